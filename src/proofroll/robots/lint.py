@@ -7,7 +7,6 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.inertia import breaks_triangle, moments, not_positive
 from proofroll.robots.model import Robot, RobotJoint
 from proofroll.robots.robot_file import LintFinding, RobotFile
 from proofroll.robots.safe_xml import numbers
@@ -40,11 +39,10 @@ def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
             continue
         if not body.mass:
             yield "error", where, "it has inertia but no mass; engines invent different masses"
-        if not_positive(body.inertia):
-            least = moments(body.inertia)[0]
-            yield "error", where, f"inertia is not positive definite (smallest moment {least:.3g} kg m²)"
-        elif breaks_triangle(body.inertia):
-            a, b, c = moments(body.inertia)
+        a, b, c = body.moments
+        if a <= 0:
+            yield "error", where, f"inertia is not positive definite (smallest moment {a:.3g} kg m²)"
+        elif body.breaks_triangle:
             yield "error", where, f"inertia breaks the triangle inequality ({c:.3g} > {a:.3g} + {b:.3g} kg m²)"
     for joint in robot.moving:
         if joint.kind == "free" or robot.groups[joint.name].mass:

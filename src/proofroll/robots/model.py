@@ -13,6 +13,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 # The parent of what hangs in the world; no body or joint has this name, but many a root link is called world.
 WORLD = ""
+# Round-off of numbers that were written with six or more digits is no defect of a body.
+_ROUNDING = 1e-9
 # Degrees of freedom of each kind of joint.
 DOFS = {"fixed": 0, "revolute": 1, "prismatic": 1, "spherical": 3, "free": 6}
 
@@ -32,6 +34,17 @@ class RobotBody:
     mass: float
     com: Array
     inertia: Array
+
+    @property
+    def moments(self) -> Array:
+        """Principal moments, smallest first, shape (3,)."""
+        return np.asarray(np.linalg.eigvalsh(self.inertia), dtype=np.float64)
+
+    @property
+    def breaks_triangle(self) -> bool:
+        """Whether the largest principal moment exceeds the sum of the others by more than round-off."""
+        small, middle, large = self.moments
+        return bool(large > (small + middle) * (1 + _ROUNDING))
 
 
 @dataclasses.dataclass(frozen=True)

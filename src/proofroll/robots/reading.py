@@ -15,10 +15,10 @@ import numpy as np
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, Missing, Refused
 from proofroll.files.json_data import plain
-from proofroll.robots.model import Robot
-from proofroll.robots.plain_data import robot_from, states_from
+from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import GROUP, Reading, Request
 from proofroll.robots.robot_file import RobotFile
+from proofroll.robots.states import RobotStates
 from proofroll.running.loading import here
 from proofroll.running.process import Worker
 
@@ -181,3 +181,24 @@ def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
 def _call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str, Any]:
     """A request to a worker for one of the functions above."""
     return {"do": "call", "function": f"{__name__}:{function.__name__}", "arguments": arguments}
+
+
+def robot_from(data: Mapping[str, Any]) -> Robot:
+    """The robot of which :func:`proofroll.files.json_data.plain` made this; its ``sources`` stay plain."""
+    return Robot(
+        data["name"],
+        {name: RobotBody(**_arrays(body)) for name, body in data["bodies"].items()},
+        tuple(RobotJoint(**_arrays(joint)) for joint in data["joints"]),
+        tuple(Mimic(**mimic) for mimic in data["mimics"]),
+        np.array(data["gravity"]),
+        data["sources"],
+    )
+
+
+def states_from(data: Mapping[str, Any]) -> RobotStates:
+    """The states of which :func:`proofroll.files.json_data.plain` made this."""
+    return RobotStates(**{field: _arrays(by_joint) for field, by_joint in data.items()})
+
+
+def _arrays(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: np.array(item, dtype=float) if isinstance(item, list) else item for key, item in values.items()}

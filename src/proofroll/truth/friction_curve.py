@@ -19,7 +19,6 @@ from proofroll.truth import taylor
 from proofroll.truth.crossing import first_rise
 from proofroll.truth.polar import Polar
 from proofroll.truth.route import Route
-from proofroll.truth.variants import with_contact
 
 _UNREACHABLE = 1e6  # a static friction that stands for rolling without slip, and still can be squared
 _POINTS = 12
@@ -82,8 +81,8 @@ class FrictionCurve:
 
 def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
     """The curve of needed friction from time 0 to ``until`` [s], whatever μ the scene has."""
-    endless = with_contact(body, mu_static=_UNREACHABLE, mu_kinetic=_UNREACHABLE)
-    fast = taylor.available() and taylor.supports(endless)
+    endless = body.with_contact(mu_static=_UNREACHABLE, mu_kinetic=_UNREACHABLE)
+    fast = taylor.supports(endless)
     route: Route = taylor.SlidingTaylor(endless) if fast else Polar(endless)
     leg = route.stick(0.0, route.start(), until)
     # One sample per turn of the ball by about a radian: crests come at the pace of the path, many turns apart.

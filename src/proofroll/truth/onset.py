@@ -12,7 +12,6 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.friction_curve import FrictionCurve, friction_curve
-from proofroll.truth.variants import with_contact
 
 _STEP = 1e-4  # relative step of the difference in f: its error, 1e-8, is far below what a sensitivity is used for
 
@@ -127,7 +126,7 @@ def _stair(curve: FrictionCurve, mu: float) -> tuple[float | None, int]:
 
 def _changed(body: RollingBall, relative: float, until: float) -> FrictionCurve:
     f = body.contact.rolling_resistance
-    return friction_curve(with_contact(body, rolling_resistance=f * (1 + relative)), until)
+    return friction_curve(body.with_contact(rolling_resistance=f * (1 + relative)), until)
 
 
 def _by_f(body: RollingBall, time: float, until: float) -> float:

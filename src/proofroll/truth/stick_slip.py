@@ -30,7 +30,7 @@ _FLOOR = 1e-12
 
 def first_route(body: RollingBall) -> Route:
     """The route that is taken as the answer: Taylor series where heyoka and the surface allow them, else DOP853."""
-    return taylor.SlidingTaylor(body) if taylor.available() and taylor.supports(body) else Polar(body)
+    return taylor.SlidingTaylor(body) if taylor.supports(body) else Polar(body)
 
 
 def stays_on(body: RollingBall, until: float) -> bool:

@@ -11,10 +11,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.events import EventKind
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
+from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, setting_off, stands, stays
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.elements.ball_on_surface.resting import setting_off, stands, stays
 from proofroll.truth.flight import Landed, airborne, pressed, touching
 from proofroll.truth.route import End, Leg, Path, Route
 

@@ -25,18 +25,15 @@ _LARGEST = 1e100  # friction that can still be squared
 _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
 
 
-def available() -> bool:
-    """Whether heyoka is installed."""
-    return library.available()
-
-
 def supports(body: RollingBall) -> bool:
-    """Whether the compiled equations hold for this scene.
+    """Whether heyoka is installed, and the compiled equations hold for this scene.
 
     The direction of the rolling resistance jumps where the centre stands still. A Taylor series does not see the
     jump, so with resistance only the vertical cylinder is taken, where the centre of a pressed ball always moves.
     """
     surface = body.surface
+    if not library.available():
+        return False
     if isinstance(surface, Plane):
         return body.contact.rolling_resistance == 0
     if not isinstance(surface, Cylinder):

@@ -11,9 +11,9 @@ import xarray as xr
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.mechanics import setting_off, stays
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.observables import energy_balance
-from proofroll.elements.ball_on_surface.resting import setting_off, stays
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 

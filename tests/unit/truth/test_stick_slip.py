@@ -75,7 +75,7 @@ def test_start_of_slip_does_not_matter() -> None:
     body = rolling_ball(scene)
     routes: list[Any] = [Implicit(body, first_step=length) for length in (0.02, 0.2)]
     routes += [Polar(body, handover=1e-4)]
-    if taylor.available():
+    if taylor.library.available():
         routes += [taylor.SlidingTaylor(body, handover=size) for size in (1e-7, 1e-6, 1e-5, 1e-4)]
     paths: list[Path] = [follow(body, route, 2.5) for route in routes]
     reference = [time for _, time in paths[0].events]
@@ -89,7 +89,7 @@ def test_the_same_answer_with_scipy_alone(monkeypatch: pytest.MonkeyPatch) -> No
     """Without heyoka another first route gives the same events and path."""
     scene, times = cylinder(mu_static=0.15, mu_kinetic=0.14), np.linspace(0.0, 0.75, 7)
     with_any, found = stick_slip(scene, times)
-    monkeypatch.setattr(taylor, "available", lambda: False)
+    monkeypatch.setattr(taylor, "supports", lambda _: False)
     assert isinstance(first_route(rolling_ball(scene)), Polar)
     with_scipy, again = stick_slip(scene, times)
     assert [event.time for event in again] == pytest.approx([event.time for event in found], abs=1e-10, rel=0)
@@ -98,7 +98,7 @@ def test_the_same_answer_with_scipy_alone(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_heyoka_is_chosen_only_where_its_equations_hold() -> None:
     """Taylor series are used on the vertical cylinder, and not where the resistance changes direction by a jump."""
-    if not taylor.available():
+    if not taylor.library.available():
         pytest.skip("heyoka is not installed")
     assert isinstance(first_route(rolling_ball(cylinder(**PAPER))), taylor.SlidingTaylor)
     assert isinstance(first_route(rolling_ball(cylinder(tilt=1.2, mu_static=0.3))), taylor.SlidingTaylor)
@@ -291,7 +291,7 @@ def test_long_sequences(
 
 def test_a_long_leg_is_handed_to_a_compiled_series(monkeypatch: pytest.MonkeyPatch) -> None:
     """However long the ball rolls, collocation makes a bounded number of steps, and events and path stay the same."""
-    if not taylor.available():
+    if not taylor.library.available():
         pytest.skip("heyoka is not installed")
     body, times = rolling_ball(cylinder(speed=10.0, mu_static=0.03)), np.linspace(0.0, 2.0, 7)
     steps, take = [0], implicit.take

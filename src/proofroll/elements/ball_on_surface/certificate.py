@@ -16,10 +16,10 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_response,
     natural_acceleration,
     slip_velocity,
+    stands,
     wall_velocity,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.resting import stands
 
 _DEEP = "a ball that is sunk in by its radius has its centre in the wall"
 _LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"

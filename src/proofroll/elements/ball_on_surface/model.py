@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Literal
@@ -192,3 +192,28 @@ class RollingBall:
     def udot0(self) -> FloatArray:
         """Initial rates of the surface coordinates, shape (2,)."""
         return np.asarray(np.linalg.pinv(self.surface.tangents(self.u0)) @ self.v0)
+
+    def with_contact(
+        self,
+        *,
+        mu_static: float | None = None,
+        mu_kinetic: float | None = None,
+        rolling_resistance: float | None = None,
+    ) -> RollingBall:
+        """The ball with other contact parameters; μk left out keeps its ratio to μs (1 where both are inf)."""
+        contact = self.contact
+        if mu_static is not None:
+            if mu_kinetic is None:
+                bounded = math.isfinite(contact.mu_static) and contact.mu_static > 0
+                mu_kinetic = mu_static * (contact.mu_kinetic / contact.mu_static if bounded else 1.0)
+            contact = replace(contact, mu_static=mu_static, mu_kinetic=mu_kinetic)
+        if rolling_resistance is not None:
+            contact = replace(contact, rolling_resistance=rolling_resistance)
+        return replace(self, contact=contact)
+
+    def at_speed(self, speed: float) -> RollingBall:
+        """The ball with another initial speed of its centre [m/s] in the same direction; it rolls, ω1 is unchanged."""
+        e1 = self.surface.normal(self.p0)
+        v0 = speed * self.v0 / np.linalg.norm(self.v0)
+        w0 = (self.w0 @ e1) * e1 - np.cross(e1, v0) / self.ball.radius
+        return replace(self, v0=v0, w0=w0, slip0=np.zeros(3))

@@ -12,9 +12,9 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
     natural_acceleration,
+    stands,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.resting import stands
 
 if TYPE_CHECKING:
     import xarray as xr

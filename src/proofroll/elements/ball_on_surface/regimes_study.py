@@ -20,7 +20,6 @@ from proofroll.files.toml import study_file
 from proofroll.files.validation import strict, validated
 from proofroll.running.in_processes import in_processes
 from proofroll.truth.regimes import Regime, analytic_boundaries, classify
-from proofroll.truth.variants import at_speed, with_contact
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -197,8 +196,8 @@ def regime_map(
 
 
 def _row(body: RollingBall, mus: FloatArray, until: float, speed: float) -> list[tuple[float, float, float]]:
-    here = at_speed(body, speed)
-    return [classify(with_contact(here, mu_static=float(mu)), until) for mu in mus]
+    here = body.at_speed(speed)
+    return [classify(here.with_contact(mu_static=float(mu)), until) for mu in mus]
 
 
 strict(RegimesStudy, EvenValues)

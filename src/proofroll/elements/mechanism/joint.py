@@ -43,6 +43,18 @@ FACTS: dict[str, Facts] = {
 }
 WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
 _WITH_QUATERNION = ("spherical", "free")
+_O, _UNIT = np.zeros(3), np.eye(3)
+# Of each velocity: whether its axis is one of B, not of A; which; whether it turns about it; whether the child carries
+# the axis round, not the parent. Of three turns about axes of the child the sum does not turn itself: ω × ω = 0.
+AXES: dict[str, tuple[tuple[bool, int, bool, bool], ...]] = {
+    "fixed": (),
+    "revolute": ((False, 2, True, False),),
+    "prismatic": ((False, 2, False, False),),
+    "universal": ((False, 2, True, False), (True, 0, True, True)),
+    "spherical": tuple((True, axis, True, False) for axis in range(3)),
+    "planar": ((False, 0, False, False), (False, 1, False, False), (False, 2, True, False)),
+    "free": tuple((True, axis, turns, not turns) for turns in (False, True) for axis in range(3)),
+}
 # which kinds may have a law along their coordinates: there a coordinate, a rate or a unit is missing elsewhere
 LAWS: dict[str, tuple[str, ...]] = {
     "stiffness": ("revolute", "prismatic", "universal"),
@@ -186,3 +198,30 @@ def check_kind(field: str, kind: str) -> None:
 
 def _none(values: object) -> bool:
     return isinstance(values, tuple | list) and not values
+
+
+def child_in_parent(kind: str, q: Array) -> tuple[Array, Array]:
+    """Where the frame B of a joint of this kind stands in A: its origin, m, and its rotation."""
+    origin, rotation = _O, _UNIT
+    if kind == "revolute":
+        rotation = rotations.about(2, q[0])
+    elif kind == "prismatic":
+        origin = np.array([0.0, 0.0, q[0]])
+    elif kind == "universal":
+        rotation = rotations.about(2, q[0]) @ rotations.about(0, q[1])
+    elif kind == "spherical":
+        rotation = rotations.from_quaternion(q)
+    elif kind == "planar":
+        origin, rotation = np.array([q[0], q[1], 0.0]), rotations.about(2, q[2])
+    elif kind == "free":
+        origin, rotation = q[:3], rotations.from_quaternion(q[3:])
+    return origin, rotation
+
+
+def coordinate_rate(kind: str, q: Array, v: Array) -> Array:
+    """Rate of a joint's coordinates."""
+    if kind == "spherical":
+        return rotations.quaternion_rate(q, v)
+    if kind == "free":
+        return np.concatenate([rotations.from_quaternion(q[3:]) @ v[:3], rotations.quaternion_rate(q[3:], v[3:])])
+    return v

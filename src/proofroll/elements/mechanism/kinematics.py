@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.elements.mechanism import joint_motion
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import AXES, FACTS, child_in_parent, coordinate_rate
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.rotations import Array, cross
@@ -84,7 +83,7 @@ class Tree:
             )
             for joint, at in zip(joints, mechanism.q_slices, strict=True)
         ]
-        axes = [(k, *axis) for k, joint in enumerate(joints) for axis in joint_motion.AXES[joint.kind]]
+        axes = [(k, *axis) for k, joint in enumerate(joints) for axis in AXES[joint.kind]]
         self._joint, self._in_child, self._axis, turns, by_child = np.array(axes, dtype=int).reshape(nv, 5).T
         self._turns = turns.astype(float)
         self._carrier = np.array([self.parents, self.children])[by_child, self._joint]
@@ -99,7 +98,7 @@ class Tree:
         for joint, at_q, at_v in zip(
             self.mechanism.joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True
         ):
-            rate[at_q] = joint_motion.rate(joint.kind, q[at_q], v[at_v])
+            rate[at_q] = coordinate_rate(joint.kind, q[at_q], v[at_v])
         return rate
 
     def normalised(self, q: Array) -> Array:
@@ -124,7 +123,7 @@ class Tree:
         for k, (kind, at, position, frame, back, child_position) in enumerate(self._static):
             i, c = self.parents[k], self.children[k]
             A = R[i] @ frame
-            d, S = joint_motion.placed(kind, q[at])
+            d, S = child_in_parent(kind, q[at])
             B = A @ S
             R[c] = B @ back
             p_joint[k] = p[i] + R[i] @ position + A @ d

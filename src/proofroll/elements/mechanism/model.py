@@ -6,7 +6,7 @@ body ``world``. Each object checks itself and raises :class:`~proofroll.core.err
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -20,7 +20,6 @@ from proofroll.elements.mechanism.checks import WORLD, Vector
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.tree import check_masses, depth_first
 
 
 class JointOrLoop(NamedTuple):
@@ -68,9 +67,9 @@ class Mechanism:
                 if getattr(item, key, WORLD) not in names:
                     field = f"{type(item).__name__.lower()}s.{item.name}.{key}"
                     raise InputError(field, getattr(item, key), f"there is no such body; choose from {_list(names)}")
-        checks.assign(self, joints=depth_first(self.bodies, self.joints))
+        checks.assign(self, joints=_depth_first(self.bodies, self.joints))
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
-        check_masses(self.bodies, self.joints)
+        _check_masses(self.bodies, self.joints)
 
     @cached_property
     def body_index(self) -> dict[str, int]:
@@ -92,6 +91,24 @@ class Mechanism:
                 for k in self.loops
             ),
         )
+
+    @property
+    def fastened(self) -> dict[str, list[Vector]]:
+        """For each body, and for the world at the end, the points in its own frame where something is fastened [m].
+
+        A free joint fastens nothing.
+        """
+        found: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in self.bodies), WORLD]}
+        for connection in self.connections:
+            if connection.kind != "free":
+                found[connection.a].append(connection.position_a)
+                found[connection.b].append(connection.position_b)
+        for spring in self.springs:
+            found[spring.body_a].append(spring.position_a)
+            found[spring.body_b].append(spring.position_b)
+        for point in self.points:
+            found[point.body].append(point.position)
+        return found
 
     @cached_property
     def nq(self) -> int:
@@ -136,3 +153,52 @@ def _check_unique(kind: str, items: Iterable[Any]) -> None:
 
 def _list(names: Iterable[str]) -> str:
     return ", ".join(sorted(names))
+
+
+def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint, ...]:
+    """The joints, each after the joint of its parent and directly before those of its descendants.
+
+    Some engines are silently wrong in another order (Pinocchio's crba).
+
+    Raises:
+        InputError: a body with two parents or none, or a cycle.
+    """
+    holder: dict[str, Joint] = {}
+    for joint in joints:
+        if joint.child in holder:
+            other = holder[joint.child].name
+            advice = f"the body has two parents, through {other} and {joint.name}; make one of these joints a loop"
+            raise InputError(f"joints.{joint.name}.child", joint.child, advice)
+        holder[joint.child] = joint
+    for body in bodies:
+        if body.name not in holder:
+            raise InputError(f"bodies.{body.name}", body.name, "no joint has this body as its child; add a free joint")
+    children: dict[str, list[Joint]] = {}
+    for joint in joints:
+        children.setdefault(joint.parent, []).append(joint)
+    found: list[Joint] = []
+    waiting = children.get(WORLD, [])[::-1]
+    while waiting:  # without recursion: chains are long
+        joint = waiting.pop()
+        found.append(joint)
+        waiting += children.get(joint.child, [])[::-1]
+    if len(found) < len(joints):
+        lost = next(joint for joint in joints if joint not in found)
+        advice = "the joints form a cycle that never reaches the world; make one of its joints a loop"
+        raise InputError(f"joints.{lost.name}.parent", lost.parent, advice)
+    return tuple(found)
+
+
+def _check_masses(bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
+    """Whatever a joint moves has a mass, if not in the body itself, then in one that it carries.
+
+    Raises:
+        InputError: a body that moves carries no mass, and its joint has no armature.
+    """
+    carried = {body.name: body.mass for body in bodies} | {WORLD: 0.0}
+    for joint in reversed(joints):  # sorted: the children come last
+        carried[joint.parent] += carried[joint.child]
+        if not carried[joint.child] and joint.nv and not joint.armature:
+            raise InputError(
+                f"bodies.{joint.child}.mass", 0.0, "a body without mass can move here; give it one or fix it"
+            )

@@ -13,7 +13,7 @@ from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
-from proofroll.elements.mechanism.joint_motion import placed
+from proofroll.elements.mechanism.joint import child_in_parent
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of, unsaid
 from proofroll.engines.mujoco import mechanism_model
@@ -77,14 +77,14 @@ class MujocoMechanism(SteppedModel):
             return
         q, v = np.array(joint.q0), np.array(joint.v0)
         if len(parts) == 1 and joint.kind == "free":  # qpos: the body's frame in the world; qvel: its origin's velocity
-            origin, S = placed(joint.kind, q)
+            origin, S = child_in_parent(joint.kind, q)
             R = joint.parent_frame @ S
             arm = R @ joint.child_position
             place = np.array(joint.position) + joint.parent_frame @ origin - arm
             q = np.concatenate([place, to_quaternion(R)])
             v = np.concatenate([R @ v[:3] - cross(R @ v[3:], arm), v[3:]])
         elif joint.kind == "free":
-            v = np.concatenate([placed(joint.kind, q)[1] @ v[:3], v[3:]])
+            v = np.concatenate([child_in_parent(joint.kind, q)[1] @ v[:3], v[3:]])
         self._data.qpos[parts[0].qposadr[0] :][: len(q)] = q
         first = parts[0].dofadr[0]
         self._data.qvel[first : first + len(v)] = v

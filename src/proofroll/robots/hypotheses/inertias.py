@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
-from proofroll.robots.inertia import breaks_triangle, not_positive
 from proofroll.robots.model import Array, Robot, RobotBody
 
 
@@ -25,7 +24,7 @@ def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
         body = robot.bodies.get(name)
         alone = sum(carrier == home for carrier, _, _ in robot.welded.values()) == 1
         if body is not None and home in other:
-            impossible = breaks_triangle(body.inertia) or not_positive(body.inertia)
+            impossible = body.breaks_triangle or body.moments[0] <= 0
             if alone or (impossible and np.any(body.inertia)) or (not body.mass and np.any(body.inertia)):
                 yield body
 

@@ -14,7 +14,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.truth import taylor
 from proofroll.truth.regimes import Regime
 
-slow = pytest.mark.skipif(not taylor.available(), reason="a map takes minutes without heyoka")
+slow = pytest.mark.skipif(not taylor.library.available(), reason="a map takes minutes without heyoka")
 
 TEXT = """
 study = "regimes"

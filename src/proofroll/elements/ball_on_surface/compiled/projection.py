@@ -20,7 +20,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.elements.ball_on_surface.compiled.rolling import Function
+from proofroll.elements.ball_on_surface.compiled.rolling import CompiledEquations, Function
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 
@@ -174,27 +174,14 @@ def _euler_angles(theta: Any, psi: Any, r: _Symbols) -> tuple[_Symbols, _Symbols
     return axes, drift, inverse
 
 
-@dataclass(frozen=True)
-class Projected:
-    """The equations compiled.
-
-    Attributes:
-        integrator: of the state; copy it, for it holds one.
-        evaluate: state -> its rates, and N, λ1 and λ2 over mass [m/s²].
-    """
-
-    integrator: Any
-    evaluate: Function
-
-
 @lru_cache(maxsize=16)
-def projected(form: Structure, tolerance: float) -> Projected:
-    """The equations compiled for a tolerance of each step, relative to the state [-]; it also decides the order."""
+def projected(form: Structure, tolerance: float) -> CompiledEquations:
+    """As :func:`rolling.reduced`, with the forces N, λ1 and λ2."""
     import heyoka as hy
 
     found = equations(form)
     outputs = [*(rate for _, rate in found.system), found.N, *found.multipliers]
-    return Projected(
+    return CompiledEquations(
         integrator=hy.taylor_adaptive(found.system, [1.0] * len(found.system), tol=tolerance),
         evaluate=Function(outputs, found.state),
     )

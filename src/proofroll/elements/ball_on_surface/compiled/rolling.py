@@ -122,12 +122,12 @@ class Function:
 
 
 @dataclass(frozen=True)
-class CompiledRolling:
-    """Rolling without slip, compiled.
+class CompiledEquations:
+    """Equations, compiled.
 
     Attributes:
-        integrator: of (q, h, v2, v3, ω1); copy it, for it holds a state.
-        evaluate: (q, h, v2, v3, ω1) -> their rates, and b2/A, b3/A, N [m/s²]: what friction must hold, and the press.
+        integrator: of the state; copy it, for it holds one.
+        evaluate: state -> its rates, and the forces over mass [m/s²].
     """
 
     integrator: Any
@@ -135,14 +135,17 @@ class CompiledRolling:
 
 
 @lru_cache(maxsize=16)
-def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledRolling:
-    """The equations compiled for a tolerance of each step, relative to the state [-]; it also decides the order."""
+def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquations:
+    """The equations compiled for a tolerance of each step, relative to the state [-]; it also decides the order.
+
+    Forces are b2/A, b3/A and N: what friction must hold, and the press.
+    """
     import heyoka as hy
 
     found = expressions(resistance, uniform)
     system = found.rolling()
     outputs = [*(rate for _, rate in system), found.per_A * found.b2, found.per_A * found.b3, found.N]
-    return CompiledRolling(
+    return CompiledEquations(
         integrator=hy.taylor_adaptive(system, [1.0] * len(system), tol=tolerance),
         evaluate=Function(outputs, found.state),
     )

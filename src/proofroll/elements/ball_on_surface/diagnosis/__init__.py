@@ -6,7 +6,7 @@ from typing import Any
 
 from proofroll.core.diagnosis.held import AnyGravity
 from proofroll.elements.ball_on_surface.diagnosis.contact_laws import CONTACT_LAWS
-from proofroll.elements.ball_on_surface.diagnosis.held import falling, held_against
+from proofroll.elements.ball_on_surface.diagnosis.equations import falling, held_against
 from proofroll.elements.ball_on_surface.diagnosis.numbers import NUMBERS
 from proofroll.elements.ball_on_surface.diagnosis.said import SAID
 

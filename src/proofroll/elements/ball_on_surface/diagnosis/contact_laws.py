@@ -11,8 +11,13 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
 from proofroll.core.events import events_of
-from proofroll.elements.ball_on_surface.diagnosis.equations import Law
-from proofroll.elements.ball_on_surface.diagnosis.held import COVERED, has_resistance, held_against, is_bounded
+from proofroll.elements.ball_on_surface.diagnosis.equations import (
+    COVERED,
+    Law,
+    has_resistance,
+    held_against,
+    is_bounded,
+)
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
 from proofroll.elements.ball_on_surface.model import RollingBall
 

@@ -12,8 +12,7 @@ import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence
 from proofroll.core.diagnosis.fitting import known_factor, said_factor, telling
-from proofroll.elements.ball_on_surface.diagnosis.equations import Law
-from proofroll.elements.ball_on_surface.diagnosis.held import has_resistance, held_against, is_bounded
+from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, held_against, is_bounded
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 

@@ -109,14 +109,6 @@ class Cylinder:
         across, down = self._tilted
         return np.array([[across * cos, -across * sin, down], [sin, cos, 0.0], [-down * cos, down * sin, across]])
 
-    def _around(self, x: float, y: float, z: float) -> tuple[float, float, float]:
-        """Distance from the axis [m], and cosine and sine of the angle about it, of one point."""
-        across, down = self._tilted
-        x = across * x - down * z
-        distance = math.sqrt(x * x + y * y)
-        size = distance or math.nan  # on the axis there is no direction
-        return distance, x / size, y / size
-
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """See :class:`Surface`."""
         if not self.tilt:  # as in triad
@@ -124,7 +116,7 @@ class Cylinder:
             size = distance or math.nan
             return self.radius - distance, x / size, y / size, 0.0
         across, down = self._tilted
-        x = across * x - down * z  # as in _around, which would be a third of the cost here
+        x = across * x - down * z
         distance = math.sqrt(x * x + y * y)
         cos = x / (distance or math.nan)
         return self.radius - distance, across * cos, y / (distance or math.nan), -down * cos
@@ -181,9 +173,12 @@ class Cylinder:
     def normal_gradient(self, p_WB: npt.ArrayLike) -> FloatArray:
         """See :class:`Surface`."""
         if np.ndim(p_WB) == 1:
-            distance, cos, sin = self._around(*np.asarray(p_WB).tolist())
-            upright, down = self._tilted
-            ex, ey, ez = -upright * sin, cos, down * sin  # e2, along which alone the normal turns
+            x, y, z = np.asarray(p_WB).tolist()
+            across, down = self._tilted
+            x = across * x - down * z
+            distance = math.sqrt(x * x + y * y)
+            cos, sin = x / (distance or math.nan), y / (distance or math.nan)  # on the axis there is no direction
+            ex, ey, ez = -across * sin, cos, down * sin  # e2, along which alone the normal turns
             rows = [[ex * ex, ex * ey, ex * ez], [ey * ex, ey * ey, ey * ez], [ez * ex, ez * ey, ez * ez]]
             return np.array(rows) / distance
         p = self._local(p_WB)

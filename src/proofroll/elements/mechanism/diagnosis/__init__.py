@@ -7,14 +7,11 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis.held import AnyGravity
-from proofroll.elements.mechanism.diagnosis.axes import other_axis
 from proofroll.elements.mechanism.diagnosis.equations import Change
-from proofroll.elements.mechanism.diagnosis.factors import FACTORS_OF_ALL
 from proofroll.elements.mechanism.diagnosis.held import held_against
-from proofroll.elements.mechanism.diagnosis.one_by_one import of_each_body, of_each_joint
-from proofroll.elements.mechanism.diagnosis.reactions import reactions
+from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
 from proofroll.elements.mechanism.diagnosis.said import SAID
-from proofroll.elements.mechanism.diagnosis.structure import loop_lacks_row, lost_coupling
+from proofroll.elements.mechanism.diagnosis.structure import loop_lacks_row, lost_coupling, other_axis
 
 GRAVITY = AnyGravity(
     held_against,
@@ -23,7 +20,6 @@ GRAVITY = AnyGravity(
 )
 HYPOTHESES: tuple[Any, ...] = (
     *SAID,
-    reactions,
     other_axis,
     *FACTORS_OF_ALL,
     of_each_body,

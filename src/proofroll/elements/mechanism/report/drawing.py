@@ -6,7 +6,6 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.fastened import fastened
 from proofroll.report.pen import Drawing, View
 
 _SIZE = 240.0  # of the mechanism in the picture [px]
@@ -28,7 +27,7 @@ def drawn(element: MechanismElement) -> Drawing:
     for spring in mechanism.springs:
         ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
         picture.path(_zigzag(at(np.stack(ends))), "thin")
-    ends_of = fastened(mechanism)
+    ends_of = mechanism.fastened
     for body in mechanism.bodies:
         com = place(body.name, body.com)
         for end in ends_of[body.name]:

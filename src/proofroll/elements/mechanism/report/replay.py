@@ -15,7 +15,6 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.fastened import fastened
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
@@ -47,7 +46,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     """What the replay draws of a mechanism: see :data:`proofroll.report.replay.Drawer`."""
     element = _element(replayed.scene)
     mechanism, length = element.mechanism, element.length
-    bodies, skeleton = [*element.bodies, WORLD], fastened(mechanism)
+    bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
