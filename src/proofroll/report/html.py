@@ -94,8 +94,12 @@ def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
 
 
 def templates() -> jinja2.Environment:
-    """The templates of the report, with the names that they use."""
-    kinds: list[type[Part] | type[ReportKind]] = [*part_kinds(), *report_kinds()]
+    """The templates of the report, with the names that they use; each is compiled once in a process."""
+    return _templates(part_kinds() + report_kinds())
+
+
+@functools.cache
+def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Environment:
     made = environment(*(Path(inspect.getfile(kind)).parent / "templates" for kind in kinds))
     made.filters |= {
         "number": labels.number,

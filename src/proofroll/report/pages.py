@@ -6,34 +6,18 @@ import base64
 import gzip
 import re
 from pathlib import Path
-from types import CodeType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import jinja2
 
 
-# What templates were compiled to, by their place and their text.
-_COMPILED: dict[tuple[str, str], CodeType] = {}
-
-
 def environment(*folders: Path) -> jinja2.Environment:
     """The report's templates and those of further folders; everything is escaped, save what they mark as ours."""
     import jinja2
 
-    class CompiledTemplates(jinja2.BytecodeCache):
-        """Each template is compiled once in a process; what it is rendered with is the environment's own."""
-
-        def load_bytecode(self, bucket: jinja2.bccache.Bucket) -> None:
-            bucket.code = _COMPILED.get((bucket.key, bucket.checksum))
-
-        def dump_bytecode(self, bucket: jinja2.bccache.Bucket) -> None:
-            assert bucket.code is not None
-            _COMPILED[bucket.key, bucket.checksum] = bucket.code
-
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader([*dict.fromkeys([Path(__file__).parent / "templates", *folders])]),
-        bytecode_cache=CompiledTemplates(),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.report import stability_map
-from proofroll.report.study_parts import Part, PartEntry, head_of, held
+from proofroll.report.study_parts import Part, PartEntry, held
 from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ class StabilityPart(Part):
     key: ClassVar[str] = "stability"
     order: ClassVar[float] = 40
     words: ClassVar[str] = "where engines stop being right"
+    command: ClassVar[str] = "stability {.scene}"
     template: ClassVar[str] = "stability.html"
     names: ClassVar[Mapping[str, Any]] = {"stability_map": stability_map}
     asked: StabilityFile
@@ -63,16 +64,6 @@ class StabilityPart(Part):
         """How many boundaries are silent, and what holds of what was claimed."""
         study = entry.study
         return f"{study.silent} of {study.boundaries} boundaries are silent{held(entry.claims)}"
-
-    @property
-    def on_request(self) -> bool:
-        """As its file says."""
-        return self.asked.on_request
-
-    @property
-    def head(self) -> dict[str, str]:
-        """What it is."""
-        return head_of(self.asked, f"proofroll stability {self.asked.scene}", self.engines)
 
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one, of all axes if there is."""

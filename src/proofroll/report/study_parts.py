@@ -55,17 +55,23 @@ class Part(Protocol):
         key: under which the content lists it.
         order: place among the parts of a report, the smallest first.
         words: what is made, for a person.
+        command: of ``proofroll`` that makes it, with fields of ``asked`` as in ``stability {.scene}``.
         template: in the folder ``templates`` beside the class's module, with the macros
             ``section(entry, index, pictures, content)`` and ``link(entry, index, count)``; the latter for the contents.
         names: further names that the template uses; no other part has them.
+        asked: what its file says.
+        engines: to which it is restricted; none: all.
     """
 
     kind: ClassVar[str]
     key: ClassVar[str]
     order: ClassVar[float]
     words: ClassVar[str]
+    command: ClassVar[str] = ""
     template: ClassVar[str]
     names: ClassVar[Mapping[str, Any]] = {}
+    asked: Any
+    engines: Sequence[str] = ()
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
@@ -85,12 +91,15 @@ class Part(Protocol):
 
     @property
     def on_request(self) -> bool:
-        """Whether a report of everything leaves it out unless it is kept."""
-        return False
+        """Whether a report of everything leaves it out unless it is kept; as its file says."""
+        return getattr(self.asked, "on_request", False)
 
     @property
     def head(self) -> dict[str, str]:
         """``name`` of the file, ``title``, ``question``, ``scene`` and the ``command`` that makes it."""
+        words = "".join(f" --engine {shlex.quote(name)}" for name in self.engines)
+        command = f"proofroll {self.command.format(self.asked)}{words}"
+        return {key: getattr(self.asked, key) for key in ("name", "title", "question", "scene")} | {"command": command}
 
     def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- for those that keep something
         """Takes what is kept under ``out`` and still holds; False: there is nothing."""
@@ -164,14 +173,6 @@ def absent(part: Part, reason: str) -> PartEntry:
     """What the content lists of a part that there is not; one sentence says why, and how to get it."""
     missing = f"{' '.join(reason.split()).rstrip('.')}; {part.head['command']} makes it."
     return PartEntry(**part.head, missing=missing)
-
-
-def head_of(asked: Any, command: str, engines: Sequence[str] = ()) -> dict[str, str]:
-    """The ``head`` of a part whose file has all of it, made by a command for some engines (none: for all)."""
-    words = "".join(f" --engine {shlex.quote(name)}" for name in engines)
-    return {name: getattr(asked, name) for name in ("name", "title", "question", "scene")} | {
-        "command": command + words
-    }
 
 
 def held(claims: Sequence[Any]) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from proofroll.core.comparison import Tolerance
 from proofroll.files.json_data import MERGED
 from proofroll.report import tradeoff_tables
-from proofroll.report.study_parts import Part, PartEntry, head_of, held
+from proofroll.report.study_parts import Part, PartEntry, held
 from proofroll.report.tradeoff_tables import default_quantities
 from proofroll.studies.claimed import ClaimJudgement
 from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
@@ -55,6 +55,7 @@ class TradeoffPart(Part):
     key: ClassVar[str] = "tradeoffs"
     order: ClassVar[float] = 30
     words: ClassVar[str] = "speed against accuracy"
+    command: ClassVar[str] = "tradeoff {.scene}"
     template: ClassVar[str] = "tradeoff.html"
     names: ClassVar[Mapping[str, Any]] = {"tradeoffs": tradeoff_tables}
     asked: TradeoffClaims
@@ -70,11 +71,6 @@ class TradeoffPart(Part):
     def line(entry: TradeoffEntry) -> str:
         """How much was measured, and what holds of what was claimed."""
         return f"{len(entry.study.points)} points{held(entry.claims)}"
-
-    @property
-    def head(self) -> dict[str, str]:
-        """What it is."""
-        return head_of(self.asked, f"proofroll tradeoff {self.asked.scene}", self.engines)
 
     def keeps(self, out: Path) -> bool:
         """The whole study, or else a brief one."""

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.report.pages import environment, rendered
 from proofroll.robots.records import RobotCheck
 from proofroll.robots.terminal import SHORT, amount, sentences
+
+if TYPE_CHECKING:
+    import jinja2
 
 # The robot is seen from the front, the left and above: directions to the right and up in the picture.
 _RIGHT, _UP = np.array([-0.64, 0.77, 0.0]), np.array([-0.26, -0.22, 0.94])
@@ -18,10 +22,15 @@ _SIZE = 400.0
 
 def page(content: RobotCheck) -> str:
     """The HTML page; everything from the file and the engines is escaped."""
-    templates = environment(Path(__file__).parent / "templates")
-    templates.filters["amount"] = amount
     said = {"short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
-    return rendered(templates, "check.html", content=content, **said)
+    return rendered(_templates(), "check.html", content=content, **said)
+
+
+@cache
+def _templates() -> jinja2.Environment:
+    made = environment(Path(__file__).parent / "templates")
+    made.filters["amount"] = amount
+    return made
 
 
 def skeleton(content: RobotCheck) -> dict[str, Any]:

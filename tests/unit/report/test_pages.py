@@ -8,13 +8,12 @@ from typing import Any
 import jinja2
 import pytest
 
+from proofroll.report import html
 from proofroll.report.pages import environment, rendered
 
 
-def test_a_template_is_compiled_once_and_says_what_each_page_has(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Pages with other words and other functions share nothing but what was compiled; another text is compiled anew."""
+def test_a_template_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All pages of a process share what was compiled for the first."""
     compiled = []
     compile_ = jinja2.Environment.compile
 
@@ -23,20 +22,15 @@ def test_a_template_is_compiled_once_and_says_what_each_page_has(
         return compile_(self, *arguments, **more)
 
     monkeypatch.setattr(jinja2.Environment, "compile", counted)
-    folders = [tmp_path / "a", tmp_path / "b"]
-    for folder in folders:
-        folder.mkdir()
-        (folder / "said.html").write_text("{{ word | shown }} {{ told }}")
-
-    def said(folder: Path, word: str, shown: Any, told: str) -> str:
-        made = environment(folder)
-        made.filters["shown"], made.globals["told"] = shown, told
-        return rendered(made, "said.html", word=word)
-
-    assert said(folders[0], "<One", str.lower, "here") == "&lt;one here"
-    assert said(folders[0], "<Two", str.upper, "there") == "&lt;TWO there"
+    html._templates.cache_clear()
+    for _ in range(2):
+        html.templates().get_template("common.html")
     assert len(compiled) == 1
-    assert said(folders[1], "Three", str.lower, "there") == "three there"
-    (folders[0] / "said.html").write_text("now {{ word | shown }}")
-    assert said(folders[0], "One", str.lower, "here") == "now one"
-    assert len(compiled) == 3
+
+
+def test_words_are_escaped(tmp_path: Path) -> None:
+    """What a page is told is text, and a name that nobody gave is an error."""
+    (tmp_path / "said.html").write_text("{{ word }}")
+    assert rendered(environment(tmp_path), "said.html", word="<One") == "&lt;One"
+    with pytest.raises(jinja2.UndefinedError):
+        rendered(environment(tmp_path), "said.html")

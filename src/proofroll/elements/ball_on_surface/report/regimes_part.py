@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from proofroll.elements.ball_on_surface.regimes_study import STUDY, RegimesStudy, load_regimes, regime_maps
-from proofroll.report.study_parts import Part, PartEntry, head_of
+from proofroll.report.study_parts import Part, PartEntry
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,6 +25,7 @@ class RegimesPart(Part):
     key: ClassVar[str] = "regimes"
     order: ClassVar[float] = 20
     words: ClassVar[str] = "regime maps"
+    command: ClassVar[str] = "regimes {.name}"
     template: ClassVar[str] = "regimes.html"
     asked: RegimesStudy
     maps: list[xr.Dataset] = field(default_factory=list)
@@ -40,11 +41,6 @@ class RegimesPart(Part):
         maps = entry.study["maps"]
         total = {word: sum(item["counts"][word] for item in maps) for word in maps[0]["counts"]}
         return ", ".join(f"{count} {word}" for word, count in total.items())
-
-    @property
-    def head(self) -> dict[str, str]:
-        """What it is."""
-        return head_of(self.asked, f"proofroll regimes {self.asked.name}")
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """The maps, briefly."""
