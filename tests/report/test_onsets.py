@@ -135,17 +135,18 @@ def test_data_holds_events_onsets_and_their_verdicts(content: ReportContent) -> 
 def test_table_says_what_is_missing_added_and_left_out(content: ReportContent) -> None:
     """Events stand beside the truth's of the same number; more than the table holds are counted."""
     well, edge = truth_at(content, WELL), truth_at(content, EDGE)
-    table = slip_table(content.comparisons[0], 0, 0, well.point, well.own)
+    table = slip_table(content.comparisons[0], well.point, well.own)
     alpha, beta, gamma, delta = table.lines
     assert alpha.in_order
     assert alpha.difference == alpha.cells[0].difference == "+1e-7"
     assert [cell.wrong for cell in beta.cells] == ["", "", "not in the truth", "not in the truth"]
-    assert (beta.count, beta.more, beta.in_order) == (6, 2, False)
+    assert (beta.count, table.columns, beta.in_order) == (6, 4, False)
     assert [cell.wrong for cell in gamma.cells] == ["missing", "missing", "", ""]
     assert (gamma.first, gamma.difference) == (None, "–")
-    assert delta.message == "refused: needs <b>more</b>"
+    assert delta.run
+    assert (delta.run.status, delta.run.message, delta.cells) == ("refused", "needs <b>more</b>", [])
     assert table.wrong == "differs"
-    assert slip_table(content.comparisons[0], 0, 1, edge.point, edge.own).wrong == "ill-posed"
+    assert slip_table(content.comparisons[0], edge.point, edge.own).wrong == "ill-posed"
 
 
 def test_conditioning_names_the_edges(content: ReportContent) -> None:

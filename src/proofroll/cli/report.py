@@ -53,11 +53,11 @@ def report(
     runner = options.new_runner(out, fresh, jobs, scheduler)
     tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))
-    stages = _Stages(len(keys) + bool(loaded))
+    total = len(keys) + bool(loaded)
     command = _command(studies or [], engine or [], out)
     outcomes: list[Outcome] = []
     if loaded:
-        stage = stages.next("comparisons")
+        stage = _begin(1, total, "comparisons")
         if len(loaded) > 1:
             awaited = [item.title for item in loaded[1:]]
             first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited)
@@ -68,9 +68,10 @@ def report(
     made = begun(outcomes, runner.store, command)
     missing = made.expect(parts, out, fresh=fresh)
     made.write(out)
-    for key in keys:
+    for number, key in enumerate(keys, start=1 + bool(loaded)):
         wanted = [part for part in missing if part.key == key]
-        stage = stages.next(next(part.words for part in parts if part.key == key), kept=not wanted)
+        words = next(part.words for part in parts if part.key == key)
+        stage = _begin(number, total, words if wanted else f"{words}: kept from before")
         for part in wanted:
             _make(made, part, runner, out, stage)
             made.write(out)
@@ -86,18 +87,10 @@ def _command(studies: list[str], engines: list[str], out: Path) -> str:
     return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 
-class _Stages:
-    """Says on standard error which stage begins."""
-
-    def __init__(self, total: int) -> None:
-        self._total, self._number = total, 0
-
-    def next(self, words: str, kept: bool = False) -> str:
-        """Begins the next stage; returns what its progress bar puts before its own words."""
-        self._number += 1
-        where = f"{self._number} of {self._total}"
-        options.complain(f"{where}, {words}" + (": kept from before" if kept else ""))
-        return f"{where}: "
+def _begin(number: int, total: int, words: str) -> str:
+    """Says on standard error which stage begins; returns what its progress bar puts before its own words."""
+    options.complain(f"{number} of {total}, {words}")
+    return f"{number} of {total}: "
 
 
 def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.files.scene_file import load_scene
@@ -110,6 +111,11 @@ def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], s
     ]
     case = ReplayCase(replayed.group, replayed.label, kind.name, replayed.scene.title, own, runs, drawn.arrays)
     return case, packed(bytes(drawn.content))
+
+
+def in_sight(off: npt.NDArray[np.bool_]) -> int | None:
+    """How many frames to draw of something that is ``off`` the picture in some: until it leaves it for good, or all."""
+    return 1 + int(np.flatnonzero(~off).max(initial=0)) if off[-1] else None
 
 
 def distance(path: FloatArray, true: FloatArray) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
@@ -75,7 +75,7 @@ def _said(run: xr.Dataset) -> str:
 def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     """The scene of a run, with all that can be asked of its truth."""
     try:
-        digest, parameters = str(run.attrs["scene_digest"]), _parameters(run)
+        digest, parameters = str(run.attrs["scene_digest"]), dict(json.loads(run.attrs["parameters"]))
     except (KeyError, ValueError):
         name = ""
     if not name:
@@ -86,10 +86,6 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     if digest not in {scene.digest, scene.fully_asked.digest}:
         raise InputError("run", str(path), f"the scene {name} has changed since this run; run it again")
     return scene.fully_asked
-
-
-def _parameters(run: xr.Dataset) -> dict[str, Any]:
-    return dict(json.loads(run.attrs["parameters"]))
 
 
 def _ghosts(path: Path, run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:

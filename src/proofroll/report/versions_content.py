@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from rich.table import Column, Table
@@ -44,34 +44,26 @@ def answer(content: VersionsStudy) -> str:
     return f"{len(cases)} cases: {', '.join(parts)}; {verdicts}."
 
 
-def verdicts_text(row: SettingDifference) -> str:
-    """How many cases had which verdict, then and now."""
-    before, after = (_counts(row.verdicts[side]) for side in ("old", "new"))
-    return before if before == after else f"{before} → {after}"
-
-
-def _counts(verdicts: Mapping[str, int]) -> str:
-    return " ".join(f"{SYMBOLS[word]}{verdicts[word]}" for word in SYMBOLS if word in verdicts)
-
-
-def numbers_text(row: SettingDifference) -> str:
-    """The largest difference of any case."""
-    found = row.numbers
-    if found is None:
-        return "–"
-    return "same" if found.kind == NumberKind.SAME_BITS else f"{number(found.relative)} {found.quantity}"
-
-
-def order_text(row: SettingDifference) -> str:
-    """The declared orders of all points, then and now."""
+def cells(row: SettingDifference) -> list[str]:
+    """The setting, and then and now its verdicts over all cases, the largest difference, the orders, and the time."""
+    before, after = (
+        " ".join(f"{SYMBOLS[word]}{row.verdicts[side][word]}" for word in SYMBOLS if word in row.verdicts[side])
+        for side in ("old", "new")
+    )
+    numbers, speed = row.numbers, row.speed
     old, new = (", ".join(map(str, row.declared_order[side])) or "–" for side in ("old", "new"))
-    return old if old == new else f"{old} → {new}"
-
-
-def speed_text(row: SettingDifference) -> str:
-    """Time of the new version over that of the old one, with its interval."""
-    found = row.speed
-    return "" if found is None else f"{found.value:.2f} [{found.low:.2f}, {found.high:.2f}]"
+    if numbers is None:
+        largest = "–"
+    else:
+        same = numbers.kind == NumberKind.SAME_BITS
+        largest = "same" if same else f"{number(numbers.relative)} {numbers.quantity}"
+    return [
+        short(row.setting),
+        before if before == after else f"{before} → {after}",
+        largest,
+        old if old == new else f"{old} → {new}",
+        "" if speed is None else f"{speed.value:.2f} [{speed.low:.2f}, {speed.high:.2f}]",
+    ]
 
 
 def table(content: VersionsStudy) -> Table:
@@ -88,8 +80,7 @@ def table(content: VersionsStudy) -> Table:
             made.add_row(Text(row.comparison, style="bold"))
         before = row.comparison
         style = "red" if row.changed else "yellow" if row.numbers and row.numbers.kind == NumberKind.CHANGED else ""
-        cells = [short(row.setting), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)]
-        made.add_row(*(Text(cell, style=style) for cell in cells[: len(made.columns)]))
+        made.add_row(*(Text(cell, style=style) for cell in cells(row)[: len(made.columns)]))
     return made
 
 
@@ -150,16 +141,12 @@ def _some(sentences: list[str], most: int | None) -> Iterator[str]:
 
 def page(content: VersionsStudy) -> str:
     """The HTML page; everything from engines and files is escaped."""
-    cells = [
-        (row, [short(row.setting), verdicts_text(row), numbers_text(row), order_text(row), speed_text(row)])
-        for row in content.rows
-    ]
     return rendered(
         environment(),
         "versions.html",
         content=content,
         heading=heading(content),
         answer=answer(content),
-        rows=cells,
+        rows=[(row, cells(row)) for row in content.rows],
         sentences=list(lines(content, None)),
     )

@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.elements.ball_on_surface.report.onsets import TrueSlips, first_slip
-from proofroll.report.labels import names, number
-from proofroll.report.verdict_matrix import anchor
+from proofroll.report.labels import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from proofroll.core.events import Event
-    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.comparison_records import ReportedComparison, ReportedRun
 
 # Events that the table shows; the page says how many more there are.
 SHOWN = 4
@@ -33,19 +32,14 @@ class EventCell:
 
 @dataclass(frozen=True)
 class SlipLine:
-    """Slips of the truth or of a run; ``more``: events that are not shown; ``message``: why there are none."""
+    """Slips of the truth or of a ``run``, of which ``count`` events in all; no cells where it failed."""
 
+    run: ReportedRun | None
     first: Event | None
+    difference: str
     cells: list[EventCell]
     count: int
-    more: int
-    name: str = "truth"
-    href: str = ""
-    message: str = ""
-    difference: str = "–"
-    verdict: str = ""
-    painted: str = ""
-    in_order: bool = True
+    in_order: bool
 
 
 @dataclass(frozen=True)
@@ -80,33 +74,25 @@ def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
     return facts
 
 
-def slip_table(content: ReportedComparison, comparison: int, point: int, at: str, truth: TrueSlips) -> SlipTable:
+def slip_table(content: ReportedComparison, at: str, truth: TrueSlips) -> SlipTable:
     """First slips and the first events at one point, which is named ``at``."""
-    shown = names(content.rows)
     runs = [run for run in content.runs if run.point == at]
     columns = min(SHOWN, max(len(slips.events) for slips in (truth, *(run.own for run in runs))))
-    true, lines = first_slip(truth.events), []
-    for run in runs:
-        events, verdict = run.own.events, run.own.onset_verdict
-        first, failed = first_slip(events), run.status != "done"
-        lines.append(
-            SlipLine(
-                first=first,
-                cells=[] if failed else [_cell(events, truth.events, index) for index in range(columns)],
-                count=len(events),
-                more=max(0, len(events) - columns),
-                name=shown[run.row],
-                href=anchor(comparison, run.row, point),
-                message=f"{run.status}: {run.message}" if failed else "",
-                difference=signed(first.time - true.time) if first and true else "–",
-                verdict="ill-posed here" if verdict == "ill-posed" else verdict,
-                painted=PAINTED.get(verdict, "failed"),
-                in_order=[event.kind for event in events] == [event.kind for event in truth.events],
-            )
+
+    def line(run: ReportedRun | None, events: Sequence[Event]) -> SlipLine:
+        first, true = first_slip(events), first_slip(truth.events)
+        shown = range(columns) if run is None or run.status == "done" else ()
+        return SlipLine(
+            run,
+            first,
+            signed(first.time - true.time) if run and first and true else "–",
+            [_cell(events, truth.events, index, own=run is None) for index in shown],
+            len(events),
+            [event.kind for event in events] == [event.kind for event in truth.events],
         )
-    cells = [_cell(truth.events, truth.events, index, own=True) for index in range(columns)]
-    above = SlipLine(true, cells, len(truth.events), max(0, len(truth.events) - columns))
-    return SlipTable(columns, "ill-posed" if truth.onset.verdict == "ill-posed" else "differs", above, lines)
+
+    wrong = "ill-posed" if truth.onset.verdict == "ill-posed" else "differs"
+    return SlipTable(columns, wrong, line(None, truth.events), [line(run, run.own.events) for run in runs])
 
 
 def clock(event: Event) -> str:

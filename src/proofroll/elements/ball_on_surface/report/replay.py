@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
 from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import frame_times
+from proofroll.report.replay import frame_times, in_sight
 from proofroll.report.replay_records import PackedNumbers, Replayed
 
 # What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
@@ -92,9 +92,6 @@ def _reachable(shown: Poses, true: Poses, body: RollingBall) -> Poses:
     """The frames until a ball leaves the picture for good: coordinates that grow without bound draw nothing."""
     centre = true.p_WB.mean(axis=0)
     size = float(np.linalg.norm(true.p_WB - centre, axis=1).max()) + body.ball.radius
-    far = np.linalg.norm(shown.p_WB - centre, axis=1) > _FAR * size
-    if not far[-1]:
-        return shown
-    last = 1 + int(np.flatnonzero(~far).max(initial=0))
+    last = in_sight(np.linalg.norm(shown.p_WB - centre, axis=1) > _FAR * size)
     kept: dict[str, Any] = {name: None if values is None else values[:last] for name, values in vars(shown).items()}
     return dataclasses.replace(shown, **kept)

@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
 from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import frame_times
+from proofroll.report.replay import frame_times, in_sight
 from proofroll.report.replay_records import SPEEDS, PackedNumbers, Replayed
 
 # Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
@@ -162,9 +162,6 @@ def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -
 def _reachable(motion: Placed, true: Placed, length: float) -> Placed:
     """The frames until a mechanism leaves the picture for good: what grows without bound draws nothing."""
     count = motion.time.size
-    off = np.linalg.norm(motion.p_WB - true.p_WB[:count], axis=-1).max(axis=-1) > _FAR * length
-    if not off[-1]:
-        return motion
-    last = 1 + int(np.flatnonzero(~off).max(initial=0))
+    last = in_sight(np.linalg.norm(motion.p_WB - true.p_WB[:count], axis=-1).max(axis=-1) > _FAR * length)
     kept = {name: getattr(motion, name)[:last] for name in ("time", *_MOTION[1:])}
     return dataclasses.replace(motion, **kept)
