@@ -5,7 +5,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report tradeoff test check format readme docs gallery clean
+.PHONY: install report tradeoff test check format readme docs gallery engines clean
 
 install: .venv/.installed
 
@@ -32,6 +32,10 @@ check: install
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The packages under examples/engines, as their authors would install and test them.
+engines: install
+	.ci/engines
 
 format: install
 	$(BIN)/ruff check --fix .

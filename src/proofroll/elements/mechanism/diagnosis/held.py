@@ -70,10 +70,13 @@ def best(held: Held[Change], change: Callable[[float], Change]) -> tuple[float, 
     """
     at = held.left(change(1.0))
     slope = held.left(change(2.0)) - at
-    square = float(slope @ slope)
-    fitted = 1.0 - float(slope @ at) / square if square else 1.0
-    known = min(FACTORS, key=lambda x: float(np.max(np.abs(at + (x - 1.0) * slope), initial=0.0)))
-    left_by_known = float(np.max(np.abs(at + (known - 1.0) * slope), initial=0.0))
-    if held.alone or left_by_known <= held.closes * held.before:
+
+    def left_by(factor: float) -> float:
+        left: FloatArray = at + (factor - 1.0) * slope
+        return float(np.max(np.abs(left), initial=0.0))
+
+    known = min(FACTORS, key=left_by)
+    if held.alone or left_by(known) <= held.closes * held.before:
         return known, 0
-    return fitted, 1
+    square = float(slope @ slope)
+    return (1.0 - float(slope @ at) / square if square else 1.0), 1
