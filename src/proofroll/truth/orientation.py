@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.truth import collocation
@@ -65,6 +64,8 @@ def _quaternions(h: FloatArray, spin: FloatArray) -> FloatArray:
 
 def _matrices(h: FloatArray, spin: FloatArray) -> FloatArray:
     """The rotation matrix by collocation at Radau points (:mod:`proofroll.truth.collocation`): order 25."""
+    from scipy.spatial.transform import Rotation  # slow to load, and few truths need it
+
     x, y, z = np.moveaxis(spin * h[:, None, None], -1, 0)
     zero = np.zeros_like(x)
     rates = np.moveaxis(np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]), (0, 1), (-2, -1))

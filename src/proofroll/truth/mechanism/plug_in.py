@@ -11,7 +11,6 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.truth.mechanism.two_routes import find_truth
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,6 +34,8 @@ class MechanismTruth:
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
         """See :func:`proofroll.truth.mechanism.two_routes.find_truth`."""
+        from proofroll.truth.mechanism.two_routes import find_truth  # a third of a second, which no ball needs
+
         assert isinstance(element, MechanismElement)  # it covers it
         found = find_truth(element.mechanism, times)
         record = found.record
