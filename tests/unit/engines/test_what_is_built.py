@@ -117,7 +117,7 @@ def test_exudyn_in_minimal_coordinates() -> None:
     system = model.system
     kinds = [system.GetObject(number)["objectType"] for number in range(system.systemData.NumberOfObjects())]
     assert kinds == ["GenericODE2", "ConnectorCoordinate", "ConnectorCoordinateVector"]
-    assert (model.friction, model.integration.events) == (None, [])
+    assert (model.friction, model.integration.events, system.GetPostStepUserFunction()) == (None, [], 0)
     with pytest.raises(Refused, match="needs the ball's orientation, and the spin of generic is a quasi-velocity"):
         build(scene("orientation"), "exudyn[formulation=generic]")
 
