@@ -182,7 +182,7 @@ def test_too_little_friction_for_unbounded() -> None:
 def test_solver_that_gives_up_is_said() -> None:
     """A solver that does not converge ends the run with a sentence."""
     engine = build(load_scene("sphere_in_cylinder"), "pinocchio[formulation=contact,solver=admm]")
-    engine.steps.contact.options.max_iterations = 3
+    engine.contact.options.max_iterations = 3
     with pytest.raises(Diverged, match="solver_tolerance"):
         engine.advance(0.01)
 
@@ -190,8 +190,8 @@ def test_solver_that_gives_up_is_said() -> None:
 def test_model_is_only_what_the_scene_requires() -> None:
     """One ball, one contact, no torque without rolling resistance."""
     run = build(load_scene("sphere_in_cylinder"), "pinocchio[formulation=contact]")
-    assert run.steps.contact.model.nv == 6
-    assert len(run.steps.contact.models) == 1
+    assert run.contact.model.nv == 6
+    assert len(run.contact.models) == 1
     assert run.built().rolling_resistance == 0.0
     assert run.sample().sticking is None
     assert run.events() == ()

@@ -63,7 +63,7 @@ def test_multipliers_of_any_state(formulation: str) -> None:
     """λ and the accelerations are those of the numeric system also in a state that violates the constraints."""
     taylor, numeric = (build(RESISTING, "projection", formulation=formulation, preset=p) for p in ("tuned", "matched"))
     x = numeric._motion.x + np.linspace(0.1, 0.4, len(numeric._motion.x))
-    taylor._motion._series.x = x
+    taylor._motion.x = x
     response = numeric._ball.response(numeric._ball.kinematics(x))
     assert taylor._motion.rates == pytest.approx(numeric._ball.derivative(x, response), rel=1e-12, abs=1e-11)
     assert taylor._motion.force == pytest.approx(numeric._ball.contact_force(response), rel=1e-12)
@@ -98,7 +98,7 @@ def test_a_sample_before_the_singularity_is_still_given() -> None:
     """What lies beyond the asked time is no reason to fail, even where a step of the series ends there."""
     engine = build(RESISTING, "projection[formulation=euler,preset=tuned]")
     engine.advance(1e-5)
-    series = engine._motion._series._integrator
+    series = engine._motion._integrator
     assert series.time > 1e-5
     series.state[3] = 0.0  # θ at the end of the step
     engine.advance(2e-5)

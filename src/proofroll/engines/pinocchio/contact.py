@@ -67,7 +67,7 @@ class ContactSteps:
         bounded: whether friction is.
         mu_static, mu_kinetic: what the cone is given [-].
         q, v: joint configuration and velocity.
-        events: so far; with unbounded friction, too.
+        happened: events so far; with unbounded friction, too.
     """
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
@@ -97,7 +97,7 @@ class ContactSteps:
         self._status: EventKind = "stick"
         self._pressed = False
         self._normal_force = 0.0  # where the repetition for rolling resistance starts
-        self.events: list[Event] = []
+        self.happened: list[Event] = []
         self._time = 0.0
         try:
             kick = self.kick()
@@ -106,7 +106,7 @@ class ContactSteps:
         self._normal_force = kick.normal_force
         if self.bounded and kick.status == "slip":
             self._status = "slip"
-            self.events.append(Event("slip", 0.0, 0.0, 0.0))
+            self.happened.append(Event("slip", 0.0, 0.0, 0.0))
 
     @property
     def span(self) -> float:
@@ -125,7 +125,7 @@ class ContactSteps:
             v, impulse, self._normal_force, status = self.kick()
             if status != self._status:
                 before = max(self._time - dt, 0.0)
-                self.events.append(Event(status, 0.5 * (before + self._time), before, self._time))
+                self.happened.append(Event(status, 0.5 * (before + self._time), before, self._time))
                 self._status = status
             self.started = True
             self._pressed = self._pressed or bool(impulse.any())

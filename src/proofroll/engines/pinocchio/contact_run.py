@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
@@ -19,31 +18,21 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 _QUATERNION = 4
 
 
-class ContactRun:
+class ContactRun(ContactSteps):
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
-        """At time 0.
-
-        Raises:
-            Refused: Pinocchio's solver does not find the first impulse.
-        """
+        super().__init__(body, settings)
         self._body = body
-        self.steps = ContactSteps(body, settings)
-        self._looked_at = self.steps.contact.model.createData()  # for sampling, which leaves the running data alone
-        self._unbounded = UNBOUNDED_FRICTION[self.steps.solver]
-
-    def advance(self, t: float) -> None:
-        """See :class:`proofroll.core.engine.Engine`."""
-        self.steps.advance(t)
+        self._looked_at = self.contact.model.createData()  # for sampling, which leaves the running data alone
+        self._unbounded = UNBOUNDED_FRICTION[self.solver]
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; the force is that of the step beginning or centred here."""
-        steps, data = self.steps, self._looked_at
-        contact, kick = steps.contact, steps.kick()
+        contact, kick, data = self.contact, self.kick(), self._looked_at
         # The velocity runs ahead by half a step with leapfrog, once it has begun to run.
-        v = 0.5 * (steps.v + kick.v) if steps.leapfrog and steps.started else steps.v
-        pin.forwardKinematics(contact.model, data, steps.q, v)
+        v = 0.5 * (self.v + kick.v) if self.leapfrog and self.started else self.v
+        pin.forwardKinematics(contact.model, data, self.q, v)
         velocity = pin.getVelocity(contact.model, data, contact.ball, pin.LOCAL_WORLD_ALIGNED)
         pose = data.oMi[contact.ball]
         return Sample(
@@ -51,55 +40,50 @@ class ContactRun:
             v_WB=velocity.linear.copy(),
             w_WB=velocity.angular.copy(),
             q_WB=np.roll(pin.Quaternion(pose.rotation).coeffs(), 1),
-            force=contact.axes @ kick.impulse / steps.span,
-            sticking=kick.status == "stick" if steps.bounded else None,
+            force=contact.axes @ kick.impulse / self.span,
+            sticking=kick.status == "stick" if self.bounded else None,
         )
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`; from the model, its contact and its torques now."""
-        steps = self.steps
-        contact, kick = steps.contact, steps.kick()
+        contact, kick = self.contact, self.kick()
         inertia, point, pose = contact.model.inertias[contact.ball], contact.point, contact.data.oMi[contact.ball]
-        lever = self._lever(pose)
-        acceleration = (kick.v - steps.v) / steps.span
+        # At rest the resistance has no direction, so its lever is looked at in motion.
+        triad = self._body.surface.triad(*pose.translation.tolist())
+        lever = float(np.linalg.norm(self.resistance(triad, triad[3:6], 1.0)))
+        acceleration = (kick.v - self.v) / self.span
         return Built(
             mass=float(inertia.mass),
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=contact.model.gravity.linear.copy(),
             ball_radius=float(np.linalg.norm(point.joint2_placement.translation)),
             rolling_resistance=lever,
-            mu_static=contact.friction(steps.mu_static),
-            mu_kinetic=contact.friction(steps.mu_kinetic),
+            mu_static=contact.friction(self.mu_static),
+            mu_kinetic=contact.friction(self.mu_kinetic),
             # The plane is posed at the contact; how far the wall is from there, the solver is told besides.
             gap=float(contact.point_data.c1Mc2.translation[2] + self._body.surface.gap(pose.translation)),
             acceleration=acceleration[:3],
             angular_acceleration=pose.rotation @ acceleration[3:],
             regularised=softened(
                 self._body,
-                bends=steps.leapfrog,
-                dt=steps.dt,
-                impulse=0.0 if steps.solver == "pgs" else steps.tolerance,
-                unbounded=None if steps.bounded else self._unbounded,
+                bends=self.leapfrog,
+                dt=self.dt,
+                impulse=0.0 if self.solver == "pgs" else self.tolerance,
+                unbounded=None if self.bounded else self._unbounded,
             ),
             terms=frozenset(self._terms(lever)),
         )
 
-    def _lever(self, pose: pin.SE3) -> float:
-        """Lever f of rolling resistance [m]; at rest it has no direction, so it is looked at in motion."""
-        triad = self._body.surface.triad(*pose.translation.tolist())
-        torque: FloatArray = self.steps.resistance(triad, triad[3:6], 1.0)
-        return float(np.linalg.norm(torque))
-
     def _terms(self, lever: float) -> Iterator[BallCapability]:
         """What there is besides rolling: the torque's lever [m], the cone, and a joint that turns the ball."""
-        contact = self.steps.contact
+        contact = self.contact
         if lever:
             yield BallCapability.ROLLING_RESISTANCE
-        if contact.friction(self.steps.mu_static) != self._unbounded:
+        if contact.friction(self.mu_static) != self._unbounded:
             yield BallCapability.BOUNDED_FRICTION
         if contact.model.joints[contact.ball].nq == _QUATERNION:
             yield BallCapability.ORIENTATION
 
     def events(self) -> tuple[Event, ...]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`; none with unbounded friction."""
-        return tuple(self.steps.events) if self.steps.bounded else ()
+        return tuple(self.happened) if self.bounded else ()

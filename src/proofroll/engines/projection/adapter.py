@@ -35,6 +35,7 @@ from proofroll.engines.projection.taylor import TaylorSeries
 # Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
 _TURN = 2 * math.pi
+_OF_BALLS = ("euler", "rotating_frame")
 
 
 class Projection:
@@ -42,26 +43,20 @@ class Projection:
 
     name: ClassVar[str] = "projection"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
-        "euler": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
-        "rotating_frame": ALL_OF_A_BALL | {BallCapability.MOVING_WALL},
+        **dict.fromkeys(_OF_BALLS, ALL_OF_A_BALL | {BallCapability.MOVING_WALL}),
         "dependent": mechanism.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "euler": {BallCapability.IMPACTS: "its constraint holds the ball on the wall"},
-        "rotating_frame": {BallCapability.IMPACTS: "its constraint holds the ball on the wall"},
+        **{name: {BallCapability.IMPACTS: "its constraint holds the ball on the wall"} for name in _OF_BALLS},
         "dependent": mechanism.LACKING,
     }
     settings: ClassVar[type[ProjectionSettings]] = ProjectionSettings
     presets: ClassVar[Mapping[str, Mapping[str, ProjectionSettings]]] = PRESETS
-    levels: ClassVar[Mapping[str, Level]] = {
-        "euler": Level.PROJECTION,
-        "rotating_frame": Level.PROJECTION,
-        "dependent": Level.PROJECTION,
-    }
+    levels: ClassVar[Mapping[str, Level]] = dict.fromkeys(PRESETS, Level.PROJECTION)
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "elimination of violations",
-            ("euler", "rotating_frame", "dependent"),
+            tuple(PRESETS),
             {"elimination": True},
             {"elimination": False},
             "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
@@ -69,7 +64,7 @@ class Projection:
         ),
         Term(
             "projections in numpy",
-            ("euler", "rotating_frame"),
+            _OF_BALLS,
             {"equations": "projected"},
             {"equations": "written_out"},
             "carries out the method's projections at every evaluation, as on a surface that looks different everywhere",

@@ -14,7 +14,7 @@ from proofroll.core.integrators import INTEGRATORS
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of
-from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.settings import ProjectionSettings
 
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
@@ -59,13 +59,17 @@ class ProjectionMechanism:
         except np.linalg.LinAlgError as error:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
 
+    def _solved(self) -> tuple[SolvedState, Array, Array, Array]:
+        """The equations now; of the bodies rotation, angular velocity, and centre of mass from their origins."""
+        answer = self._equations.solve(self._motion.x)
+        R = answer.bodies.R[:-1]
+        return answer, R, answer.bodies.w[:-1], np.einsum("nij,nj->ni", R, self._equations.com)
+
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._motion.x
-        answer = equations.solve(x)
-        bodies, count = answer.bodies, len(equations.mass)
-        R, w = bodies.R[:count], bodies.w[:count]
-        arm = np.einsum("nij,nj->ni", R, equations.com)
+        answer, R, w, arm = self._solved()
+        bodies, count = answer.bodies, len(R)
         force, torque = equations.applied.of_joints(bodies, answer.ends)
         np.add.at(force, equations.connections.owner, answer.multipliers[:, None] * answer.rows.force)
         np.add.at(torque, equations.connections.owner, answer.multipliers[:, None] * answer.rows.torque)
@@ -82,10 +86,8 @@ class ProjectionMechanism:
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`; gravity from the forces on the bodies at rest."""
         equations = self._equations
-        answer = equations.solve(self._motion.x)
-        bodies, count = answer.bodies, len(equations.mass)
-        R, w = bodies.R[:count], bodies.w[:count]
-        arm = np.einsum("nij,nj->ni", R, equations.com)
+        answer, R, w, arm = self._solved()
+        bodies, count = answer.bodies, len(R)
         of_com = answer.acceleration.reshape(count, 6)
         turning = np.einsum("nij,nj->ni", R, of_com[:, 3:])
         joints = len(self._mechanism.joints)

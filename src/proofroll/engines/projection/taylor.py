@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.compiled.series import Renewed, Series, 
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 
-class TaylorSeries:
+class TaylorSeries(Series):
     """A ball that rolls without slip, its state x = [q, s] by steps as long as the tolerance allows.
 
     A step is exact to the last digits, and the equations keep C v constant, so that round-off alone violates the
@@ -54,29 +54,19 @@ class TaylorSeries:
         require_heyoka("integrator=taylor")
         model = projected(structure(body, formulation), rtol)
         self._pars, self._evaluate = parameters(body), model.evaluate
-        self._check, self._resistance = check, body.contact.rolling_resistance > 0
+        self._trust, self._resistance = check, body.contact.rolling_resistance > 0
         self._scales, self._mass = np.array(body.surface.length_scales), body.ball.mass
         pars = np.array(self._pars[: len(model.integrator.pars)])
-        self._series = Series(model.integrator, pars, x, self._look, accepted)
+        super().__init__(model.integrator, pars, x, self._look, accepted)
 
     def _look(self, before: FloatArray, t: float, x: FloatArray) -> None:
-        self._check(t, x)
+        self._trust(t, x)
         if self._resistance:
             still_moving(self._along(before), t, self._along(x))
 
     def _along(self, x: FloatArray) -> FloatArray:
         """Velocity of the centre along the coordinates [m/s], shape (2,)."""
         return np.asarray(x[-5:-3] * self._scales)
-
-    @property
-    def t(self) -> float:
-        """Present time [s]."""
-        return self._series.t
-
-    @property
-    def x(self) -> FloatArray:
-        """State now."""
-        return self._series.x
 
     @property
     def rates(self) -> FloatArray:
@@ -87,11 +77,3 @@ class TaylorSeries:
     def force(self) -> FloatArray:
         """Force of the wall on the ball now along the local axes, (-N, -λ1, -λ2) [N], shape (3,)."""
         return -self._mass * self._evaluate(self.x, self._pars)[-3:]
-
-    def advance(self, t: float) -> None:
-        """Moves to time t [s].
-
-        Raises:
-            Diverged: it gave up.
-        """
-        self._series.advance(t)
