@@ -15,7 +15,7 @@ from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.loop_points import held_points, is_planar
 from proofroll.engines.pinocchio.joint_tree import JointTree
-from proofroll.engines.pinocchio.loop_rows import LoopRows
+from proofroll.engines.pinocchio.null_space import LoopRows
 from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.files.scene_file import load_scene
 

@@ -154,7 +154,7 @@ def test_projection_is_mass_orthogonal() -> None:
     data = mechanism.model.createData()
     v = mechanism.v0 + np.array([1e-3, 2e-3, -1e-3, 0.3, 0.1, -0.2])
     q, corrected = mechanism.project(data, mechanism.q0, v)
-    rows = mechanism._rows(data, q, corrected).rows
+    rows = mechanism.rows(data, q, corrected).rows
     rolling = np.linalg.svd(rows)[2][3:]
     assert np.abs(rows @ corrected).max() < 1e-14
     assert np.abs(rolling @ data.M @ (corrected - v)).max() < 1e-15

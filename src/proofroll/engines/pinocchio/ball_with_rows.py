@@ -22,7 +22,7 @@ _FAINT = 1e-9
 NOISE = 1e-13
 
 
-class RowsAtState(NamedTuple):
+class ContactRows(NamedTuple):
     """What the rows are at a state; mass matrix and bias forces are in the ``data`` then.
 
     Attributes:
@@ -119,7 +119,7 @@ class BallWithRows(ABC):
         return pin.getClassicalAcceleration(self.model, data, self.ball, pin.LOCAL).vector  # type: ignore[no-any-return]  # it is an array
 
     @abstractmethod
-    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> RowsAtState:
+    def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
         """The rows at a state."""
 
     @abstractmethod
@@ -191,12 +191,4 @@ class BallWithRows(ABC):
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         """The rows, and the mass matrix in ``data``."""
-        return self._rows(data, q, v).rows
-
-    def rolling_row(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """Row of slip along e2, shape (nv,)."""
-        return np.asarray(self._rows(data, q, v).rows[-2])
-
-    def resistance(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray | None:
-        """Rolling resistance on the joints per unit of normal force [m], shape (nv,); None if none was built."""
-        return self._rows(data, q, v).resistance if self._f else None
+        return self.rows(data, q, v).rows

@@ -13,7 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Generator
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, RowsAtState, SlidingContact
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, ContactRows, SlidingContact
 
 # Two places on the surface, at which its geometry along the local axes is compared.
 _SHIFTS = np.zeros(6), np.array([0.7, -0.4, 0.0, 0.0, 0.0, 0.0])
@@ -81,7 +81,7 @@ class Composite(BallWithRows):
         self.q_scale = np.concatenate([self._radius / metres, np.ones(4)])
         self.v_scale = np.concatenate([self._speed / metres, np.full(3, self._speed / self._radius)])
 
-    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> RowsAtState:
+    def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; those of rolling."""
         model, ball, a, axes = self.model, self.ball, self._radius, pin.LOCAL_WORLD_ALIGNED
         # computeAllTerms does not touch data.a, so the bias needs forwardKinematics with a joint acceleration of zero
@@ -103,7 +103,7 @@ class Composite(BallWithRows):
             speed = math.hypot(*along)
             moment = np.array(_cross(e1, along)) * (self._f / speed if speed else 0.0)
             resistance = jacobian[3:].T.dot(moment)
-        return RowsAtState(frame, directions.dot(jacobian), drift, resistance)
+        return ContactRows(frame, directions.dot(jacobian), drift, resistance)
 
     def _along_axes(self) -> _AlongAxes | None:
         """What is constant along the ball's axes; None if it changes from place to place."""
@@ -151,7 +151,7 @@ class Composite(BallWithRows):
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the multipliers are F2, F3."""
         if self._own is not None:
             return self._accelerate_along(self._own, data, q, v)
-        frame, rows, drift, torque = self._rows(data, q, v)
+        frame, rows, drift, torque = self.rows(data, q, v)
         if self._f:
             # The joints cannot accelerate the ball along e1, so N follows from the bias pass alone.
             torque = torque * self._transmitted(data, frame[:, 0])
@@ -175,7 +175,7 @@ class Composite(BallWithRows):
 
     def slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the friction is put to the joints."""
-        frame, rows, drift, resistance = self._rows(data, q, v)
+        frame, rows, drift, resistance = self.rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         # Friction along the wall cannot change N, no more than the joints can.
         normal_force = self._transmitted(data, e1)

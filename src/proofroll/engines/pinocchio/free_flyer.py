@@ -11,7 +11,7 @@ import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, RowsAtState, SlidingContact
+from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, ContactRows, SlidingContact
 
 
 class FreeFlyer(BallWithRows):
@@ -68,7 +68,7 @@ class FreeFlyer(BallWithRows):
     def _at(
         self, data: Any, q: FloatArray, v: FloatArray
     ) -> tuple[Sequence[float], FloatArray, FloatArray, FloatArray]:
-        """Triad with its distance before it and ė1 behind, rows, drift, and the resistance; see :class:`RowsAtState`.
+        """Triad with its distance before it and ė1 behind, rows, drift, and the resistance; see :class:`ContactRows`.
 
         First the row of the surface, then the two of rolling. Components as plain floats: to add to one in an array
         takes numpy three times as long.
@@ -105,9 +105,10 @@ class FreeFlyer(BallWithRows):
             resistance[3:] = moment if turned is None else moment.dot(turned)
         return moving, rows, drift, resistance
 
-    def _rows(self, data: Any, q: FloatArray, v: FloatArray) -> RowsAtState:
+    def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
+        """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the wall's, then those of rolling."""
         moving, *found = self._at(data, q, v)
-        return RowsAtState(np.array(moving[1:10]).reshape(3, 3).T, *found)
+        return ContactRows(np.array(moving[1:10]).reshape(3, 3).T, *found)
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         if self._orientation:
@@ -154,7 +155,7 @@ class FreeFlyer(BallWithRows):
 
     def reaction(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and the wall's force from the multipliers."""
-        frame, *rows = self._rows(data, q, v)
+        frame, *rows = self.rows(data, q, v)
         return np.array(self._solve(data, *rows)), frame @ data.lambda_c
 
     def on_surface(self, q: FloatArray) -> FloatArray:
@@ -172,7 +173,7 @@ class FreeFlyer(BallWithRows):
 
     def _slide(self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray) -> SlidingContact:
         """One row, that of the surface; friction and rolling resistance are columns, for both follow N."""
-        frame, rows, drift, resistance = self._rows(data, q, v)
+        frame, rows, drift, resistance = self.rows(data, q, v)
         e1, along = frame[:, 0], frame[:, 1:]
         against = self.friction(1.0, along.T @ direction)  # per unit of N
         matrix = np.zeros((7, 7))
@@ -202,7 +203,7 @@ class FreeFlyer(BallWithRows):
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`."""
         q = self.on_surface(q)
-        return q, np.array(pin.impulseDynamics(self.model, data, v, self._rows(data, q, v).rows[:1]))
+        return q, np.array(pin.impulseDynamics(self.model, data, v, self.rows(data, q, v).rows[:1]))
 
 
 def _sources(radius: float) -> list[tuple[int, int, float]]:

@@ -16,8 +16,7 @@ from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, u
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
-from proofroll.engines.pinocchio.loop_rows import LoopRows
-from proofroll.engines.pinocchio.null_space import NullSpace
+from proofroll.engines.pinocchio.null_space import LoopRows, NullSpace
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 

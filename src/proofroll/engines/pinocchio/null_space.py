@@ -1,15 +1,144 @@
-"""Formulation ``null_space``: Pinocchio's terms of the joint tree, loops by projection on their rows' null space."""
+"""Formulation ``null_space``: Pinocchio's terms of the joint tree, loops by projection on their rows' null space.
+
+With M = L Lᵀ, the singular vectors of C L⁻ᵀ split velocities into those that the loops lock and those that they allow.
+Which row depends on which never matters, and the number of independent ones is found once, at the start: where it is
+found anew at each evaluation, it flickers with round-off.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri
 
+from proofroll.core.arrays import cross
+from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.pinocchio.joint_tree import JointTree
-from proofroll.engines.pinocchio.loop_rows import LoopRows, RowsAtState
+
+
+class RowsAtState(NamedTuple):
+    """Φ, C with C v = Φ̇, Ċ v; and of each row its loop, and the force and moment on body_b of a unit multiplier."""
+
+    residual: Array
+    C: Array
+    drift: Array
+    loop: NDArray[np.intp]
+    force: Array
+    torque: Array
+
+
+class Split(NamedTuple):
+    """L⁻ᵀ, its product with the locked directions, and what takes a row's value to them."""
+
+    into: Array
+    locked: Array
+    back: Array
+
+
+class LoopRows:
+    """The rows of all loops of a tree.
+
+    Attributes:
+        rank: number of independent rows.
+    """
+
+    def __init__(self, tree: JointTree) -> None:
+        self._model = tree.model
+        kinds = [loop.kind for loop in tree.mechanism.loops]
+        points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
+        angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
+        self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
+        self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
+        # whether a row's direction turns with body_a; points that coincide do so along the world's axes too
+        self._turning = np.array([len(FACTS[kinds[number]].translations) < 3 for number, _ in points]).reshape(-1, 1)
+        self._fixed = np.eye(3)[self._axis]
+        self._loop = np.concatenate([self._point, self._angle])
+        self._ends = np.array(tree.loops, dtype=np.intp).reshape(-1, 2).T
+        data, rest = self._model.createData(), np.zeros(self._model.nv)
+
+        def at_rest(q: Array) -> tuple[Array, Array]:
+            rows = self.at(data, q, rest)
+            return rows.residual, rows.C
+
+        self.rank = 0
+        if tree.loops:
+            self.rank = independent_anywhere(tree.q0, at_rest, partial(pin.integrate, self._model))
+
+    def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
+        """Rows at a state; positions, velocities and drifts of all frames are in ``data`` then."""
+        model = self._model
+        pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
+        pin.computeJointJacobians(model, data, q)
+        pin.updateFramePlacements(model, data)
+        (p_a, A, J_a, v_a, a_a), (p_b, B, J_b, v_b, a_b) = (self._frames(data, ends) for ends in self._ends)
+        J, a, d, w_a, w_b = J_b - J_a, a_b - a_a, p_b - p_a, v_a[:, 3:], v_b[:, 3:]
+        i, j, turning = self._point, self._angle, self._turning
+        n = np.where(turning, A[i, :, self._axis], self._fixed)
+        x, y, first, then = A[j, :, self._x], B[j, :, self._y], len(n), len(n) + len(self._angle)
+        # ω × each direction, and again; the moments d × n and y × x. One call for all costs as much as for one.
+        spins = np.concatenate([w_a[i], w_a[j], w_b[j]])
+        rates = cross(spins, np.concatenate([n, x, y]))
+        bends = cross(spins, rates)
+        moments = cross(np.concatenate([d[i], y]), np.concatenate([n, x]))
+        r, t = turning * moments[:first], moments[first:]
+        C = _times(n, J[i, :3]) - _times(r, J_a[i, 3:])
+        along = 2 * rates[:first] * (v_b - v_a)[i, :3] + bends[:first] * d[i]
+        drift = n * a[i, :3] - r * a_a[i, 3:] + turning * along
+        x_rate, y_rate = rates[first:then], rates[then:]
+        turn = t * a[j, 3:] + bends[first:then] * y + x * bends[then:] + 2 * x_rate * y_rate
+        return RowsAtState(
+            np.concatenate([n * d[i], x * y]).sum(1),
+            np.concatenate([C, _times(t, J[j, 3:])]),
+            np.concatenate([drift, turn]).sum(1),
+            self._loop,
+            np.concatenate([n, np.zeros_like(t)]),
+            np.concatenate([np.zeros_like(n), t]),
+        )
+
+    def _frames(self, data: Any, frames: NDArray[np.intp]) -> tuple[Array, Array, Array, Array, Array]:
+        """Places, axes, Jacobians, velocities and accelerations at v̇ = 0 of frames, world axes; the world's stand."""
+        model, count = self._model, len(frames)
+        p, R, J = np.empty((count, 3)), np.empty((count, 3, 3)), np.zeros((count, 6, model.nv))
+        v, a = np.zeros((count, 6)), np.zeros((count, 6))
+        for number, frame in enumerate(frames.tolist()):
+            pose = data.oMf[frame]
+            p[number], R[number] = pose.translation, pose.rotation
+            if model.frames[frame].parentJoint:
+                jacobian = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+                J[number] = jacobian.reshape(6, model.nv)  # of a single column it is a vector
+                v[number] = pin.getFrameVelocity(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+                a[number] = pin.getFrameClassicalAcceleration(model, data, frame, pin.LOCAL_WORLD_ALIGNED).vector
+        return p, R, J, v, a
+
+    def split(self, M: Array, C: Array) -> Split:
+        """How the rows split velocities, in the metric of the mass matrix (upper triangle)."""
+        upper, failed = dpotrf(M, lower=0)
+        if failed:
+            raise np.linalg.LinAlgError("the mass matrix is not positive definite")
+        into = dtrtri(upper, lower=0)[0]
+        U, S, Vt, failed = dgesdd(C @ into, full_matrices=0)
+        if failed:
+            raise np.linalg.LinAlgError("the singular values were not found")
+        r = self.rank
+        return Split(into, into @ Vt[:r].T, U[:, :r].T / S[:r, None])
+
+    def eliminated(self, data: Any, q: Array, v: Array) -> tuple[Array, Array]:
+        """The state with violations of the loops taken away along the locked directions (Blajer 2002)."""
+        rows = self.at(data, q, v)
+        split = self.split(pin.crba(self._model, data, q), rows.C)
+        v = v - split.locked @ (split.back @ (rows.C @ v))
+        return pin.integrate(self._model, q, -split.locked @ (split.back @ rows.residual)), v
+
+
+def _times(a: Array, J: Array) -> Array:
+    """Each vector times its matrix of three rows."""
+    return np.asarray(np.matmul(a[:, None, :], J)[:, 0])
 
 
 class NullSpace:

@@ -74,8 +74,8 @@ class RowsRun:
         inertia = model.inertias[ball]
         # In both formulations the spin is last, in orthonormal axes: the row of slip has the length a there, and
         # rolling resistance the length f. At rest that has no direction, so it is looked at in a motion along that row.
-        row = mechanism.rolling_row(data, q, v)
-        torque = mechanism.resistance(data, q, row)
+        row = mechanism.rows(data, q, v).rows[-2]
+        torque = mechanism.rows(data, q, row).resistance
         mu_kinetic = None  # without a bound nothing stands for it
         if self.motion.mu_static is not None:
             mu_kinetic = float(np.linalg.norm(mechanism.friction(1.0, np.array([1.0, 0.0]))))
@@ -87,7 +87,7 @@ class RowsRun:
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=model.gravity.linear.copy(),
             ball_radius=float(np.linalg.norm(row[-3:])),
-            rolling_resistance=0.0 if torque is None else float(np.linalg.norm(torque[-3:])),
+            rolling_resistance=float(np.linalg.norm(torque[-3:])),
             mu_static=self.motion.mu_static,
             mu_kinetic=mu_kinetic,
             gap=mechanism.gap(q),
@@ -96,9 +96,9 @@ class RowsRun:
             terms=frozenset(self._terms(torque)),
         )
 
-    def _terms(self, torque: FloatArray | None) -> Iterator[BallCapability]:
+    def _terms(self, torque: FloatArray) -> Iterator[BallCapability]:
         """What there is besides rolling, with the torque of rolling resistance as it is put to the joints."""
-        if torque is not None:
+        if torque.any():
             yield BallCapability.ROLLING_RESISTANCE
         if self.motion.mu_static is not None:
             yield BallCapability.BOUNDED_FRICTION

@@ -1,7 +1,7 @@
 """Writes the program that shows what Pinocchio does with a ball on a wall, without proofroll.
 
-A program is put together from the text of a formulation (:mod:`contact`, :mod:`composite`, :mod:`free_flyer`) and, for
-the last two, of an integrator (:mod:`stepping`); numbers come from the adapter's own model.
+A program is put together from the text of a formulation (:mod:`contact`, :mod:`rows`) and, for those with rows, of an
+integrator (:mod:`stepping`); numbers come from the adapter's own model.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
-from proofroll.engines.pinocchio.reproducer import composite, contact, free_flyer, stepping
+from proofroll.engines.pinocchio.reproducer import contact, rows, stepping
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -33,9 +33,9 @@ def source(body: RollingBall, settings: PinocchioSettings) -> str:
         if math.isfinite(body.contact.mu_static):
             raise Refused("the loop that switches between stick and slip around Pinocchio's terms is proofroll's")
         mechanism = RowsRun(body, settings).mechanism
-        numbers, program = stepping.numbers(mechanism, settings), free_flyer.SOURCE
+        numbers, program = stepping.numbers(mechanism, settings), rows.FREE_FLYER
         if settings.formulation == "composite":
-            numbers, program = numbers + composite.numbers(body), composite.SOURCE
+            numbers, program = numbers + rows.carriage(body), rows.COMPOSITE
         parts = [program, stepping.source(settings)]
         imports = "import numpy as np\nimport pinocchio as pin\n"
         imports += ("from scipy.integrate import DOP853\n" if settings.integrator == "dop853" else "") + "\n"
