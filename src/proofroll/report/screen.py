@@ -66,21 +66,28 @@ _WIDEST = 10_000  # characters: the width at which nothing wraps
 
 
 def fitted(table: Table, console: Console) -> list[Table]:
-    """The table as parts that are no wider than the console; each begins with the first column, and no word is cut."""
+    """The table as parts that are no wider than the console; no word is cut.
+
+    Each part begins with the columns that tell the lines apart, or with the first where they leave no room for others.
+    """
     if not table.columns:
         return [table]
     _, right, _, left = table.padding
     room, pad = console.width, left + right
     sizes = [_size(column, console, room - pad) for column in table.columns]
-    groups: list[list[int]] = [[0]]
-    for index in range(1, len(sizes)):
-        if sum(sizes[i].minimum + pad for i in (*groups[-1], index)) > room and len(groups[-1]) > 1:
-            groups.append([0])
+    least = [size.minimum + pad for size in sizes]
+    telling = _telling(table)
+    if sum(least[:telling]) + max(least[telling:], default=0) > room:
+        telling = 1
+    groups = [list(range(telling))]
+    for index in range(telling, len(sizes)):
+        if sum(least[i] for i in (*groups[-1], index)) > room and len(groups[-1]) > telling:
+            groups.append(list(range(telling)))
         groups[-1].append(index)
     parts = []
     for number, group in enumerate(groups):
         part = copy.copy(table)
-        free = max(0, room - sum(sizes[i].minimum + pad for i in group))
+        free = max(0, room - sum(least[i] for i in group))
         wanted = sum(sizes[i].span for i in group)
         part.columns = []
         for place, index in enumerate(group):
@@ -92,6 +99,13 @@ def fitted(table: Table, console: Console) -> list[Table]:
         part.caption = None
         parts.append(part)
     return parts
+
+
+def _telling(table: Table) -> int:
+    """How many columns from the first on tell all lines apart; 1 where not even all do."""
+    lines = list(zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True))
+    counts = range(1, len(table.columns))
+    return next((count for count in counts if len({line[:count] for line in lines}) == len(lines)), 1)
 
 
 def _size(column: Column, console: Console, most: int) -> Measurement:

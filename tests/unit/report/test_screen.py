@@ -7,7 +7,7 @@ import pytest
 from rich.table import Table
 
 from proofroll.report.labels import settings_text, step
-from proofroll.report.screen import Screen, escaped, printable
+from proofroll.report.screen import Screen, escaped, numeric, plain_table, printable, unbroken
 from proofroll.report.terminal import console
 
 COMMANDS = "\x1b]0;title\x07\x1b[2J\x9b31m\x00\x08\r\x7f\u202e\u2028"
@@ -112,3 +112,14 @@ def test_a_step_is_shown_as_it_is(resolution: str | None, value: float | None, s
 def test_settings_that_are_left_to_the_engine_are_not_listed() -> None:
     """A setting without a value is no text that a person could give."""
     assert settings_text({"dt": 1e-3, "elimination": None}) == "dt=0.001"
+
+
+def test_parts_of_a_table_tell_their_lines(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Where columns go below the others, the columns that tell the lines apart stand there again."""
+    monkeypatch.setenv("COLUMNS", "45")
+    table = plain_table(*unbroken("engine", "step"), *numeric(*(f"quantity {number}" for number in range(3))))
+    for step_size in ("dt 0.1 s", "dt 0.2 s"):
+        table.add_row("projection", step_size, *("1.7e-10",) * 3)
+    console().print(table)
+    out = capsys.readouterr().out
+    assert out.count("projection dt 0.1 s") == out.count("projection dt 0.2 s") == out.count("step") == 2
