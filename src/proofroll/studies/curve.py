@@ -127,6 +127,11 @@ class Curve:
         """Whether it is swept over steps rather than over tolerances."""
         return self.facts.resolution == "dt"
 
+    @property
+    def tried(self) -> set[float | None]:
+        """Steps or tolerances with which there is a run, or why there is none."""
+        return {point.step for point in self.points} | self.dropped.keys()
+
     def envelope(self, quantity: str) -> list[float]:
         """Of each point's error, see :func:`proofroll.studies.pareto.envelope`."""
         return envelope([point.errors.get(quantity, np.inf) for point in self.points])

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.engine import whole_steps
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import ProofrollError
 from proofroll.running.asking import resolve_with_truth
-from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.studies.curve import Curve, CurvePoint, Question, judged
 from proofroll.studies.reference import Reference
@@ -45,21 +45,17 @@ def sweep(
     in sampling intervals, while each takes off this part of the error, ``gain``.
     """
     references: dict[float, Reference] = {}
-    asked: list[set[float]] = [set() for _ in curves]
     for first in (True, False, False, False):
         wanted = [
-            (index, value)
-            for index, curve in enumerate(curves)
-            for value in (
-                _first(question, curve) if first else _further(question, curve, references, asked[index], finer, gain)
-            )
-            if value not in asked[index]
+            (curve, value)
+            for curve in curves
+            for value in (_first(question, curve) if first else _further(question, curve, references, finer, gain))
         ]
         if not wanted:
             break
-        for index, value in wanted:
-            asked[index].add(value)
-        _run(question, curves, wanted, runner, references, progress)
+        _run(question, wanted, runner, references, progress)
+        for curve in curves:
+            curve.points.sort(key=lambda point: -(point.step or 0.0))
     return references
 
 
@@ -69,14 +65,13 @@ def _first(question: Question, curve: Curve) -> list[float]:
     own = float(curve.facts.settings[curve.facts.resolution])
     if curve.fixed_step:
         return [question.step(factor) for factor in _STEPS]
-    return [*_TOLERANCES, own]
+    return list(dict.fromkeys([*_TOLERANCES, own]))
 
 
 def _further(
     question: Question,
     curve: Curve,
     references: Mapping[float, Reference],
-    asked: set[float],
     finer_steps: Sequence[float] = FINER,
     gain: float = GAIN,
 ) -> list[float]:
@@ -87,13 +82,13 @@ def _further(
     scale = references[question.every].scale(question.quantity) or 1.0
     coarsest, finest = curve.points[0], curve.points[-1]
     ladder = [question.step(factor) for factor in _COARSER] if curve.fixed_step else _LOOSER
-    coarser = next((value for value in ladder if value not in asked), None)
+    coarser = next((value for value in ladder if value not in curve.tried), None)
     whole = coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale
     if coarser is not None and whole and not curve.saturated(question.quantity):
         found.append(coarser)
     if not curve.fixed_step:
         return found
-    finer = next((step for step in map(question.step, finer_steps) if step not in asked), None)
+    finer = next((step for step in map(question.step, finer_steps) if step not in curve.tried), None)
     if finer is not None and len(curve.points) > 1:
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
         if now < (1 - gain) * before:
@@ -103,30 +98,28 @@ def _further(
 
 def _run(
     question: Question,
-    curves: list[Curve],
-    wanted: list[tuple[int, float]],
+    wanted: list[tuple[Curve, float]],
     runner: Runner,
     references: dict[float, Reference],
     progress: Progress | None,
 ) -> None:
+    """Runs curves with steps or tolerances, and the truths that they need besides those that are there."""
     scene = question.loaded()
     options: list[tuple[str, dict[str, Any]]] = []
-    for index, value in wanted:
-        facts = curves[index].facts
+    for curve, value in wanted:
+        facts = curve.facts
         options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
     resolved, truth_facts = resolve_with_truth(options, runner.workers)
-    cases: list[tuple[int, tuple[Case, ...]]] = []
-    for (index, value), found in zip(wanted, resolved, strict=True):
-        if not isinstance(found, EngineFacts):
-            curves[index].dropped[value] = str(found)
-            continue
+    cases: list[tuple[Curve, tuple[Case, ...]]] = []
+    for (curve, value), found in zip(wanted, resolved, strict=True):
         try:
+            if isinstance(found, ProofrollError):
+                raise found
             if found.step is not None:
                 whole_steps(0.0, question.until, found.step)
-        except InputError as error:
-            curves[index].dropped[value] = str(error)
-            continue
-        cases.append((index, question.cases(scene, found, max(question.every, found.step or 0.0))))
+            cases.append((curve, question.cases(scene, found, max(question.every, found.step or 0.0))))
+        except ProofrollError as error:
+            curve.dropped[value] = str(error)
     intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()
     truths = {every: question.case(scene, truth_facts, every) for every in intervals}
     results = runner.run([*truths.values(), *(case for _, both in cases for case in both)], progress)
@@ -134,7 +127,5 @@ def _run(
         if results[case.key].status != Status.DONE:
             raise ProofrollError(f"there is no truth here: {results[case.key].message}")
         references[every] = Reference.read(scene, runner.store.trajectory(case))
-    for index, both in cases:
-        curves[index].points.append(judged([CurvePoint(case, results[case.key]) for case in both], references, runner))
-    for curve in curves:
-        curve.points.sort(key=lambda point: -(point.step or 0.0))
+    for curve, both in cases:
+        curve.points.append(judged([CurvePoint(case, results[case.key]) for case in both], references, runner))

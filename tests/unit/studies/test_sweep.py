@@ -13,7 +13,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.curve import Curve, CurvePoint, Question
 from proofroll.studies.curves_asked import curves_of
-from proofroll.studies.sweep import BROKEN, _further, sweep
+from proofroll.studies.sweep import BROKEN, _first, _further, sweep
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.1, "z")
 
@@ -110,8 +110,15 @@ def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None
     found = []
     for slowness in (1.0, 1e3):
         curve.points = [point(2e-4, 4e-4, slowness), point(1e-4, 1e-4, 2 * slowness)]
-        found.append(_further(QUESTION, curve, {QUESTION.every: reference}, {2e-4, 1e-4}))  # type: ignore[dict-item]
+        found.append(_further(QUESTION, curve, {QUESTION.every: reference}))  # type: ignore[dict-item]
     assert found[0] == found[1] != []
+
+
+def test_a_curve_has_each_tolerance_once() -> None:
+    """An engine's own tolerance that is among those of every curve is no second point."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=matched,rtol=1e-8]"])
+    assert curve.facts.settings["rtol"] in (tolerances := _first(QUESTION, curve))
+    assert len(set(tolerances)) == len(tolerances)
 
 
 def test_nothing_of_a_curve_is_lost(swept: tuple[dict[str, Curve], float]) -> None:

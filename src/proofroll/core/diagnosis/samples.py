@@ -1,4 +1,4 @@
-"""Hypotheses that a right motion is told wrongly, of any element with poses and twists.
+"""Hypotheses that a right motion is told wrongly, in samples or at its start, of any element with poses and twists.
 
 Its variables are ``p_WB``, ``v_WB``, ``w_WB`` and perhaps ``q_WB``; what else is said of it, its kind tests itself.
 """
@@ -14,13 +14,19 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
-from proofroll.core.diagnosis.lines import single_precision
+from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import Reported
 
 if TYPE_CHECKING:
     import xarray as xr
 
 TWIST = ("p_WB", "v_WB", "w_WB")
+# In this order: a state that is wrong makes all that follows wrong, and not the other way round.
+_STATE = (("velocity", "the velocity", "m/s"), ("spin", "the angular velocity", "rad/s"))
+_RATES = (
+    ("acceleration", "the acceleration", "m/s^2"),
+    ("angular acceleration", "the angular acceleration", "rad/s^2"),
+)
 # Fewer samples tell no frame and no time.
 _FEWEST = 3
 # Quaternions at time 0 that are this near to each other are the same.
@@ -165,3 +171,35 @@ def _turned(said: FloatArray, other: FloatArray) -> float:
     """How far quaternions are apart, up to their signs."""
     signs = np.where(np.sum(said * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
     return apart(said * signs, other)
+
+
+@dataclass(frozen=True)
+class AtStart:
+    """Signs, units and axes of velocities and accelerations at time 0.
+
+    Attributes:
+        frames: of an element at time 0, in which a vector may be given by mistake; each of shape (vectors, 3, 3).
+        follows: quantities that follow from the velocities.
+        rates: whether accelerations are looked at, where nothing else differs.
+    """
+
+    frames: Callable[[Any], Mapping[str, FloatArray]]
+    follows: frozenset[str]
+    rates: bool = True
+    id: str = "said at time 0"
+    grounds: str = "the scene's own vectors with another sign, unit or axes are those of the certificate"
+
+    def test(self, evidence: Evidence) -> Iterator[Cause]:
+        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+        wrong = {str(line["quantity"]): line for line in differing(evidence.lines)}
+        state = {name for name, _, _ in _STATE}
+        rates = {name for name, _, _ in _RATES}
+        for vectors, others in ((_STATE, state | rates | self.follows), (_RATES if self.rates else (), set())):
+            for name, what, unit in vectors:
+                if name not in wrong or not set(wrong) <= others | {name}:
+                    continue
+                said, true = (np.reshape(wrong[name][key], (-1, 3)) for key in ("found", "expected"))
+                if said.shape != true.shape:
+                    continue
+                frames = {key: frame[None] for key, frame in self.frames(evidence.element).items()}
+                yield from Reported(name, what, unit, said[None], true[None], np.zeros(1), frames).causes(evidence.step)

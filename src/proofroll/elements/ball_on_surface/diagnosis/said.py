@@ -10,11 +10,17 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
-from proofroll.core.diagnosis.at_start import AtStart
 from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import fitted
 from proofroll.core.diagnosis.lines import differing
-from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, both, single_precision_run
+from proofroll.core.diagnosis.samples import (
+    AnotherClock,
+    AtStart,
+    Attitudes,
+    ReportedVectors,
+    both,
+    single_precision_run,
+)
 from proofroll.core.diagnosis.vectors import Reported, into
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import carried

@@ -9,8 +9,14 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
-from proofroll.core.diagnosis.at_start import AtStart
-from proofroll.core.diagnosis.samples import AnotherClock, Attitudes, ReportedVectors, both, single_precision_run
+from proofroll.core.diagnosis.samples import (
+    AnotherClock,
+    AtStart,
+    Attitudes,
+    ReportedVectors,
+    both,
+    single_precision_run,
+)
 from proofroll.core.diagnosis.vectors import Reported
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 from proofroll.elements.mechanism.placed import Placed
