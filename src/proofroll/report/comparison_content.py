@@ -64,12 +64,13 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
 
 def runs_at(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run, Path]]:
     """Number of the row, run and trajectory of every run at a point that has one."""
-    found = []
-    for number, runs in enumerate(by_row(outcome).values()):
-        for run in runs:
-            if point_name(run.parameters) == point and run.case is not None and run.result.trajectory is not None:
-                found.append((number, run, store.trajectory(run.case)))
-    return [(number, run, path) for number, run, path in found if path.is_file()]
+    return [
+        (number, run, path)
+        for number, runs in enumerate(by_row(outcome).values())
+        for run in runs
+        if point_name(run.parameters) == point and run.case is not None and run.result.trajectory is not None
+        if (path := store.trajectory(run.case)).is_file()
+    ]
 
 
 def by_row(outcome: Outcome) -> dict[int, list[Run]]:

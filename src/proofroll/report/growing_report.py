@@ -33,26 +33,34 @@ class Report:
     """What the files are written from.
 
     Attributes:
-        content: what it says, with the further studies that there are so far.
+        compared: what it says of the comparisons.
         curves: of each comparison, for the figures.
-        pictures: markup by name.
         replay: of the comparisons, as their kind of element gives it.
         parts: the further studies, in the order of the content's lists.
+        pictures: markup by name.
     """
 
-    content: ReportContent
+    compared: ReportContent
     curves: list[list[PointCurves]]
-    pictures: dict[str, str]
     replay: Replay | None
     parts: list[Part] = field(default_factory=list)
+    pictures: dict[str, str] = field(default_factory=dict)
+    _said: dict[int, PartEntry] = field(default_factory=dict)
+
+    @property
+    def content(self) -> ReportContent:
+        """What it says, with the further studies that there are so far."""
+        said = [(part.key, self._said[id(part)]) for part in self.parts if id(part) in self._said]
+        entries = {key: [entry for other, entry in said if other == key] for key in self.compared.entries}
+        environment = self.compared.environment
+        for _, entry in said:
+            if isinstance(entry.study, dict):  # of a kept study the versions are those of now
+                environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
+        findings = Sentences(three_sentences(self.compared.comparisons, entries))
+        return replace(self.compared, entries=entries, findings=findings, environment=environment)
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
-        """Lists further studies with what is kept of them.
-
-        Args:
-            parts: the studies.
-            out: folder of all results.
-            fresh: nothing that is kept counts.
+        """Lists further studies with what is kept of them in the folder of all results, unless it is made ``fresh``.
 
         Returns:
             those that have to be made.
@@ -85,28 +93,15 @@ class Report:
         Raises:
             ProofrollError: the folder cannot be written.
         """
-        write_text(out / "report.json", json.dumps(plain(self.content), indent=1, allow_nan=False) + "\n")
-        write_text(out / "report.html", page(self.content, self.curves, self.pictures, self.replay))
+        content = self.content
+        write_text(out / "report.json", json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+        write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
     def _put(self, part: Part, said: PartEntry) -> None:
-        """Gives a part its place in the content, and its pictures theirs."""
-        content = self.content
-        alike = [other for other in self.parts if other.key == part.key]
-        entries, index = list(content.entries[part.key]), next(i for i, other in enumerate(alike) if other is part)
-        entries[index : index + 1] = [said]
-        known = {**content.entries, part.key: entries}
-        # Of a kept study the versions are those of now.
-        versions = content.environment.versions | dict(
-            said.study.get("versions", {}) if isinstance(said.study, dict) else {}
-        )
-        self.content = replace(
-            content,
-            entries=known,
-            findings=Sentences(three_sentences(content.comparisons, known)),
-            environment=replace(content.environment, versions=versions),
-        )
+        self._said[id(part)] = said
         if said.study is not None:
-            prefix = f"{part.key}{index}-"
+            alike = [id(other) for other in self.parts if other.key == part.key]
+            prefix = f"{part.key}{alike.index(id(part))}-"
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
 
@@ -122,23 +117,13 @@ def begun(outcomes: list[Outcome], store: Store, command: str, awaited: Sequence
     replay = _replay(outcomes, store)
     described = [case.described for case in replay.cases] if replay else []
     content = replace(report_content(outcomes, store, command), replay=described, awaited=list(awaited))
-    return Report(content, [point_curves(outcome, store) for outcome in outcomes], {}, replay)
+    return Report(content, [point_curves(outcome, store) for outcome in outcomes], replay)
 
 
 def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> ReportContent:
-    """Writes ``report.html`` and ``report.json`` of comparisons alone.
+    """Writes ``report.html`` and ``report.json`` of comparisons alone into a folder, and returns their content.
 
-    Args:
-        outcomes: what was compared.
-        store: where the trajectories are: a folder in that of the report.
-        out: folder of the report.
-        command: that makes the report again.
-
-    Returns:
-        the content of both files.
-
-    Raises:
-        ProofrollError: the folder cannot be written.
+    The rest is as for :func:`begun`. Raises ProofrollError if the folder cannot be written.
     """
     report = begun(outcomes, store, command)
     report.write(out)

@@ -113,21 +113,13 @@ class TradeoffPart(Part):
         return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
 
 
-def wishes(study: TradeoffStudy, claims: TradeoffClaims | None) -> list[Wish]:
-    """What a report asks of a trade-off: of the study's own quantity the tolerances of its claims, if there are any."""
-    own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values()) if claims else []
-    found = []
-    for name in default_quantities(study):
-        if study.quantities[name].scale is None:
-            continue  # a part of nothing
-        parts = [Tolerance(part, True) for part in PARTS]
-        found += [Wish(name, tolerance) for tolerance in (own if own and name == study.quantity else parts)]
-    return found
-
-
-def advice(study: TradeoffStudy, claims: TradeoffClaims | None) -> list[Advice]:
-    """The answers of :func:`proofroll.studies.recommend.recommend` to all wishes."""
+def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
+    """What to use, of the study's own quantity for the tolerances of its claims, if there are any, else for parts."""
+    own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
+    parts = [Tolerance(part, True) for part in PARTS]
     return [
-        Advice(wish.tolerance.value if wish.tolerance.relative else None, recommend(study, wish).answer)
-        for wish in wishes(study, claims)
+        Advice(tolerance.value if tolerance.relative else None, recommend(study, Wish(name, tolerance)).answer)
+        for name in default_quantities(study)
+        if study.quantities[name].scale is not None  # a part of nothing
+        for tolerance in (own if own and name == study.quantity else parts)
     ]

@@ -29,13 +29,11 @@ class Wall:
             column.
         normals: e1 there, shape (rows, columns, 3).
         lines: every how many rows and columns a line is drawn.
-        spacing: between the lines [unit of the coordinate], for the first and the second coordinate.
     """
 
     points: FloatArray
     normals: FloatArray
     lines: tuple[int, int]
-    spacing: tuple[float, float]
 
 
 def wall(body: RollingBall, u: FloatArray) -> Wall:
@@ -49,12 +47,11 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
     u = body.wall.locate(body.surface.position(u))
     domain = body.wall.domain if isinstance(body.wall, Declared) else ((-math.inf, math.inf),) * 2
     grids: list[npt.NDArray[np.floating]] = []
-    every, spacing = [], []
+    every = []
     for column, (period, scale) in enumerate(zip(body.surface.periods, body.surface.length_scales, strict=True)):
         if period is not None:
             grids.append(np.arange(_ROUND + 1) * np.float64(period / _ROUND))
             every.append(_ROUND_LINES)
-            spacing.append(period * _ROUND_LINES / _ROUND)
             continue
         margin = _MARGIN * body.ball.radius / scale
         low, high = float(u[:, column].min()) - margin, float(u[:, column].max()) + margin
@@ -62,10 +59,9 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
         step = _round_step(max(2 * body.ball.radius / scale, (high - low) / _MOST_LINES))
         grids.append(np.arange(math.floor(low / step), math.ceil(high / step) + 1) * step)
         every.append(1)
-        spacing.append(step)
     grid = np.stack(np.meshgrid(*grids, indexing="xy"), axis=-1)
     points = body.wall.position(grid)
-    return Wall(points, body.wall.normal(points), (every[1], every[0]), (spacing[0], spacing[1]))
+    return Wall(points, body.wall.normal(points), (every[1], every[0]))
 
 
 def middle(body: RollingBall, u: FloatArray) -> FloatArray:
