@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from proofroll.cli import options
+
+if TYPE_CHECKING:
+    from rich.table import Table
 
 
 def onset(
@@ -27,7 +30,6 @@ def onset(
     """Say when the ball first slips, in every engine, and how well that is posed."""
     from proofroll.core.time_grid import time_grid
     from proofroll.elements.ball_on_surface.onset_study import onset_study, summary
-    from proofroll.elements.ball_on_surface.report.first_slip_table import onset_table
 
     time_grid(until, 0.01)
     with options.progress_bar("runs") as advance:
@@ -41,12 +43,44 @@ def onset(
             progress=lambda case, _: advance(case.engine.name),
         )
     content = study.content()
-    options.show(content, as_json, lambda: [summary(content), onset_table(content)])
+    options.show(content, as_json, lambda: [summary(content), _onset_table(content)])
     verdicts = {item["verdict"] for item in content["engines"]}
     # A refusal is an answer where nobody asked for that engine in particular.
     if "failed" in verdicts or (engine and "refused" in verdicts):
         raise typer.Exit(options.ENGINE)
     raise typer.Exit(options.CONTRADICTED if "disagree" in verdicts else options.OK)
+
+
+def _onset_table(content: dict[str, Any]) -> Table:
+    """One line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
+    from rich.table import Column
+    from rich.text import Text
+
+    from proofroll.report.labels import number
+    from proofroll.report.screen import numeric, plain_table, unbroken
+
+    table = plain_table(
+        Column("engine", overflow="fold"),
+        *numeric("first slip [s]"),
+        *unbroken("between [s]"),
+        *numeric("difference [s]"),
+        Column("verdict", overflow="fold"),
+    )
+    for item in content["engines"]:
+        first = item["onset"]
+        bracket = f"{first['time_low']:.9g} … {first['time_high']:.9g}" if first else ""
+        verdict = item["verdict"]
+        if verdict in {"failed", "refused"}:
+            verdict += f": {item['message']}"
+        label = (item["name"], *(item["settings"].get(key, "") for key in ("formulation", "preset")))
+        table.add_row(
+            Text(" ".join(filter(None, label))),
+            f"{first['time']:.9g}" if first else "none",
+            bracket,
+            number(item["difference"]),
+            Text(verdict),
+        )
+    return table
 
 
 def regimes(

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.report.drawings import Drawing, overview
+from proofroll.elements.ball_on_surface.report.drawings import overview
 from proofroll.elements.ball_on_surface.report.drawings.surfaces import overview as by_kind
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.report.pen import View, circle, turn
+from proofroll.report.pen import Drawing, View, circle, turn
 
 
 def drawn(scene: str, **parameters: float) -> list[dict[str, Any]]:

@@ -1,7 +1,8 @@
-"""A scene as a whole, drawn by the kind of its wall. Surfaces without a drawing of their own are in :mod:`net`."""
+"""A scene as a whole, drawn by the kind of its wall; one without a drawing of its own as a net of coordinate lines."""
 
 from __future__ import annotations
 
+import itertools
 from functools import singledispatch
 
 import numpy as np
@@ -9,11 +10,13 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.report.drawings.contact import contact
-from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane, Surface
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
+from proofroll.report.labels import symbol
 from proofroll.report.pen import Drawing, View, turn
 
-SIZE = 128.0  # half the width of what is drawn of a wall [px]
+_SIZE = 128.0  # half the width of what is drawn of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]
+_LINES, _FINE = 13, 61  # lines of a net along each coordinate, and points of each
 
 
 @singledispatch
@@ -31,7 +34,7 @@ def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001
 def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     """A cylinder cut open: axis, radii, the circle of the centre, the ball at its start and somewhere below."""
     b, surface = wall.radius, body.surface
-    drawn, at = Drawing(), View(direction(-68, 24), (0, 0, 1), SIZE / b)
+    drawn, at = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
     top, bottom, here = 0.62 * b, -1.3 * b, (2.55, -0.72 * b)
     _tube(drawn, at, wall, top, bottom)
     drawn.path(at(surface.position(_ring(turn(0, 2 * np.pi), 0.0))), "hidden", closed=True)
@@ -55,7 +58,7 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
     leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
     drawn.path(leader, "thin")
     drawn.text(leader[-1], "a", beside=(8.0, 5.0))
-    gravity(drawn, at, body, at(-1.35 * b * right(at)))
+    _gravity(drawn, at, body, at(-1.35 * b * _right(at)))
     return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
 
 
@@ -64,7 +67,7 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     """A slope with its angle, the ball on it or above, and its speeds down and across."""
     a, surface = body.ball.radius, body.surface
     size = max(6.0 * a, body.gap0)
-    drawn, at = Drawing(), View(direction(-62, 22), (0, 0, 1), SIZE / size)
+    drawn, at = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
     corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
     low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
     drawn.path(at([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
@@ -74,16 +77,49 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
     if body.gap0:
         drawn.path(at([start, touching]), "hidden")
         drawn.disc(at(touching).tolist(), a * at.scale, "ghost")
-    for index, symbol in ((1, "V_0"), (2, "V_3")):
+    for index, letter in ((1, "V_0"), (2, "V_3")):
         along = size * frame[:, index]
         drawn.vector(at([foot, foot + 0.95 * along]), "thin", surface.coordinates[index - 1], by=14.0)
-        drawn.vector(at([start, start + 0.62 * along]), "motion", symbol, by=13.0)
+        drawn.vector(at([start, start + 0.62 * along]), "motion", letter, by=13.0)
     drawn.disc(at(start).tolist(), a * at.scale, "ball")
     rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
     drawn.path(rim, "thin")
     drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
-    gravity(drawn, at, body, at(-1.15 * size * right(at)))
+    _gravity(drawn, at, body, at(-1.15 * size * _right(at)))
     return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
+
+
+@overview.register
+def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
+    """The net over the whole domain, the ball at its start, its velocity and the directions of the coordinates."""
+    (low, high), (lowest, highest) = wall.domain
+    middle = wall.position(wall.places())
+    size = 0.5 * float(np.max(np.ptp(middle, axis=0)))
+    centre = (middle.min(axis=0) + middle.max(axis=0)) / 2
+    drawn, at = Drawing(), View(_direction(-62, 32), (0, 0, 1), _SIZE / size)
+
+    def line(u1: FloatArray, u2: FloatArray) -> None:
+        points = wall.position(np.stack(np.broadcast_arrays(u1, u2), axis=-1))
+        looks = np.where(at.towards(wall.normal(points)) > 0, "hidden", "line")  # seen from behind
+        cuts = [0, *(1 + np.flatnonzero(looks[1:] != looks[:-1])).tolist(), len(looks) - 1]
+        for start, end in itertools.pairwise(cuts):
+            if end > start:
+                drawn.path(at(points[start : end + 1] - centre), str(looks[start]))
+
+    for value in np.linspace(low, high, _LINES):
+        line(np.full(1, value), np.linspace(lowest, highest, _FINE))
+    for value in np.linspace(lowest, highest, _LINES):
+        line(np.linspace(low, high, _FINE), np.full(1, value))
+    start, frame = body.p0 - centre, body.surface.frame(body.u0)
+    foot = start + body.ball.radius * frame[:, 0]
+    for name, along in zip(body.surface.coordinates, frame[:, 1:].T, strict=True):
+        drawn.vector(at([foot, foot + 0.45 * size * along]), "thin", symbol(name), by=14.0)
+    speed = float(np.linalg.norm(body.v0))
+    if speed:
+        drawn.vector(at([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
+    drawn.disc(at(start).tolist(), body.ball.radius * at.scale, "ball")
+    _gravity(drawn, at, body, at(-1.25 * size * _right(at)))
+    return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1) if abs(frame[2, 0]) < 0.9 else (-1, 0, 0))]
 
 
 def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
@@ -102,7 +138,7 @@ def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
     drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
 
 
-def right(at: View) -> FloatArray:
+def _right(at: View) -> FloatArray:
     """The level direction that is to the right in the picture."""
     across = np.cross(np.array([0.0, 0.0, 1.0]), np.asarray(at.viewer, dtype=np.float64))
     return np.asarray(across / np.linalg.norm(across))
@@ -136,15 +172,15 @@ def _ring(angles: FloatArray, height: float | FloatArray) -> FloatArray:
 
 
 def _radius(
-    drawn: Drawing, at: View, centre: FloatArray, rim: FloatArray, symbol: str, beside: tuple[float, float]
+    drawn: Drawing, at: View, centre: FloatArray, rim: FloatArray, letter: str, beside: tuple[float, float]
 ) -> None:
     """An arrow along a radius, and its letter beside the middle of it [px]."""
     ends = at([centre, rim])
     drawn.arrow(ends, "thin")
-    drawn.text(ends.mean(axis=0) + beside, symbol)
+    drawn.text(ends.mean(axis=0) + beside, letter)
 
 
-def gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
+def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
     """The direction of gravity at a place of the picture; nothing where there is none."""
     size = float(np.linalg.norm(body.gravity))
     if not size:
@@ -154,7 +190,7 @@ def gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> N
     drawn.vector(np.stack([place, place + 44.0 * along]), "force", "g")
 
 
-def direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
+def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
     """Towards a viewer at these angles [deg]."""
     az, el = np.radians([azimuth, elevation])
     return float(np.cos(el) * np.cos(az)), float(np.cos(el) * np.sin(az)), float(np.sin(el))
