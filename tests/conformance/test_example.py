@@ -15,7 +15,7 @@ from proofroll.conformance import Check, checks
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "semi_implicit.py"
 

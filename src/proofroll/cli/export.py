@@ -20,7 +20,7 @@ def export(
     """Write the model that an engine builds of a scene, as its own tools read it."""
     from proofroll.running.model_file import model_file
     from proofroll.running.store import write_text
-    from proofroll.studies.run_once import single_case
+    from proofroll.studies.cases import single_case
 
     options.require_writable(file)
     case = single_case(scene, options.assignments(settings), engine, until=1.0, every=1.0, time_limit=60.0)

@@ -49,7 +49,7 @@ def run(
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
-    from proofroll.studies.run_once import single_case
+    from proofroll.studies.cases import single_case
 
     if until is not None:
         time_grid(until, EVERY if every is None else every)

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from proofroll.core.arrays import largest_difference
-from proofroll.core.dataset import scales
 from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import MERGED
 from proofroll.running.case import EngineDescription, Status
@@ -128,10 +127,10 @@ def ladder_content(study: Ladder) -> LadderContent:
         parameters=dict(study.scene.parameters),
         quantity=study.quantity,
         unit=study.unit,
-        scale=scales(study.scene, truth.dataset).get(study.quantity),
+        scale=truth.sizes.get(study.quantity),
         tolerance=study.tolerance,
         until=study.until,
-        truth=KnownTruth(truth.dataset.attrs.get("route"), truth.error_bar),
+        truth=KnownTruth(truth.dataset.attrs.get("route"), study.true({})[1]),
         rungs=[_rung(study, rung) for rung in study.ladder],
         terms=[_term(study, switch) for switch in study.switches],
         absent={
@@ -196,8 +195,8 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
         change,
         cost,
         tolerance=study.tolerance,
-        bar=study.truths[str(point)].error_bar,
-        scale=scales(study.scene, study.truths[str({})].dataset).get(study.quantity, 1.0),
+        bar=study.true(point)[1],
+        scale=study.truths[str({})].sizes.get(study.quantity, 1.0),
     )
     return TermFound(*said, verdict, reason, on, off, cost, change, error_change)
 

@@ -1,12 +1,22 @@
-"""The one place that makes cases."""
+"""The one place that makes cases: of any study, and of one run as the command line asks for it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import threading
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import sampling_interval
+from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.worker_pool import Workers
+
+# Length of a run that nobody gives [s].
+USUAL = 2.0
 
 
 def case_of(
@@ -18,3 +28,39 @@ def case_of(
     """
     parameters = {parameter: scene.parameters[parameter] for parameter in given}
     return Case(name, parameters, scene.digest, engine, until, every, asks=scene.asks, **others)
+
+
+def single_case(
+    scene: str,
+    parameters: Mapping[str, object],
+    engine: str,
+    *,
+    until: float | None,
+    every: float | None,
+    time_limit: float,
+    asks: Sequence[str] = (),
+    workers: Workers | None = None,
+) -> Case:
+    """The case of one run.
+
+    Without ``until`` it ends after 2 s, or sooner where the scene's file has a shorter ``duration``.
+    Without an interval ``every`` between samples it is that of :func:`proofroll.core.time_grid.sampling_interval`.
+    The engine is asked in one of ``workers``, if they are given: the run can then go on in the same process.
+
+    Raises:
+        InputError, Missing: something that was given does not exist or makes no sense.
+    """
+    if not 0 < time_limit <= threading.TIMEOUT_MAX:
+        raise InputError("time_limit", time_limit, "give a positive, finite time in s")
+    if "asks" in parameters:
+        raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
+    spec = parse_engine(engine)
+    loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
+    facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
+    if isinstance(facts, ProofrollError):
+        raise facts
+    if until is None:
+        until = min(USUAL, read_scene_file(scene).duration or USUAL)
+    if every is None:
+        every = sampling_interval(facts.step)
+    return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit)

@@ -29,7 +29,7 @@ from proofroll.studies.ladder_models import LadderModel, Rung, Switch, rungs, sw
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
 _EVERY = 0.02  # interval between samples [s], as in the comparison files
 _TIME_LIMIT = 60.0  # wall seconds for one case
@@ -50,15 +50,6 @@ class ModelAnswer:
     result: Result
     values: FloatArray | None = None
     timing: Timing | None = None
-
-
-@dataclass(frozen=True)
-class LadderTruth:
-    """The truth at one point of the parameters: the whole, the quantity of it, and that one's error bar."""
-
-    dataset: xr.Dataset
-    values: FloatArray
-    error_bar: float
 
 
 class Ladder:
@@ -98,7 +89,7 @@ class Ladder:
         engines: Sequence[str] = (),
         rounds: int | None = None,
     ) -> None:
-        self._grid = time_grid(until, _EVERY)
+        time_grid(until, _EVERY)  # what makes no sense is refused there
         if until <= 0:
             raise InputError("until", until, "give a time in s that is positive")
         if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
@@ -117,7 +108,7 @@ class Ladder:
             if isinstance(error, InputError):
                 raise error
         _, self._truth_facts = resolve_with_truth([], runner.workers)
-        self.truths: dict[str, LadderTruth] = {}
+        self.truths: dict[str, Reference] = {}
         self.answers: dict[str, ModelAnswer] = {}
         self.ladder: list[Rung] = rungs(self.engines, self.scene.requires)
         self.switches: list[Switch] = []
@@ -155,14 +146,10 @@ class Ladder:
             result = results[case.key]
             if result.status != Status.DONE:
                 raise Refused(f"there is no truth of this scene: {result.message}")
-            self.truths[str(point)] = self._truth(read(self._runner.store.trajectory(case)), point)
-
-    def _truth(self, dataset: xr.Dataset, point: dict[str, float]) -> LadderTruth:
-        reference = Reference.of(self._scene_at(point), dataset)
-        if self.quantity not in reference.curves:
-            raise Refused(f"the truth of this scene has no {self.quantity}")
-        values, bar = reference.true(self.quantity, reference.curves[self.quantity])
-        return LadderTruth(dataset, values, bar)
+            reference = Reference.read(self._scene_at(point), self._runner.store.trajectory(case))
+            if self.quantity not in reference.curves:
+                raise Refused(f"the truth of this scene has no {self.quantity}")
+            self.truths[str(point)] = reference
 
     def _scene_at(self, point: Mapping[str, float]) -> Scene:
         return load_scene(self._name, **(self._given | dict(point)))
@@ -173,10 +160,15 @@ class Ladder:
         curves = observe(self._scene_at(model.parameters), read(self._runner.store.trajectory(case)))
         return ModelAnswer(case, result, curves.get(self.quantity))
 
+    def true(self, point: dict[str, float]) -> tuple[FloatArray, float]:
+        """The true values of the quantity in the scene with these parameters, and their error bar."""
+        reference = self.truths[str(point)]
+        return reference.true(self.quantity, reference.curves[self.quantity])
+
     def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
         """Largest distance from the truth of the scene with these parameters; None: no answer."""
         values = self.answers[key_of(model)].values
-        return None if values is None else largest_difference(values, self.truths[str(point)].values)
+        return None if values is None else largest_difference(values, self.true(point)[0])
 
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}

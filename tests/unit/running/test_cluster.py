@@ -32,7 +32,7 @@ from proofroll.running.cluster import Cluster
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 from proofroll_benchmarks.cluster import idle
 from proofroll_drill.processes import alive
 

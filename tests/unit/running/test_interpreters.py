@@ -24,7 +24,7 @@ from proofroll.running.runner import Runner, run_one
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 
 SHORT = {"until": 0.02, "every": 0.01, "time_limit": 60.0}
 

@@ -21,7 +21,7 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner, run_one
 from proofroll.running.store import Store
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 
 MakeCase = Callable[..., Case]
 

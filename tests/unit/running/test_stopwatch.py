@@ -12,7 +12,7 @@ from proofroll.running.process import Worker
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.time_case import time_once
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 
 
 def test_what_is_measured_is_a_run_of_the_case(install_engines: Callable[[Mapping[str, str]], None]) -> None:

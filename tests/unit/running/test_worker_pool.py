@@ -11,7 +11,7 @@ from proofroll.running.process import Worker
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 
 pytestmark = pytest.mark.own_workers
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from proofroll.studies.run_once import single_case
+from proofroll.studies.cases import single_case
 
 
 @pytest.mark.parametrize(
