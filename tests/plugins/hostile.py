@@ -15,10 +15,10 @@ import numpy as np
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
 from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from decimal import Decimal, getcontext
 import numpy as np
 import pytest
 
-from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.compiled import library, rolling
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import energy
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build
 

@@ -38,7 +38,7 @@ def check(
     time_limit: float = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
 ) -> RobotCheck:
-    """Reads a file with every engine and compares what each holds with what the file says.
+    """What every engine makes of a file, held against what the file says.
 
     Args:
         path: of a URDF or MJCF.
@@ -48,9 +48,6 @@ def check(
         seed: of the states.
         time_limit: for each engine [s].
         progress: called with the name of an engine that has been asked.
-
-    Returns:
-        everything that is said of it.
 
     Raises:
         InputError: the file, an engine or an option is wrong.

@@ -90,9 +90,6 @@ def gallery(
         progress: called with the name of each robot.
         cluster: where the robots are checked; None: here.
 
-    Returns:
-        for every robot its file, what each engine does, and what of that was not expected.
-
     Raises:
         InputError: there is no such robot or engine.
     """

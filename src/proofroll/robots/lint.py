@@ -8,8 +8,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.robots.model import Robot, RobotJoint
-from proofroll.robots.robot_file import LintFinding, RobotFile
-from proofroll.robots.safe_xml import numbers
+from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
 
 # Level, where and what of a :class:`LintFinding`.
 _Noticed = tuple[str, str, str]

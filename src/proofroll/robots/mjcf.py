@@ -9,8 +9,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
-from proofroll.robots.robot_file import LintFinding
-from proofroll.robots.safe_xml import MOST_ELEMENTS, read_xml
+from proofroll.robots.robot_file import MOST_ELEMENTS, LintFinding, read_xml
 
 # How deep files may include files.
 _DEEPEST = 8

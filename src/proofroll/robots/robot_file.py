@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from proofroll.core.errors import InputError
-from proofroll.robots.safe_xml import read_xml
 
+# Of the XML of strangers; a robot file is a few hundred kB, the largest known is 2 MB.
+LARGEST, DEEPEST, MOST_ELEMENTS = 32 * 2**20, 400, 200_000
 # More bodies than any robot has; each costs a row and a column of dense matrices.
 MOST_BODIES = 2000
 BASES = ("fixed", "free")
@@ -69,3 +72,75 @@ def open_robot(path: Path, base: str = "fixed") -> RobotFile:
     if count > MOST_BODIES:
         raise InputError("file", str(path), f"it has {count} {body}s; at most {MOST_BODIES} are checked")
     return RobotFile(path, kind, root, base, tuple(findings))
+
+
+class _Builder(TreeBuilder):
+    """Builds elements, and stops at what no robot file needs."""
+
+    depth = elements = 0
+
+    def start(self, tag: Any, attrs: Any) -> Element:
+        self.depth += 1
+        self.elements += 1
+        if self.depth > DEEPEST:
+            raise _TooMuch(f"elements are nested deeper than {DEEPEST}")
+        if self.elements > MOST_ELEMENTS:
+            raise _TooMuch(f"there are more than {MOST_ELEMENTS} elements")
+        return super().start(tag, attrs)
+
+    def end(self, tag: Any) -> Element:
+        self.depth -= 1
+        return super().end(tag)
+
+    def doctype(self, *_: Any) -> None:
+        raise _TooMuch("a document type (and entities that it may declare) is not read; remove <!DOCTYPE …>")
+
+
+class _TooMuch(Exception):  # noqa: N818 -- turned into an InputError with the name of the file
+    pass
+
+
+def read_xml(path: Path) -> Element:
+    """The root element of a file: no document types, no entities, nothing loaded, limits on size and depth.
+
+    Raises:
+        InputError: it cannot be read, is too large or too deep, declares a document type or is no XML.
+    """
+    try:
+        if not path.is_file():
+            raise InputError("file", str(path), "there is no such file")
+        if path.stat().st_size > LARGEST:
+            raise InputError("file", str(path), f"the file is larger than {LARGEST // 2**20} MB")
+        text = path.read_bytes()
+    except OSError as error:
+        raise InputError("file", str(path), f"the file cannot be read: {error.strerror}") from None
+    parser = XMLParser(target=_Builder())
+    try:
+        parser.feed(text)
+        root: Element = parser.close()
+    except _TooMuch as error:
+        raise InputError("file", str(path), str(error)) from None
+    except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that does not exist
+        raise InputError("file", str(path), f"this is no XML: {error}") from None
+    return root
+
+
+def numbers(element: Element, attribute: str, default: str | None, count: int) -> list[float]:
+    """The numbers in an attribute.
+
+    Raises:
+        InputError: it is absent without a default, has another number of them, or one is not finite.
+    """
+    text = element.get(attribute, default)
+    field = f"<{element.tag} {attribute}>"
+    if text is None:
+        raise InputError(field, None, "the attribute is missing")
+    try:
+        found = [float(part) for part in text.split()]
+    except ValueError:
+        raise InputError(field, text, "write numbers") from None
+    if len(found) != count:
+        raise InputError(field, text, f"write {count} number{'s' if count > 1 else ''}")
+    if not all(map(math.isfinite, found)):
+        raise InputError(field, text, "numbers must be finite")
+    return found

@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
-from proofroll.robots.robot_file import LintFinding, RobotFile
-from proofroll.robots.safe_xml import numbers
+from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
 
 # What carries the root; no name in a file begins so.
 BASE_JOINT = "(base)"

@@ -14,11 +14,11 @@ from proofroll.core.element import Element
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.events import with_events
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.truth import rolling, unreduced_taylor
 from proofroll.truth.error_bars import dataset_of, put_error_bars
 from proofroll.truth.onset import edge_between, onset

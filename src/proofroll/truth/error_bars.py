@@ -47,12 +47,8 @@ def dataset_of(
 def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
     """Gives each variable of ``result`` the attribute ``error_bar`` in its own unit.
 
-    It is :data:`SAFETY` times the largest difference between the routes plus what both may have in common.
-
-    Args:
-        result: of the first route; changed in place.
-        check: of the second route.
-        floor: error common to both routes, relative to the variable's largest size [-].
+    It is :data:`SAFETY` times the largest difference to ``check``, of the second route, plus ``floor``: what both may
+    have in common, relative to the size of the variable [-].
 
     Raises:
         Diverged: a value is not finite, other than the friction needed where nothing presses.

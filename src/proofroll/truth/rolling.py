@@ -64,17 +64,7 @@ def _sizes(body: RollingBall) -> tuple[float, float, float]:
 def _integrate(
     rates: Callable[[FloatArray], FloatArray], scales: FloatArray, x: FloatArray, times: FloatArray
 ) -> FloatArray:
-    """States at rising times, each reached by a step that ends there: the dense output of DOP853 has a lower order.
-
-    Args:
-        rates: ẋ of a state x.
-        scales: natural size of each component of x.
-        x: the state at the first time.
-        times: [s].
-
-    Raises:
-        Diverged: a step became too short.
-    """
+    """States from ``x`` on, each reached by a step that ends there: the dense output of DOP853 has a lower order."""
     from scipy.integrate import DOP853
 
     states, step = [x], math.inf

@@ -10,11 +10,11 @@ import xarray as xr
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.model import Ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.files.scene_file import load_scene
 from proofroll.truth import rolling, unreduced_taylor

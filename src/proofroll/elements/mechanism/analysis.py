@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +17,7 @@ from proofroll.elements.mechanism.rotations import Array, cross
 # of the mechanisms seen so far above 1e-3; the square-root middle leaves room to both.
 RANK = 1e-8
 NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
+State = TypeVar("State")
 _ZERO = 1e-9  # relative: a component of a null vector that is zero but for round-off
 
 
@@ -52,7 +55,13 @@ def analysed(mechanism: Mechanism) -> Analysis:
     rows = tree.loop_rows(motion)
     values = singular_values(rows.C)
     at_start = rank_of(values)
-    near = _near(tree, q, rows.C)
+    still = np.zeros(mechanism.nv)
+
+    def of_loops(at: Array) -> tuple[Array, Array]:
+        found = tree.loop_rows(tree.at(at, still))
+        return found.residual, found.C
+
+    near = tree.at(general_place(q, of_loops, tree.moved), still)
     near_rows = tree.loop_rows(near)
     rank = max(at_start, rank_of(singular_values(near_rows.C)))
     mask = determinate(tree, near, near_rows, rank)
@@ -132,19 +141,21 @@ def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, lo
     return of_joints, of_loops
 
 
-def _near(tree: Tree, q: Array, C: Array) -> BodyMotion:
-    """The mechanism at a pose near q that its loops allow and that no symmetry distinguishes."""
-    nv = tree.mechanism.nv
-    direction = 1.0 + np.modf(np.arange(1, nv + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
-    if C.size:
-        kernel = np.linalg.svd(C)[2][rank_of(singular_values(C)) :]
-        direction = kernel.T @ (kernel @ direction)
-    dv = NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300)
-    q = tree.moved(q, dv)
-    zero = np.zeros(nv)
-    for _ in range(20):
-        rows = tree.loop_rows(tree.at(q, zero))
-        if np.abs(rows.residual).max(initial=0.0) < 1e-14:
-            break
-        q = tree.moved(q, -least(rows.C, rows.residual))
-    return tree.at(q, zero)
+def general_place(
+    start: State, rows: Callable[[State], tuple[Array, Array]], moved: Callable[[State, Array], State]
+) -> State:
+    """A place near the start that the constraints allow and that no symmetry distinguishes: a start may be singular.
+
+    Args:
+        start: in whatever words.
+        rows: residuals, shape (rows,), and rows on the velocities, shape (rows, velocities), where it is told.
+        moved: where a small displacement, shape (velocities,), leads.
+    """
+    _, C = rows(start)
+    direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
+    direction -= np.linalg.pinv(C, RANK) @ (C @ direction)
+    place = moved(start, NEARBY * direction / max(np.abs(direction).max(initial=0.0), 1e-300))
+    for _ in range(10 if C.size else 0):  # Newton's method doubles the digits; four rounds do from so near
+        residual, C = rows(place)
+        place = moved(place, -np.linalg.pinv(C, RANK) @ residual)
+    return place

@@ -9,21 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import joint
+from proofroll.elements.mechanism.analysis import State, general_place
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
 # Relative singular value below which a constraint row of an engine depends on the others; see analysis.RANK, of which
 # it is independent: an engine's rows have other units and weights.
 DEPENDENT = 1e-9
-_NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
-State = TypeVar("State")
 WITH_AXIS = joint.WITH_AXIS
 
 
@@ -90,25 +89,9 @@ def independent(rows: Array) -> int:
 def independent_anywhere(
     start: State, rows: Callable[[State], tuple[Array, Array]], moved: Callable[[State, Array], State]
 ) -> int:
-    """Number of independent constraint rows at the start or, where it is larger, at a pose near it.
-
-    That pose is one that the constraints allow and that no symmetry distinguishes: a start may be singular.
-
-    Args:
-        start: where the engine starts, as it describes that.
-        rows: residuals, shape (rows,), and rows on the velocities, shape (rows, velocities), where it is told.
-        moved: where a small displacement, shape (velocities,), leads.
-    """
-    _, C = rows(start)
-    if not C.size:
-        return 0
-    direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike
-    direction -= np.linalg.pinv(C, 1e-8) @ (C @ direction)
-    place, near = moved(start, _NEARBY * direction / max(np.abs(direction).max(), 1e-300)), C
-    for _ in range(10):  # Newton's method doubles the digits; four rounds do from so near
-        residual, near = rows(place)
-        place = moved(place, -np.linalg.pinv(near, 1e-8) @ residual)
-    return max(independent(C), independent(near))
+    """Number of independent constraint rows at the start or, where it is larger, at a :func:`general_place` near it."""
+    near = general_place(start, rows, moved)
+    return max(independent(rows(start)[1]), independent(rows(near)[1]))
 
 
 def unsaid(mechanism: Mechanism) -> tuple[Array, Array]:

@@ -13,7 +13,6 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import DormandPrince853
-from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
 from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, parameters, reduced, supports
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
@@ -21,7 +20,7 @@ from proofroll.elements.ball_on_surface.compiled.series import Series, still_mov
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
-from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced_rates, start
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
 
 # A step shorter than this part of the way to the next sample leads nowhere.
 _STUCK = 1e-12

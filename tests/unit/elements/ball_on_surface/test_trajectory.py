@@ -10,9 +10,9 @@ from proofroll.core.dataset import from_samples
 from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.elements.ball_on_surface.closed_form import closed_form
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.files.scene_file import load_scene
 
 

@@ -38,15 +38,7 @@ class Series:
     def __init__(
         self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check, renewed: Renewed | None = None
     ) -> None:
-        """Starts at time 0.
-
-        Args:
-            integrator: heyoka's; it is copied, for it holds a state.
-            pars: values of its parameters.
-            x: initial state.
-            check: see :data:`Check`.
-            renewed: see :data:`Renewed`.
-        """
+        """Starts at time 0, with a copy of heyoka's integrator, for that holds a state."""
         self.t, self.x = 0.0, np.array(x, dtype=np.float64)
         self._integrator, self._check, self._renewed = copy.copy(integrator), check, renewed
         self._steps = 0
