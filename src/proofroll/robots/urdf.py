@@ -114,9 +114,7 @@ def _body(name: str, link: Element) -> tuple[RobotBody, dict[str, Any]]:
     written = np.zeros((3, 3))
     moments = inertial.find("inertia")
     if moments is not None:
-        xx, xy, xz, yy, yz, zz = (
-            numbers(moments, f"i{key}", "0", 1)[0] for key in ("xx", "xy", "xz", "yy", "yz", "zz")
-        )
+        xx, xy, xz, yy, yz, zz = (numbers(moments, f"i{key}", "0", 1)[0] for key in _MOMENTS)
         written = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     source |= {"written": written, "frame": R}
     return RobotBody(name, m, com, R @ written @ R.T), source

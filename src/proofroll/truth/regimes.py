@@ -9,6 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.truth.flight import pressed
 from proofroll.truth.route import End
 from proofroll.truth.stick_slip import first_route
 from proofroll.truth.switching import follow
@@ -41,9 +42,8 @@ def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
 def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
     """Whether friction could hold the weight along the surface if it pointed straight against it."""
     e1 = body.surface.normal(p_WB)
-    along = float(e1 @ body.gravity)
-    press = along + v_WB @ body.surface.normal_gradient(p_WB) @ v_WB  # N/m
-    return bool(body.contact.mu_kinetic * press >= np.linalg.norm(body.gravity - along * e1))
+    weight = np.linalg.norm(body.gravity - float(e1 @ body.gravity) * e1)
+    return bool(body.contact.mu_kinetic * pressed(body, p_WB, v_WB) >= weight)
 
 
 def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:

@@ -29,6 +29,7 @@ from proofroll.elements.ball_on_surface.mechanics import newton_euler
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
+from proofroll.truth.scalars import cross, dot, minus, plus, scaled
 
 _local = threading.local()
 
@@ -132,15 +133,8 @@ def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> 
     a, kappa = hy.par[0], hy.par[1]
     g, k, outward = [hy.par[i] for i in (2, 3, 4)], [hy.par[i] for i in (5, 6, 7)], hy.par[8]
 
-    def dot(x: Any, y: Any) -> Any:
-        return sum(one * other for one, other in zip(x, y, strict=True))
-
-    def cross(x: Any, y: Any) -> list[Any]:
-        return [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]]
-
     def across(x: Any, axis: Any) -> list[Any]:
-        along = dot(x, axis)
-        return [one - along * other for one, other in zip(x, axis, strict=True)]
+        return minus(x, scaled(dot(x, axis), axis))
 
     if isinstance(surface, Declared):
         away = surface.distance(*p)
@@ -151,28 +145,25 @@ def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> 
         e1 = [outward * x / distance for x in radial]
     else:
         e1 = k
-    v = [a * x for x in cross(e1, w)] if bounded else free
+    v = scaled(a, cross(e1, w)) if bounded else free
     if isinstance(surface, Declared):
         e1_rate = [dot([hy.diff(component, x) for x in p], v) for component in e1]
     elif surface is Cylinder:
         e1_rate = [outward * x / distance for x in across(across(v, k), e1)]
     else:
         e1_rate = [0.0, 0.0, 0.0]
-    turning = cross(w, e1_rate)
-    driven = [-a * ti for ti in turning]
+    driven = scaled(-a, cross(w, e1_rate))
     first = 9 if surface is Cylinder else 8 if surface is Plane else 5  # parameter that is not taken yet
     if moves:  # the wall's velocity W × (p + a e1) grows at this rate
-        gained = cross([hy.par[first + i] for i in range(3)], [x + a * y for x, y in zip(v, e1_rate, strict=True)])
-        driven = [x + y for x, y in zip(driven, gained, strict=True)]
-    along_wall = across([(gi + kappa * di) / (1 + kappa) for gi, di in zip(g, driven, strict=True)], e1)
-    normal = -dot(e1_rate, v)
-    v_rate = [x + normal * e for x, e in zip(along_wall, e1, strict=True)]
-    w_rate = [x / (kappa * a) for x in cross(e1, [x - gi for x, gi in zip(v_rate, g, strict=True)])]
+        driven = plus(driven, cross([hy.par[first + i] for i in range(3)], plus(v, scaled(a, e1_rate))))
+    along_wall = across([x / (1 + kappa) for x in plus(g, scaled(kappa, driven))], e1)
+    v_rate = plus(along_wall, scaled(-dot(e1_rate, v), e1))
+    force = minus(v_rate, g)  # of the wall, of a unit of mass
+    w_rate = [x / (kappa * a) for x in cross(e1, force)]
     if not bounded:
         return hy.taylor_adaptive(list(zip([*p, *v, *w], [*v, *v_rate, *w_rate], strict=True)), [1.0] * 9)
     mu = hy.par[first]
-    force = [x - gi for x, gi in zip(v_rate, g, strict=True)]  # of the wall, of a unit of mass
     pressed = -dot(force, e1)
-    friction = [x + pressed * e for x, e in zip(force, e1, strict=True)]
+    friction = plus(force, scaled(pressed, e1))
     used_up = hy.t_event(dot(friction, friction) - (mu * pressed) ** 2, direction=hy.event_direction.positive)
     return hy.taylor_adaptive(list(zip([*p, *w], [*v, *w_rate], strict=True)), [1.0] * 6, t_events=[used_up])

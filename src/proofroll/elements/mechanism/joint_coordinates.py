@@ -19,9 +19,8 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
-from proofroll.elements.mechanism.stepping import integrated
 
 _NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
 _EQUAL_STEP = 2e-3  # s

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars, GeneralBody, Planar
 from proofroll.truth.mechanism.rolling_rows import RollingContact
-from proofroll.truth.mechanism.scalars import (
+from proofroll.truth.scalars import (
     Scalar,
     add,
     cross,

@@ -17,7 +17,7 @@ from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
-from proofroll.truth.mechanism.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
+from proofroll.truth.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
 
 _PARALLEL = 1e-12  # how far axes of a plane mechanism may be from parallel: round-off
 _LIGHT = 1e-9  # of the largest moment of a body: a smaller one is a rod's or a point's, written with a file's digits

@@ -17,9 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.stepping import integrated
 from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (

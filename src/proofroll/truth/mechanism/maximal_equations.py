@@ -21,7 +21,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.mechanism.rolling_rows import RollingContact
-from proofroll.truth.mechanism.scalars import (
+from proofroll.truth.scalars import (
     Scalar,
     add,
     cross,

@@ -15,7 +15,7 @@ from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations
-from proofroll.truth.mechanism.scalars import Scalar, add, is_zero, mul, sub
+from proofroll.truth.scalars import Scalar, add, is_zero, mul, sub
 
 try:
     import heyoka

@@ -28,7 +28,7 @@ from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
-from proofroll.truth.mechanism.scalars import Scalar, dot
+from proofroll.truth.scalars import Scalar, dot
 
 
 @dataclass(frozen=True)

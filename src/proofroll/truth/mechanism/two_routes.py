@@ -19,7 +19,6 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.singular_poses import singular_poses
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 
@@ -27,6 +26,9 @@ FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does n
 CHAOS = 1e-9  # m, 1 (of quaternions): where two precisions differ by more, no number of digits is worth comparing
 BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only after it has parted the two precisions
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
+# Of the smallest singular value just before and after: where it goes to zero like |t|, the lines through its values
+# on both sides meet at zero but for their curvature; at a mere minimum they meet near the minimum.
+_AT_ZERO = 0.2
 JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench")
 
 
@@ -123,6 +125,33 @@ def _singular(mechanism: Mechanism, until: float) -> str:
         found = []
     where = ", ".join(f"{time:.4g}" for time in found[:3]) + (", …" if len(found) > 3 else "")
     return f" (singular poses near t = {where} s)" if found else ""
+
+
+def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> list[float]:
+    """Times, s, good to a fraction of the step, at which the loops' rows lose rank and the branch could change.
+
+    Args:
+        mechanism: any without dry friction.
+        until: end of the motion, s.
+        step: of Runge-Kutta 4 with a fixed rank, which passes such poses, s.
+    """
+    if not mechanism.loops:
+        return []
+    equations, nq = JointCoordinates(mechanism), mechanism.nq
+    times = np.linspace(0.0, until, max(round(until / step), 5) + 1)
+    states = equations.rk4_states(times, float(times[1]))
+    sizes = np.array([equations.solve(y[:nq], y[nq:]).smallest for y in states])
+    found = []
+    for i in range(2, len(times) - 2):
+        before, after = sizes[i - 2 : i], sizes[i + 1 : i + 3]
+        if sizes[i] > before[1] or sizes[i] >= after[0]:
+            continue
+        down, up = before[1] - before[0], after[1] - after[0]
+        # both lines against steps from i: before[1] + down·(x + 1) and after[0] + up·(x - 1)
+        x = (before[1] + down - after[0] + up) / (up - down)
+        if abs(before[1] + down * (x + 1)) < _AT_ZERO * min(before[1], after[0]):
+            found.append(float(times[i] + x * times[1]))
+    return found
 
 
 def _apart(one: Record, two: Record) -> Array:

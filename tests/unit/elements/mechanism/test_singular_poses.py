@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from proofroll.elements.mechanism.singular_poses import singular_poses
 from proofroll.truth.mechanism.closed_forms import closed_form
+from proofroll.truth.mechanism.two_routes import singular_poses
 
 
 def test_four_bar_passes_when_its_links_are_in_line(scene):
