@@ -60,14 +60,8 @@ def explain(
 ) -> tuple[tuple[RobotCause, ...], str | None]:
     """The causes of all differences, and the first layer that they leave unexplained.
 
-    Args:
-        file: what was read.
-        truth: what the file describes.
-        torques: that the forward dynamics were asked for, by joint.
-        reading: what the engine holds.
-        engine: its name.
-        tolerances: layer -> difference up to which it holds.
-        recompiled: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
+    The forward dynamics were asked for the ``torques``, by joint; a layer holds up to its tolerance. For ``recompiled``
+    see :class:`proofroll.robots.hypotheses.RobotEvidence`.
     """
     step = _Step(truth, differences(truth, torques, reading))
     ranked = sorted(hypotheses(), key=lambda item: engine not in item.known)

@@ -84,11 +84,7 @@ def gallery(
 ) -> GalleryContent:
     """Checks robots, each with every engine that its entry expects something of and that is installed.
 
-    Args:
-        names: of robots; by default all.
-        engines: to which it is restricted.
-        progress: called with the name of each robot.
-        cluster: where the robots are checked; None: here.
+    By default all robots and engines; ``progress`` is called with the name of each robot.
 
     Raises:
         InputError: there is no such robot or engine.

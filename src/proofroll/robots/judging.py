@@ -38,13 +38,7 @@ def judged(
 ) -> ImporterRow:
     """The row of an engine that answered.
 
-    Args:
-        file: what was read.
-        truth: what it means.
-        bar: how far the two formulations of the truth differ.
-        spec: the engine as the user wrote it.
-        answer: what it holds, or why it refused.
-        torques: by joint, that the forward dynamics were asked for.
+    The two formulations of the truth differ by ``bar``; the forward dynamics were asked for the ``torques``, by joint.
     """
     row = ImporterRow(
         engine=str(spec), status="refused", version=answer.version, refused=answer.refused, says=answer.says
@@ -109,10 +103,7 @@ def _offending(truth: RobotTruth, held: Reading) -> list[str]:
 def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
     """The robot that a file means, and the engine here that defines the format, with its version; empty: we read it.
 
-    Args:
-        file: what was read.
-        written: the file that engines get.
-        time_limit: for an engine that defines the format [s].
+    An engine that defines the format is asked for no longer than ``time_limit`` [s], of the file as engines get it.
 
     Raises:
         InputError: it has no meaning.

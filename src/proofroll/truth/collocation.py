@@ -95,15 +95,7 @@ def nodes(length: float) -> FloatArray:
 
 
 def take(system: System, time: float, state: FloatArray, length: float, guess: FloatArray) -> Step:
-    """One step.
-
-    Args:
-        system: what is integrated.
-        time: where it starts [s].
-        state: there, shape (n,).
-        length: of the step [s].
-        guess: states at the nodes from which Newton's method starts, shape (s, n).
-    """
+    """One step from a time [s]; Newton's method starts from a guess of the states at the nodes, shape (s, n)."""
     s, n = guess.shape
     values = guess
     before, factors, grown = np.inf, None, 0

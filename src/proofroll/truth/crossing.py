@@ -15,15 +15,10 @@ _TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(_X, _POINTS - 1))
 
 
 def first_rise(function: Callable[[FloatArray], FloatArray], start: float, end: float) -> float | None:
-    """First time in (start, end] at which the function passes from negative to positive, or None.
+    """First time in (start, end] at which a function of times passes from negative to positive, or None.
 
     A polynomial through 20 Chebyshev points finds every root, also the pair under a crest that lies between the ends
     of a step; two secant steps on the function itself then polish the first.
-
-    Args:
-        function: vectorised over times.
-        start: of the interval [s].
-        end: of the interval [s].
     """
     half, middle = (end - start) / 2, (end + start) / 2
     values = function(middle + half * _X)

@@ -84,14 +84,8 @@ def _integrated(rates: Rates, piece: Piece, time: float) -> FloatArray:
 class ExplicitRun:
     """A run from ``start`` until something ends it; see :class:`proofroll.truth.sliding.IntegratedRun`.
 
-    Args:
-        rates: of the state.
-        start: of the independent variable.
-        state: there.
-        until: its last value.
-        atol: absolute tolerance of each component.
-        ended: where a step reached what ends the run, with the state there; None: it goes on.
-        cap: longest step after a state.
+    Of each step ``ended`` tells where it reached what ends the run, the state there, and the reason; None: it goes on.
+    See :func:`steps` for the rest.
     """
 
     def __init__(

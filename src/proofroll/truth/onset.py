@@ -51,12 +51,7 @@ def first_slip(scene: Scene, until: float) -> float | None:
 
 
 def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
-    """The first slip until ``until`` [s] and its conditioning.
-
-    Args:
-        scene: with bounded friction.
-        until: how long to look [s].
-        uncertainty: relative uncertainty of μ and of f [-].
+    """The first slip until ``until`` [s], and its conditioning if μ and f have this relative uncertainty [-].
 
     Raises:
         InputError: ``uncertainty`` is not between 0 and 1.

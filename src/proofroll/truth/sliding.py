@@ -38,10 +38,6 @@ class Sliding(Route):
     Against τ the end of a slip, |u| → 0, is a smooth decay to infinity. The start of a slip is not: there the direction
     follows the drive b, against which sticking would need friction, ever more stiffly. Until |u| reaches ``handover``
     |b| T, with T = |b|/|ḃ| the time in which b changes, the direction is slaved to it.
-
-    Args:
-        body: the scene's ball.
-        handover: see above.
     """
 
     impact = staticmethod(by_coefficients)

@@ -39,11 +39,7 @@ def stays_on(body: RollingBall, until: float) -> bool:
 
 
 def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]]:
-    """The true trajectory and the events, with error bars.
-
-    Args:
-        scene: one ball on one surface; starts rolling without slip at time 0.
-        times: of the samples [s], rising, shape (time,).
+    """The true trajectory of one ball on one surface at rising times [s], and the events, with error bars.
 
     Returns:
         Dataset as of :func:`trajectory.trajectory`, each variable with the attribute ``error_bar`` in its

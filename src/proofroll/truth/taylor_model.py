@@ -46,13 +46,7 @@ _local = threading.local()
 
 
 def model(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
-    """The integrators, compiled once per thread.
-
-    Args:
-        resistance: with rolling resistance; without it the speed may pass through zero.
-        uniform: gravity's local components do not change along the surface.
-        bounded: friction has a bound.
-    """
+    """The integrators, compiled once per thread; see :func:`expressions`, and whether friction has a bound."""
     if not hasattr(_local, "models"):
         _local.models = cache(_compiled)
     compiled: TaylorModel = _local.models(resistance, uniform, bounded)

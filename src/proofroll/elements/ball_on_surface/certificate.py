@@ -149,9 +149,7 @@ def another_scene(lines: Iterable[Mapping[str, Any]], needed: float) -> str | No
     A scene without bound on friction is built with a number for it. As long as the motion needs less friction than
     that, the number changes nothing; where it needs more, the ball slips in the engine and cannot in the scene.
 
-    Args:
-        lines: of a stored certificate (:meth:`Line.as_dict`).
-        needed: largest friction |F|/N that the true motion needs [-].
+    The lines are those of a stored certificate (:meth:`Line.as_dict`), ``needed`` the largest |F|/N of the true motion.
     """
     for line in lines:
         if line["quantity"] == "1 / static friction" and line["found"] and line["found"][0] * needed > 1:

@@ -113,14 +113,7 @@ def regime_maps(
     progress: Callable[[int], None] | None = None,
     cluster: Cluster | None = None,
 ) -> list[xr.Dataset]:
-    """One map per value of the rolling resistance, each from runs of the truth.
-
-    Args:
-        study: the axes.
-        workers: processes at once.
-        progress: called with the number of runs just finished.
-        cluster: where the runs are made; None: here.
-    """
+    """One map per value of the rolling resistance, see :func:`regime_map`."""
     scenes = [load_scene(study.scene, rolling_resistance=f) for f in study.rolling_resistance]
     key = study, "".join(scene.digest for scene in scenes)
     if key not in _MADE:

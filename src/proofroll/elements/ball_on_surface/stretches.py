@@ -52,11 +52,7 @@ def carried(start: Rotation, t: FloatArray, w_WB: FloatArray, substeps: int) -> 
     The ball may turn more than once from sample to sample, so ω is integrated, by Magnus steps of fourth order
     (Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 2009, section 5.4).
 
-    Args:
-        start: orientations at all samples but the last.
-        t: of the samples [s].
-        w_WB: angular velocity there.
-        substeps: of the integration between two samples.
+    ``start`` are the orientations at all samples but the last, ``t`` the times of the samples [s].
     """
     from scipy.interpolate import make_interp_spline
     from scipy.spatial.transform import Rotation

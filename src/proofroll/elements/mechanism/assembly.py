@@ -25,11 +25,7 @@ ADVICE = "correct q0, or give the joints that follow from the loops dependent = 
 
 
 def assembled(mechanism: Mechanism, dependent: Collection[str]) -> Mechanism:
-    """The mechanism with q0 and v0 of some joints found from its loops.
-
-    Args:
-        mechanism: its q0 of these joints are guesses.
-        dependent: names of the joints that follow from the loops.
+    """The mechanism with q0 and v0 of the ``dependent`` joints found from its loops; their own q0 are guesses.
 
     Raises:
         InputError: one of them has coordinates that cannot be found.

@@ -70,12 +70,7 @@ def run(times):
 def program(element: MechanismElement, failed: FailedRun, engine: str | None, gain: float, opened: float) -> str:
     """The whole file; see :class:`proofroll.core.element_abilities.WritesPrograms`.
 
-    Args:
-        element: what was run.
-        failed: how it failed.
-        engine: its part with the engine alone; None: proofroll is asked to run it.
-        gain: energy [J] that it may gain; 0 where it is driven or damped.
-        opened: how far its joints and loops may be open [m].
+    The element may gain energy [J], 0 where it is driven or damped, and its joints and loops may be open so far [m].
     """
     part = engine
     if part is None:

@@ -61,11 +61,7 @@ class Rows(NamedTuple):
 
 
 class Tree:
-    """The kinematics of one mechanism; what does not move is computed once.
-
-    Args:
-        mechanism: bodies and joints.
-    """
+    """The kinematics of one mechanism; what does not move is computed once."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism

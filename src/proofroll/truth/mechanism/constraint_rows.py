@@ -53,14 +53,9 @@ class ConstraintRow:
 
 
 class ConstraintRows:
-    """Makes the rows for one state.
+    """Makes the rows for one state: what connects the bodies, and the views of these, the ground's last.
 
-    Args:
-        bodies: of the mechanism.
-        u_slices: where the velocities of each lie among all.
-        connections: joints, loops and rolling contacts.
-        rolling: those of them that are rolling contacts.
-        views: place, attitude and velocities of each body, the ground's last.
+    ``u_slices`` say where the velocities of each body lie among all, ``rolling`` which connections are those of balls.
     """
 
     def __init__(

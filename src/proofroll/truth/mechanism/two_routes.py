@@ -57,12 +57,7 @@ class TwoRouteMotion:
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
-    """The truth at the given times.
-
-    Args:
-        mechanism: any that both routes cover.
-        times: growing, s; the first may be 0.
-        tolerance: of DOP853.
+    """The truth at growing times, s, of which the first may be 0; ``tolerance`` is DOP853's.
 
     Raises:
         Refused: fewer than two routes cover the mechanism; the text says why.
@@ -130,10 +125,7 @@ def _singular(mechanism: Mechanism, until: float) -> str:
 def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> list[float]:
     """Times, s, good to a fraction of the step, at which the loops' rows lose rank and the branch could change.
 
-    Args:
-        mechanism: any without dry friction.
-        until: end of the motion, s.
-        step: of Runge-Kutta 4 with a fixed rank, which passes such poses, s.
+    The motion until then, s, goes in steps of Runge-Kutta 4 with a fixed rank, which pass such poses.
     """
     if not mechanism.loops:
         return []

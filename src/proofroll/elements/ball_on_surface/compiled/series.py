@@ -82,10 +82,7 @@ def still_moving(before: FloatArray, t: float, now: FloatArray) -> None:
     At the other side of rest on a straight path the equations are smooth, so a series may step across. A velocity that
     merely turns does not turn by more than a right angle in a step, for its own turning is what bounds the step.
 
-    Args:
-        before: velocity of the centre where the step began [m/s], shape (k,).
-        t: time [s] in the step.
-        now: velocity then [m/s], shape (k,).
+    Velocities [m/s], shape (k,), are those where the step began and at a time ``t`` [s] in it.
 
     Raises:
         Diverged: it stood still.

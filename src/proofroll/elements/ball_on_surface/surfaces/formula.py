@@ -95,11 +95,7 @@ def _text(x: Any) -> str:
 def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """Value, gradient and upper half of the Hessian of each result, one after the other: of floats, and of arrays.
 
-    Where a formula has no value, there are NaN.
-
-    Args:
-        formula: of ``count`` numbers, giving one or a tuple of them.
-        count: of its variables.
+    The formula is one of ``count`` numbers, giving one or a tuple of them. Where it has no value, there are NaN.
     """
     program: dict[str, str] = {}
     given = [f"x{i}" for i in range(count)]
