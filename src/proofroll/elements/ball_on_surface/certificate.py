@@ -69,20 +69,11 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
             lines.append(Line(quantity, unit, tuple(want.tolist()), (), None, EXACT))
             return
         got = np.atleast_1d(np.asarray(np.nan if found is None else found, float))
-        difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else float("inf")
+        difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else np.inf
+        difference = difference if np.isfinite(difference) else float("inf")
         cap = _LIFTED if quantity in _DYNAMICS and np.any(body.slip0) else CAPS.get(quantity)
-        tolerance, because = _allowed(quantity, built.regularised, cap)
-        lines.append(
-            Line(
-                quantity,
-                unit,
-                tuple(want.tolist()),
-                tuple(got.tolist()),
-                difference if np.isfinite(difference) else float("inf"),
-                tolerance,
-                because,
-            )
-        )
+        shown = tuple(want.tolist()), tuple(got.tolist())
+        lines.append(Line(quantity, unit, *shown, difference, *_allowed(quantity, built.regularised, cap)))
 
     compare("mass", "kg", body.ball.mass, built.mass, body.ball.mass)
     compare("inertia", "kg m^2", np.full(3, body.ball.inertia), built.inertia, body.ball.inertia)
