@@ -26,10 +26,6 @@ class BallMotion:
     force: FloatArray
     route: str
 
-    def at(self, which: slice) -> BallMotion:
-        """The same at some of the times."""
-        return BallMotion(self.p_WB[which], self.v_WB[which], self.w_WB[which], self.force[which], self.route)
-
 
 def world_motion(
     body: RollingBall,
