@@ -14,6 +14,7 @@ from proofroll.cli import options
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
     from proofroll.running.runner import Runner
+    from proofroll.running.worker_pool import Workers
     from proofroll.studies.outcome import Outcome
 
 
@@ -37,16 +38,18 @@ def compare(
     """
     from proofroll.report.comparison_content import outcome_content
     from proofroll.report.terminal import verdict_parts
+    from proofroll.running.worker_pool import Workers
 
-    loaded = asked(comparison, options.assignments(settings))
+    workers = Workers()
+    loaded = asked(comparison, options.assignments(settings), workers)
     tell_left_out([loaded], engine or [])
-    outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler))
+    outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
     content = outcome_content(outcomes[0])
     options.show(content, as_json, lambda: verdict_parts(content))
     raise typer.Exit(exit_code(outcomes))
 
 
-def asked(name: str, parameters: Mapping[str, str]) -> Comparison:
+def asked(name: str, parameters: Mapping[str, str], workers: Workers) -> Comparison:
     """The comparison of this name, or that of a scene about which no file says anything.
 
     Raises:
@@ -61,7 +64,7 @@ def asked(name: str, parameters: Mapping[str, str]) -> Comparison:
     if source_of(name) is not None or (named_file(name) is None and is_scene(name)):
         from proofroll.studies.first_look import compared
 
-        return compared(name, parameters)
+        return compared(name, parameters, workers)
     if parameters:
         raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
     return load_comparison(name)

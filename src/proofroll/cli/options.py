@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from proofroll.running.cluster import Cluster
     from proofroll.running.runner import Runner
+    from proofroll.running.worker_pool import Workers
 
 _SAID_EVERY = 10.0  # seconds between lines of progress where no bar can be shown
 OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130
@@ -38,13 +39,15 @@ SceneName = Annotated[str, typer.Argument(help="A scene: its name, a folder with
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 
 
-def new_runner(out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None) -> Runner:
+def new_runner(
+    out: Path, fresh: bool, jobs: int | None, scheduler: str | None = None, workers: Workers | None = None
+) -> Runner:
     """Runs cases in worker processes, here or on a cluster, and keeps their results under ``out``."""
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
 
     store = Store(out / "cases")  # a folder that cannot be written is told before a cluster is started
-    return Runner(store, jobs=jobs, fresh=fresh, cluster=new_cluster(scheduler))
+    return Runner(store, jobs=jobs, fresh=fresh, cluster=new_cluster(scheduler), workers=workers)
 
 
 def new_cluster(scheduler: str | None) -> Cluster | None:

@@ -44,13 +44,15 @@ def report(
     from proofroll.files.comparison_file import comparison_names
     from proofroll.report.growing_report import begun
     from proofroll.report.study_parts import all_parts, parts_of
+    from proofroll.running.worker_pool import Workers
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
-    loaded = [asked(name, {}) for name in names]
+    workers = Workers()
+    loaded = [asked(name, {}, workers) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
     options.require_pages()
-    runner = options.new_runner(out, fresh, jobs, scheduler)
+    runner = options.new_runner(out, fresh, jobs, scheduler, workers)
     tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))
     total = len(keys) + bool(loaded)

@@ -36,8 +36,8 @@ class Runner:
         store: where results are kept.
         jobs: how many workers run at once.
         fresh: run every case again, once, whatever is stored.
-        memory: how much each worker may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
         cluster: where the cases run; None: here. Engines are asked here, and speeds measured here, all the same.
+        workers: processes that may have loaded an engine already; None: new ones.
     """
 
     def __init__(
@@ -45,12 +45,12 @@ class Runner:
         store: Store,
         jobs: int | None = None,
         fresh: bool = False,
-        memory: float | None = None,
         cluster: Cluster | None = None,
+        workers: Workers | None = None,
     ) -> None:
         self.store = store
         self.cluster = cluster
-        self.workers = Workers(memory)
+        self.workers = workers or Workers()
         """Idle workers, for whoever asks engines something on behalf of the same study."""
         self.jobs = jobs or os.cpu_count() or 1
         self.fresh = fresh

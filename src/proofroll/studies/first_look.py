@@ -14,6 +14,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.asking import described
 from proofroll.running.case import EngineDescription
+from proofroll.running.worker_pool import Workers
 from proofroll.studies.axes import Axis, AxisTerm
 
 _UNTIL, _SAMPLES = 1.0, 50
@@ -24,8 +25,13 @@ _BECAUSE = "nobody has said what to expect of this scene"
 _PARTS = (0.1, 1.0, 10.0)
 
 
-def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
+def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None = None) -> Comparison:
     """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
+
+    Args:
+        name: of the scene.
+        parameters: those that differ from the defaults.
+        workers: processes in which engines are asked, for whoever runs the comparison; None: others.
 
     Raises:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
@@ -33,9 +39,9 @@ def compared(name: str, parameters: Mapping[str, Any]) -> Comparison:
     file, scene = read_scene_file(name), load_scene(name, **parameters)
     duration = file.duration or _UNTIL
     every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
-    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene)]
+    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene, workers)]
     if not rows:
-        raise InputError("scene", name, f"no installed engine has {', '.join(_lacking(scene))}")
+        raise InputError("scene", name, f"no installed engine has {', '.join(_lacking(scene, workers))}")
     return Comparison(
         name=scene.name,
         title=file.title,
@@ -59,25 +65,25 @@ def bounds(scene: Scene) -> dict[str, Tolerance]:
     }
 
 
-def able(scene: Scene, *, first: bool = False) -> list[str]:
+def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
     found = []
-    for engine, provides in _provided():
+    for engine, provides in _provided(workers):
         fitting = [name for name, given in provides.items() if scene.requires <= set(given)]
         found += [f"{engine}[formulation={name}]" for name in fitting[: 1 if first else None]]
     return found
 
 
-def _provided() -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
+def _provided(workers: Workers | None) -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
     """What the formulations of each installed engine provide."""
-    for engine, told in described(engine_names()).items():
+    for engine, told in described(engine_names(), workers).items():
         if isinstance(told, EngineDescription):
             yield engine, told.provides
 
 
-def _lacking(scene: Scene) -> list[str]:
+def _lacking(scene: Scene, workers: Workers | None) -> list[str]:
     """What no formulation provides; all that the scene requires where each is provided by some."""
-    given = {item for _, provides in _provided() for items in provides.values() for item in items}
+    given = {item for _, provides in _provided(workers) for items in provides.values() for item in items}
     return sorted(scene.requires - given) or ["all of", *sorted(scene.requires)]
 
 
