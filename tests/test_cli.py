@@ -374,6 +374,14 @@ def test_onset_where_nobody_was_asked_for(
     assert max(map(len, out.splitlines())) <= 100
 
 
+def test_onset_without_a_ball(proofroll: Proofroll) -> None:
+    """A scene that has no ball on a surface is refused for that, and not for friction that it has not."""
+    code, out, err = proofroll("onset", "pendulum")
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "one ball on one surface" in err
+    assert "mu_static" not in err
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [

@@ -101,6 +101,8 @@ def _named(subject: str) -> list[_Named]:
         return [("scene", subject, "")]
     if subject in engine_names():
         return [("engine", subject, "")]
+    if named_file(subject) is None:
+        raise InputError("subject", subject, "there is no such scene, engine, comparison or file of results")
     comparison = load_comparison(subject)
     engines = (parse_engine(row.engine).name for row in comparison.rows)
     return [("scene", comparison.scene, ""), *(("engine", name, "") for name in engines)]

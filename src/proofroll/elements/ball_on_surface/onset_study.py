@@ -13,6 +13,7 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.events import Event, events_of
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
@@ -118,11 +119,13 @@ def onset_study(
         progress: called with each case that is finished.
 
     Raises:
-        InputError: friction is unbounded, or something that does not exist.
+        InputError: the scene is not one ball, its friction is unbounded, or something that does not exist.
     """
     from proofroll.truth.onset import onset
 
     loaded = load_scene(scene, **parameters)
+    if len(loaded.elements) > 1 or not isinstance(loaded.elements[0], BallOnSurface):
+        raise InputError("scene", scene, "a first slip is that of one ball on one surface; name a scene of such a one")
     if BallCapability.BOUNDED_FRICTION not in loaded.requires:
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
     with ThreadPoolExecutor(1) as pool:  # engines start while the truth is worked out
