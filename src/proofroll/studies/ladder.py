@@ -65,7 +65,7 @@ class Ladder:
         scene: name of the scene.
         parameters: of it.
         runner: where cases are run and kept.
-        quantity: what is asked; the scene's ``z``, else its first coordinate, if None.
+        quantity: what is asked; what decides the scene if None.
         until: last time [s].
         tolerance: error of the quantity that is allowed, in its unit; None: a term counts if it moves the quantity by
             more than the smaller of the errors with and without it.
