@@ -18,6 +18,7 @@ from proofroll.running.simulation import build
 GENERIC, CONTACT = (f"exudyn[formulation={name},dt=1e-3]" for name in ("generic", "contact"))
 CHART, FREE = (f"mujoco[formulation={name},preset=tuned]" for name in ("chart", "free"))
 COMPOSITE, FLYER = (f"pinocchio[formulation={name},preset=tuned]" for name in ("composite", "free_flyer"))
+PGS, ADMM = (f"pinocchio[formulation=contact,solver={name}]" for name in ("pgs", "admm"))
 FRAME = "projection[formulation=rotating_frame]"
 
 
@@ -39,6 +40,8 @@ def need(engine: str) -> None:
         ("paper", "exudyn[formulation=contact,preset=default]", 5e-3, 1.6e-2),
         ("paper", FREE, 2.5e-3, 2e-4),
         ("paper", COMPOSITE, 1e-8, 1e-7),
+        ("paper", PGS, 1e-3, 1e-3),
+        ("paper", ADMM, 1e-3, 1e-3),
         ("paper", FRAME, 6e-9, 6e-8),
         ("kinetic", FREE, 2.5e-3, 1e-2),
         ("kinetic", "mujoco[formulation=free,cone_correction=true,friction_damping=1.9]", 1.05e-2, None),
@@ -84,6 +87,9 @@ def test_events_and_fall(case: str, engine: str, late: float, off: float | None)
         ("paper", FRAME, 1e-2, 1e-12, 1e-12, 1e-13),
         ("kinetic", COMPOSITE, 1e-2, 1e-12, 1e-12, 1e-12),
         ("kinetic", FLYER, 1e-2, 1e-12, 1e-12, 1e-12),
+        ("paper", PGS, 1e-2, 1e-12, 3e-5, 2e-6),
+        ("paper", ADMM, 1e-2, 1e-8, 3e-5, 2e-6),
+        ("kinetic", PGS, 1e-2, 1e-12, 1.4e-4, 2e-6),
         ("kinetic", CHART, 1e-2, 1e-8, 4e-4, 4e-4),
         ("kinetic", FREE, 1e-2, 1e-8, 1.6e-3, 4e-4),
     ],

@@ -175,6 +175,10 @@ def test_default_preset_is_the_engines_default(formulation: str) -> None:
         ({"spectral_radius": 0.9}, "trapezoidal rule has no damping; set integrator=generalized_alpha"),
         ({"formulation": "contact", "spectral_radius": 0.9}, "trapezoidal rule has no damping"),
         ({"formulation": "contact", "stiffness": None}, "formulation=contact needs a number"),
+        ({"formulation": "contact", "stiffness": 0}, "stiffness"),
+        ({"formulation": "contact", "friction_zone": -1}, "friction_zone"),
+        ({"formulation": "contact", "grip": 0}, "grip"),
+        ({"formulation": "contact", "halvings": -1}, "halvings"),
     ],
 )
 def test_wrong_settings_give_one_clear_line(options: dict[str, Any], words: str) -> None:

@@ -9,7 +9,7 @@ from slip_cases import CASES
 
 from proofroll import load_scene
 from proofroll.core.certificate import certify
-from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
@@ -165,10 +165,3 @@ def test_what_cannot_slip_refuses(formulation: str, words: str) -> None:
     """A formulation that does not represent the law of friction says so before anything runs."""
     with pytest.raises(Refused, match=words):
         build(cylinder(rolling_resistance=5e-4, mu_kinetic=0.2), "exudyn", formulation=formulation)
-
-
-@pytest.mark.parametrize("options", [{"stiffness": 0}, {"friction_zone": -1}, {"grip": 0}, {"halvings": -1}])
-def test_wrong_settings_of_the_contact(options: dict[str, Any]) -> None:
-    """A wrong setting names itself."""
-    with pytest.raises(InputError, match=next(iter(options))):
-        build(paper(), "exudyn", formulation="contact", **options)

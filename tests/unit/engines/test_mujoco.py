@@ -143,37 +143,24 @@ def test_facets_are_useless_and_say_so_by_their_numbers() -> None:
     assert error(CYLINDER, "formulation=facets", "energy", until=2.0) > 1.0
 
 
-@pytest.mark.parametrize(("formulation", "preset"), MODELS)
 @pytest.mark.parametrize(
-    "parameters",
+    ("name", "parameters"),
     [
-        {},
-        {"rolling_resistance": 5e-4, "speed": 6.0},
-        {"rolling_resistance": 5e-4, "speed": -2.0, "axial_speed": 0.3, "radial_spin": 5.0},
-        {"radius": 0.05, "mass": 2.0, "gravity": 1.6},
+        (CYLINDER, {}),
+        (CYLINDER, {"rolling_resistance": 5e-4, "speed": 6.0}),
+        (CYLINDER, {"rolling_resistance": 5e-4, "speed": -2.0, "axial_speed": 0.3, "radial_spin": 5.0}),
+        (CYLINDER, {"radius": 0.05, "mass": 2.0, "gravity": 1.6}),
+        (PLANE, {}),
+        (PLANE, {"tilt": 0.0, "rolling_resistance": 5e-4}),
+        (PLANE, {"tilt": -1.2, "speed": 0.0, "cross_speed": 0.0, "normal_spin": 5.0}),
     ],
 )
-def test_certificate_holds_in_the_cylinder(formulation: str, preset: str, parameters: dict[str, float]) -> None:
+def test_certificate_holds(name: str, parameters: dict[str, float]) -> None:
     """What MuJoCo built is what the scene says, within the tolerances that softness explains."""
-    scene = load_scene(CYLINDER, **parameters)
-    engine = build(scene, f"mujoco[formulation={formulation},preset={preset}]")
-    assert first_difference(certify(engine, scene)) is None
-
-
-@pytest.mark.parametrize(("formulation", "preset"), ON_BOTH)
-@pytest.mark.parametrize(
-    "parameters",
-    [
-        {},
-        {"tilt": 0.0, "rolling_resistance": 5e-4},
-        {"tilt": -1.2, "speed": 0.0, "cross_speed": 0.0, "normal_spin": 5.0},
-    ],
-)
-def test_certificate_holds_on_the_plane(formulation: str, preset: str, parameters: dict[str, float]) -> None:
-    """What MuJoCo built is what the scene says, within the tolerances that softness explains."""
-    scene = load_scene(PLANE, **parameters)
-    engine = build(scene, f"mujoco[formulation={formulation},preset={preset}]")
-    assert first_difference(certify(engine, scene)) is None
+    scene = load_scene(name, **parameters)
+    for formulation, preset in MODELS if name == CYLINDER else ON_BOTH:
+        engine = build(scene, f"mujoco[formulation={formulation},preset={preset}]")
+        assert first_difference(certify(engine, scene)) is None
 
 
 ROLLING = {"rolling_resistance": 5e-4}
@@ -367,6 +354,8 @@ def test_callbacks_of_others_are_forgotten_and_ours_do_not_stay(formulation: str
         ("formulation=free,curvature=true,integrator=RK4", "integrator"),
         ("formulation=free,preset=tuned,cone=pyramidal,friction=1", "cone"),
         ("formulation=free,cone=pyramidal", "friction"),
+        ("formulation=facets,cone_correction=true", "cone_correction"),
+        ("formulation=free,cone_correction=true,integrator=RK4", "integrator"),
     ],
 )
 def test_wrong_settings_give_one_clear_line(engine: str, field: str) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from slip_cases import CASES, PAPER, run
 
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed
@@ -139,22 +139,6 @@ def test_what_mujoco_cannot_represent_is_refused(engine: str, parameters: dict[s
     """Coefficients that MuJoCo would change without a word, and a wall without a slip, are refused with the reason."""
     with pytest.raises(Refused, match=reason):
         build(load_scene(CYLINDER, **parameters), f"mujoco[{engine}]")
-
-
-@pytest.mark.parametrize(
-    ("engine", "parameters", "field"),
-    [
-        ("formulation=facets,cone_correction=true", {}, "cone_correction"),
-        ("formulation=free,cone_correction=true,integrator=RK4", {"mu_static": 0.35}, "integrator"),
-        ("formulation=free,preset=tuned,cone=pyramidal", {"mu_static": 0.35}, "cone"),
-    ],
-)
-def test_wrong_settings_give_one_clear_line(engine: str, parameters: dict[str, float], field: str) -> None:
-    """Settings that MuJoCo would ignore or misread are refused by name before anything is built."""
-    with pytest.raises(InputError) as caught:
-        build(load_scene(CYLINDER, **parameters), f"mujoco[{engine}]")
-    assert field in caught.value.field
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("engine", TUNED)

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-import xarray as xr
+from slip_cases import run
 
 from proofroll.core.certificate import certify
 from proofroll.core.errors import Diverged, Refused
@@ -112,53 +112,10 @@ def test_number_for_unbounded_friction() -> None:
         assert built.regularised["1 / static friction"].tolerance == 1 / mu
 
 
-@pytest.fixture(scope="module")
-def paper() -> dict[str, xr.Dataset]:
-    """The paper's ball with bounded friction, by both solvers."""
-    scene = load_scene("sphere_in_cylinder", mu_static=0.35, rolling_resistance=RESISTANCE)
-    return {s: simulate(scene, f"pinocchio[formulation=contact,solver={s}]", until=4, every=0.02) for s in SOLVERS}
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_stick_slip_stick_fall(paper: dict[str, xr.Dataset], solver: str) -> None:
-    """The paper's ball slips, sticks, slips again and falls; times are right to a step, the end to a millimetre."""
-    events = events_of(paper[solver])
-    assert [event.kind for event in events] == ["slip", "stick", "slip"]
-    np.testing.assert_allclose([e.time for e in events], [1.720183, 2.008128, 2.449695], rtol=0, atol=1e-3)
-    assert all(event.time_high - event.time_low == pytest.approx(1e-3) for event in events)
-    assert float(paper[solver].z[-1]) == pytest.approx(-2.2976587, abs=1e-3)
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_law_of_friction(paper: dict[str, xr.Dataset], solver: str) -> None:
-    """Slipping, friction is mu N against the slip velocity; sticking, it is inside the cone, and creep is small."""
-    result = paper[solver]
-    slips = (result.sticking == 0).values
-    slip, friction = (np.stack([result[f"{name}2"], result[f"{name}3"]], axis=-1) for name in ("slip", "F"))
-    size = np.linalg.norm(slip, axis=-1)
-    np.testing.assert_allclose(result.needed_friction[slips], 0.35, rtol=1e-8)
-    fast = slips & (size > 1e-2)
-    cosine = -np.sum(slip * friction, axis=-1)[fast] / size[fast] / np.linalg.norm(friction, axis=-1)[fast]
-    assert fast.sum() > 50
-    assert cosine.min() > 1 - 1e-3  # the force is that of the step's end, where slip turns while it is small
-    assert float(result.needed_friction[~slips].max()) < 0.35
-    assert size[~slips].max() < 1e-5
-
-
-def test_solvers_agree(paper: dict[str, xr.Dataset]) -> None:
+def test_solvers_agree() -> None:
     """PGS and ADMM find the same impulses: their paths differ by what the tolerance leaves."""
-    np.testing.assert_allclose(paper["admm"].p_WB, paper["pgs"].p_WB, rtol=0, atol=1e-6)
-
-
-def test_smaller_kinetic_friction() -> None:
-    """With mu_kinetic below mu_static the ball slips at the one and is held back by the other."""
-    scene = load_scene("sphere_in_cylinder", mu_static=0.15, mu_kinetic=0.1)
-    result = simulate(scene, "pinocchio[formulation=contact]", until=0.4, every=0.01)
-    events = events_of(result)
-    assert [event.kind for event in events] == ["slip"]
-    assert events[0].time == pytest.approx(0.176667992, abs=1.5e-3)
-    slips = (result.sticking == 0).values
-    np.testing.assert_allclose(result.needed_friction[slips], 0.1, rtol=1e-8)
+    pgs, admm = (run("paper", f"pinocchio[formulation=contact,solver={name}]", 4.0, 0.05) for name in SOLVERS)
+    np.testing.assert_allclose(admm.p_WB, pgs.p_WB, rtol=0, atol=1e-6)
 
 
 def test_leaving_the_wall() -> None:
