@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -64,28 +63,25 @@ def versions(
         runner = options.new_runner(out, fresh, jobs, scheduler)
         with options.progress_bar("cases") as advance:
             content = compared(sides, comparisons, runner, rounds, advance)
-    _keep(content, page(content), out)
+    file = _keep(content, page(content), out)
     made = table if robot is None else robot_table
-    where = f"The page is in {_file(content, out)}.html."
+    where = f"The page is in {file}.html."
     options.show(content, as_json, lambda: [heading(content), made(content), *lines(content), where], widest=80)
     if content.lost:
         raise typer.Exit(options.ENGINE)
     raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)
 
 
-def _file(content: VersionsStudy, out: Path) -> Path:
-    """Where page and document are kept, without an ending."""
-    words = ["versions", content.engine, content.old.version, content.new.version]
-    return out / re.sub(r"[^\w.+-]", "_", "-".join(map(str, words)))
-
-
-def _keep(content: VersionsStudy, page: str, out: Path) -> None:
+def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
+    """Writes page and document; their file, without an ending."""
     from proofroll.running.store import write_text
 
     out.mkdir(parents=True, exist_ok=True)
-    file = _file(content, out)
+    words = ["versions", content.engine, content.old.version, content.new.version]
+    file = out / re.sub(r"[^\w.+-]", "_", "-".join(map(str, words)))
     write_text(file.with_name(f"{file.name}.html"), page)
     write_text(file.with_name(f"{file.name}.json"), options.json_text(content))
+    return file
 
 
 def _place(engine: str, text: str) -> str:
@@ -118,13 +114,9 @@ def _made(engine: str, version: str) -> str:
     if not package:
         raise InputError("engine", engine, f"no environment of {version} is remembered; {by_hand}")
     options.complain(f"no environment of {engine} {version} is remembered: making one, as {by_hand} does")
-
-    def tell(say: Callable[[str], None]) -> None:
-        add(engine, [f"{package}=={version}"], tell=lambda text: say(f"{engine} {version}: {text}"))
-
     try:
         with options.spinner(f"{engine} {version}") as say:
-            tell(say)
+            add(engine, [f"{package}=={version}"], tell=lambda text: say(f"{engine} {version}: {text}"))
     except InputError:  # what was asked for is wrong, by hand too
         raise
     except ProofrollError as error:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         ReportedComparison,
         ReportedRow,
         ReportedRun,
-        ShownBand,
     )
 
 
@@ -100,11 +99,6 @@ def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
         if line["because"]:
             found.setdefault(line["because"], []).append(line["quantity"])
     return found
-
-
-def bounds(band: ShownBand) -> list[str]:
-    """The tolerances of a band, with symbols."""
-    return [f"{symbol(name)} {bound}" for name, bound in band.bounds.items()]
 
 
 @dataclass(frozen=True)
