@@ -11,8 +11,6 @@ from proofroll.elements.ball_on_surface.report import onset_tables, onsets
 from proofroll.report.kinds import ReportKind
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from proofroll.report.pen import Picture
     from proofroll.report.replay_records import ReplayKind
 
@@ -43,11 +41,7 @@ class BallReport(ReportKind):
         found = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
         return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
 
-    @staticmethod
-    def truth_facts(scene: Scene, dataset: xr.Dataset) -> onsets.TrueSlips | None:
-        """Its slips."""
-        return onsets.truth_facts(dataset, scene)
-
+    truth_facts = staticmethod(onsets.truth_facts)
     run_facts = staticmethod(onsets.run_facts)
     sentences = staticmethod(onsets.ill_posed)
     mark = staticmethod(onsets.mark)

@@ -50,7 +50,7 @@ class RunSlips:
     onset_verdict: str | None = field(default=None, metadata=OPTIONAL)
 
 
-def truth_facts(dataset: xr.Dataset, scene: Scene) -> TrueSlips | None:
+def truth_facts(scene: Scene, dataset: xr.Dataset) -> TrueSlips | None:
     """The truth's slips; None where friction has no bound."""
     if "onset" not in dataset.attrs:
         return None

@@ -44,16 +44,12 @@ class MechanismReport(ReportKind):
         """The first case at its start."""
         from proofroll.elements.mechanism.report.drawing import drawn
 
-        element = scenes[0].elements[0]
-        assert isinstance(element, MechanismElement)  # it covers no other
-        return [drawn(element).picture("at the start")], ""
+        return [drawn(covered(scenes[0])).picture("at the start")], ""
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
         """Forces and torques of joints and loops; their arrays are judged as a whole."""
-        element = scene.elements[0]
-        assert isinstance(element, MechanismElement)  # it covers no other
-        return _reactions(element, truth)
+        return _reactions(covered(scene), truth)
 
     @staticmethod
     def replay() -> ReplayKind:
@@ -62,6 +58,13 @@ class MechanismReport(ReportKind):
         from proofroll.report.replay_records import ReplayKind
 
         return ReplayKind("mechanism", seen, drawn)
+
+
+def covered(scene: Scene) -> MechanismElement:
+    """The mechanism of a scene that :class:`MechanismReport` covers."""
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)
+    return element
 
 
 def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:

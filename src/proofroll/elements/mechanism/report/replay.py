@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
+from proofroll.elements.mechanism.report.kind import covered
 from proofroll.files.json_data import plain
 from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
@@ -39,12 +40,12 @@ _MOTION = ("time", "p_WB", "v_WB", "w_WB", "q_WB")
 
 def seen(scene: Scene) -> float:
     """How far a body can be off and look right [m]."""
-    return _SEEN * _element(scene).length
+    return _SEEN * covered(scene).length
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """What the replay draws of a mechanism: see :data:`proofroll.report.replay.Drawer`."""
-    element = _element(replayed.scene)
+    element = covered(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
@@ -97,12 +98,6 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
         "falls": any(joint.kind == "free" for joint in mechanism.joints),
     }  # fmt: skip
     return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
-
-
-def _element(scene: Scene) -> MechanismElement:
-    element = scene.elements[0]
-    assert isinstance(element, MechanismElement)  # its kind of report covers no other
-    return element
 
 
 def _readings(element: MechanismElement) -> list[tuple[str, str]]:
