@@ -31,15 +31,10 @@ class TaylorSeries(Series):
         check: Callable[..., None],
         accepted: Renewed,
     ) -> None:
-        """Starts at time 0.
+        """Starts at time 0 in the state x, with the relative tolerance ``rtol`` of a step [-].
 
-        Args:
-            body: the scene's ball.
-            formulation: of the engine.
-            x: initial state.
-            rtol: relative tolerance of a step [-].
-            check: called with the time [s] and state after each step; raises Diverged if it is not to be trusted.
-            accepted: the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
+        After each step ``check`` is called with the time [s] and state, and raises Diverged if it is not to be trusted;
+        ``accepted`` is the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
 
         Raises:
             Refused: heyoka is missing, or the scene is not one of its equations.

@@ -122,13 +122,7 @@ class Euler(Closed):
     ) -> tuple[float, float, float, float, float]:
         """λ of (C M̄⁻¹ Cᵀ) λ = ``free``, and what it takes from the rates of φ, θ, ψ.
 
-        Args:
-            along2: components of the axes of φ, θ, ψ along e2.
-            along3: the same along e3.
-            cos: cos θ.
-            scale: 1 / sin²θ.
-            free2: right side along e2.
-            free3: right side along e3.
+        ``along2`` and ``along3`` are the axes of φ, θ, ψ along e2 and e3, ``cos`` and ``scale`` cos θ and 1 / sin²θ.
         """
         a, J, per_mass = self.a, self.J, 1.0 / self.m
         (phi2, theta2, z2), (phi3, theta3, z3) = along2, along3
