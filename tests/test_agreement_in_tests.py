@@ -136,7 +136,7 @@ def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
         ({"time": [0.0, 0.1], "q.pivot": [0.0]}, "one row for each of the 2 times"),
         ({"time": [0.1, 0.0], "q.pivot": [0.0, 0.0]}, "rise from 0"),
         ({"time": [0.0, 0.1], "angle": [0.0, 0.0]}, "the truth has none of these; it has .*q.pivot"),
-        ("nowhere.nc", "cannot be read"),
+        ("nowhere.nc", "there is no such file"),
         (STILL | {"p_WB": np.zeros((2, 2))}, "p_WB .*: these are no states of pendulum"),
         (STILL | {"joint_force": np.zeros((2, 3, 2))}, r"no states of pendulum \(.*joint_force with shape \(3, 2\)"),
     ],
