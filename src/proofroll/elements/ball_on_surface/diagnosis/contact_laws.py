@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, FunctionHypothesis, apart, hypothesis
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import (
     COVERED,
@@ -30,34 +29,19 @@ _PYRAMID = 1 / 100
 _TURNS = 0.4
 
 
-@dataclass(frozen=True)
-class OtherLaw:
-    """A law of the contact that is another than the scene's, without a number to fit.
+def other_law(
+    name: str, says: str, law: Callable[[RollingBall], Law], remedy: str, applies: Callable[[RollingBall], bool]
+) -> FunctionHypothesis:
+    """That the contact has another law than the scene's, without a number to fit, if the scene has what it is about."""
 
-    Attributes:
-        id: of the hypothesis.
-        says: what the engine does.
-        laws: possible ones for a ball, with how many numbers were chosen for each.
-        remedy: what to look at.
-        applies: whether the scene has what the law is about.
-    """
-
-    id: str
-    says: str
-    laws: Callable[[RollingBall], Iterator[Law]]
-    remedy: str
-    applies: Callable[[RollingBall], bool]
-    fitted: int = 0
-    grounds: str = "the other law gives the accelerations and forces at every sample, with no number or one angle"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis(name, "the other law gives the accelerations and forces at every sample, with no number fitted")
+    def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
-        if not self.applies(body):
-            return
-        for held in held_against(evidence):
-            best = min(self.laws(body), key=held.largest)
-            yield held.cause(self.id, self.says, best, self.remedy, self.fitted)
+        if applies(body):
+            for held in held_against(evidence):
+                yield held.cause(name, says, law(body), remedy, 0)
+
+    return test
 
 
 @hypothesis(
@@ -125,45 +109,45 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
     )
 
 
-def _along_spin(body: RollingBall) -> Iterator[Law]:
+def _along_spin(body: RollingBall) -> Law:
     def moment(ball: RollingBall, N: float, w: FloatArray) -> FloatArray:
         return -ball.contact.rolling_resistance * N * w / (float(np.linalg.norm(w)) or 1.0)
 
-    yield Law(body, resisting=moment)
+    return Law(body, resisting=moment)
 
 
-def _by_weight(body: RollingBall) -> Iterator[Law]:
+def _by_weight(body: RollingBall) -> Law:
     weight = body.ball.mass * float(np.linalg.norm(body.gravity))
 
     def moment(e1: FloatArray, v: FloatArray, _: FloatArray) -> FloatArray:
         return resistance_moment(body.contact.rolling_resistance, weight, e1, v)
 
-    yield Law(body, moment=moment, resisting=lambda *_: np.zeros(3))
+    return Law(body, moment=moment, resisting=lambda *_: np.zeros(3))
 
 
-def _as_velocity(body: RollingBall) -> Iterator[Law]:
+def _as_velocity(body: RollingBall) -> Law:
     def friction(ball: RollingBall, N: float, v: FloatArray) -> FloatArray:
         return -ball.contact.mu_kinetic * N * v / (float(np.linalg.norm(v)) or 1.0)
 
-    yield Law(body, slipping=friction)
+    return Law(body, slipping=friction)
 
 
 CONTACT_LAWS: tuple[Any, ...] = (
-    OtherLaw(
+    other_law(
         "resistance along spin",
         "the rolling resistance acts against the whole angular velocity, spin about the normal included",
         _along_spin,
         "the moment of the rolling resistance is f (v/V) x (-N e1): it is against the rolling alone",
         has_resistance,
     ),
-    OtherLaw(
+    other_law(
         "resistance by weight",
         "the rolling resistance is f times the ball's weight, not f times the force of the wall",
         _by_weight,
         "the moment of the rolling resistance is f N, with the N of that moment",
         has_resistance,
     ),
-    OtherLaw(
+    other_law(
         "friction against velocity",
         "the friction acts against the velocity of the centre, not against the slip of the contact point",
         _as_velocity,

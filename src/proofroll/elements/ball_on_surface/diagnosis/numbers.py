@@ -5,12 +5,11 @@ from __future__ import annotations
 import copy
 import dataclasses
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from proofroll.core.diagnosis import Cause, Evidence
+from proofroll.core.diagnosis import Cause, Evidence, FunctionHypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import known_factor, said_factor, telling
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, held_against, is_bounded
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -35,12 +34,19 @@ def _friction(body: RollingBall, mu: float) -> RollingBall:
     return _contact(body, mu_kinetic=mu, mu_static=max(mu, body.contact.mu_static))
 
 
-@dataclass(frozen=True)
-class Number:
-    """A number of the scene is another one in the engine.
+def number(
+    name: str,
+    what: str,
+    value: Callable[[RollingBall], float],
+    change: Callable[[RollingBall, float], RollingBall],
+    remedy: str,
+    possible: Callable[[float], bool] = lambda _: True,
+    only: Callable[[RollingBall], bool] = lambda _: True,
+) -> FunctionHypothesis:
+    """That a number of the scene is another one in the engine.
 
-    Attributes:
-        id: of the hypothesis.
+    Args:
+        name: of the hypothesis.
         what: the number, in words.
         value: of the scene; None or 0: the scene has none of it.
         change: the ball with another value.
@@ -49,34 +55,24 @@ class Number:
         only: whether the scene has it.
     """
 
-    id: str
-    what: str
-    value: Callable[[RollingBall], float]
-    change: Callable[[RollingBall, float], RollingBall]
-    remedy: str
-    possible: Callable[[float], bool] = lambda _: True
-    only: Callable[[RollingBall], bool] = lambda _: True
-    grounds: str = "one factor on this number of the scene closes accelerations and forces at every sample"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis(name, "one factor on this number of the scene closes accelerations and forces at every sample")
+    def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
-        scene = self.value(body)
-        if not scene or not np.isfinite(scene) or not self.only(body):
+        scene = value(body)
+        if not scene or not np.isfinite(scene) or not only(body):
             return
+
+        def law(factor: float) -> Law | None:
+            return Law(change(body, factor * scene)) if possible(factor * scene) else None
+
         for held in held_against(evidence):
-            factor = _snapped(held.fit(lambda x: self._law(body, x * scene), 1.0))
-            if not telling(factor):
-                continue
-            says = f"the engine moves a ball with {self.what} {self._said(factor, scene)}"
-            yield held.cause(self.id, says, self._law(body, factor * scene), self.remedy, 1)
+            factor = _snapped(held.fit(law, 1.0))
+            if telling(factor):
+                said = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
+                says = f"the engine moves a ball with {what} {said}"
+                yield held.cause(name, says, law(factor), remedy, 1)
 
-    def _law(self, body: RollingBall, value: float) -> Law | None:
-        return Law(self.change(body, value)) if self.possible(value) else None
-
-    @staticmethod
-    def _said(factor: float, scene: float) -> str:
-        return f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
+    return test
 
 
 def _snapped(factor: float) -> float:
@@ -84,30 +80,18 @@ def _snapped(factor: float) -> float:
     return known[0] if known else factor
 
 
-@dataclass(frozen=True)
-class Load:
-    """A force or a moment that the scene does not have, with one coefficient.
+def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy: str) -> FunctionHypothesis:
+    """That a force or moment acts which the scene does not have, with one coefficient, in ``says`` as ``{value}``."""
 
-    Attributes:
-        id: of the hypothesis.
-        says: with the coefficient as ``{value}``.
-        law: of the ball and the coefficient.
-        remedy: what to look at.
-    """
-
-    id: str
-    says: str
-    law: Callable[[RollingBall, float], Law]
-    remedy: str
-    grounds: str = "the load with one coefficient closes accelerations and forces at every sample"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis(name, "the load with one coefficient closes accelerations and forces at every sample")
+    def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
         for held in held_against(evidence):
-            value = held.fit(lambda x: self.law(body, x), 0.0)
+            value = held.fit(lambda x: law(body, x), 0.0)
             if value > 0:
-                yield held.cause(self.id, self.says.format(value=value), self.law(body, value), self.remedy, 1)
+                yield held.cause(name, says.format(value=value), law(body, value), remedy, 1)
+
+    return test
 
 
 def _damps_velocity(body: RollingBall, c: float) -> Law:
@@ -124,7 +108,7 @@ def _damps_both(body: RollingBall, c: float) -> Law:
 
 _DAMPING = "find the engine's own damping, drag or sleeping, and switch it off"
 NUMBERS: tuple[Any, ...] = (
-    Number(
+    number(
         "inertia",
         "a moment of inertia (J over m a^2)",
         lambda body: body.ball.inertia_ratio,
@@ -132,7 +116,7 @@ NUMBERS: tuple[Any, ...] = (
         "give the engine the scene's inertia, about the centre, once",
         lambda x: x > 0,
     ),
-    Number(
+    number(
         "mass",
         "a mass",
         lambda body: body.ball.mass,
@@ -140,14 +124,14 @@ NUMBERS: tuple[Any, ...] = (
         "give the engine the scene's mass, once",
         lambda x: x > 0,
     ),
-    Number(
+    number(
         "gravity",
         "gravity",
         lambda body: float(np.linalg.norm(body.gravity)),
         lambda body, x: dataclasses.replace(body, gravity=body.gravity * (x / float(np.linalg.norm(body.gravity)))),
         "give the engine the scene's gravity: an acceleration in the world, its sign and its unit",
     ),
-    Number(
+    number(
         "rolling resistance",
         "a rolling resistance f",
         lambda body: body.contact.rolling_resistance,
@@ -155,7 +139,7 @@ NUMBERS: tuple[Any, ...] = (
         "the moment is f N against the rolling, f a length in metres",
         only=has_resistance,
     ),
-    Number(
+    number(
         "kinetic friction",
         "a kinetic friction",
         lambda body: body.contact.mu_kinetic,
@@ -164,7 +148,7 @@ NUMBERS: tuple[Any, ...] = (
         lambda x: x >= 0,
         only=is_bounded,
     ),
-    Load("damping", "the velocity is damped at a rate of {value:.4g} per second", _damps_velocity, _DAMPING),
-    Load("damping", "the spin is damped at a rate of {value:.4g} per second", _damps_spin, _DAMPING),
-    Load("damping", "velocity and spin are damped at a rate of {value:.4g} per second", _damps_both, _DAMPING),
+    load("damping", "the velocity is damped at a rate of {value:.4g} per second", _damps_velocity, _DAMPING),
+    load("damping", "the spin is damped at a rate of {value:.4g} per second", _damps_spin, _DAMPING),
+    load("damping", "velocity and spin are damped at a rate of {value:.4g} per second", _damps_both, _DAMPING),
 )

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, FunctionHypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import said_factor, telling
 from proofroll.core.diagnosis.held import Held
 from proofroll.elements.mechanism.diagnosis.equations import Change
@@ -18,36 +17,25 @@ from proofroll.elements.mechanism.diagnosis.held import best, held_against
 from proofroll.elements.mechanism.model import Mechanism
 
 
-@dataclass(frozen=True)
-class Factor:
-    """A number of all bodies or joints times a factor.
+def factor_of_all(
+    name: str,
+    what: str,
+    change: Callable[[Mechanism, float], Change],
+    has: Callable[[Mechanism], bool],
+    remedy: str,
+) -> FunctionHypothesis:
+    """That a number of all bodies or joints, of a mechanism that has such, has a factor on it in the engine."""
 
-    Attributes:
-        id: of the hypothesis.
-        what: the number, in words.
-        change: the mechanism with a factor on it.
-        has: whether the mechanism has such numbers.
-        remedy: what to look at.
-    """
-
-    id: str
-    what: str
-    change: Callable[[Mechanism, float], Change]
-    has: Callable[[Mechanism], bool]
-    remedy: str
-    grounds: str = "the equations of motion are linear in it: one factor balances them at every state of the run"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
+    def test(evidence: Evidence) -> Iterator[Cause]:
         mechanism = evidence.element.mechanism
-        if not self.has(mechanism):
-            return
-        for held in held_against(evidence):
-            factor, number = best(held, lambda x: self.change(mechanism, x))
-            if not telling(factor):
-                continue
-            says = f"the engine moves it with {self.what} {said_factor(factor)}"
-            yield held.cause(self.id, says, self.change(mechanism, factor), self.remedy, number)
+        for held in held_against(evidence) if has(mechanism) else ():
+            factor, fitted = best(held, lambda x: change(mechanism, x))
+            if telling(factor):
+                says = f"the engine moves it with {what} {said_factor(factor)}"
+                yield held.cause(name, says, change(mechanism, factor), remedy, fitted)
+
+    return test
 
 
 def _inertias(mechanism: Mechanism, x: float) -> Change:
@@ -59,65 +47,65 @@ def _masses(mechanism: Mechanism, x: float) -> Change:
 
 
 FACTORS_OF_ALL: tuple[Any, ...] = (
-    Factor(
+    factor_of_all(
         "gravity",
         "gravity",
         lambda m, x: Change(m, gravity=x * np.array(m.gravity)),
         lambda m: any(m.gravity),
         "give the engine the scene's gravity: an acceleration in the world, its sign and its unit",
     ),
-    Factor("mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once"),
-    Factor("inertia", "all inertias", _inertias, lambda m: bool(m.bodies), "give each body its inertia once"),
-    Factor(
+    factor_of_all("mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once"),
+    factor_of_all("inertia", "all inertias", _inertias, lambda m: bool(m.bodies), "give each body its inertia once"),
+    factor_of_all(
         "joint damping",
         "the damping of the joints",
         lambda m, x: Change(m, damping=x),
         lambda m: any(joint.damping for joint in m.joints),
         "give the joints their damping, as a moment per rad/s or a force per m/s against the motion",
     ),
-    Factor(
+    factor_of_all(
         "joint stiffness",
         "the stiffness of the joints",
         lambda m, x: Change(m, stiffness=x),
         lambda m: any(joint.stiffness for joint in m.joints),
         "give the joints their stiffness, per rad or per m",
     ),
-    Factor(
+    factor_of_all(
         "joint torque",
         "the drives of the joints",
         lambda m, x: Change(m, torque=x),
         lambda m: any(joint.torque for joint in m.joints),
         "give the joints their drive, on the child against the parent",
     ),
-    Factor(
+    factor_of_all(
         "armature",
         "the armature of the joints",
         lambda m, x: Change(m, armature=x),
         lambda m: any(joint.armature for joint in m.joints),
         "give the joints their armature",
     ),
-    Factor(
+    factor_of_all(
         "springs",
         "the stiffness of the springs",
         lambda m, x: Change(m, springs=x),
         lambda m: bool(m.springs),
         "give the springs their stiffness and free length",
     ),
-    Factor(
+    factor_of_all(
         "damping of springs",
         "the damping of the springs",
         lambda m, x: Change(m, spring_damping=x),
         lambda m: any(spring.damping for spring in m.springs),
         "give the springs their damping, along the line between their ends",
     ),
-    Factor(
+    factor_of_all(
         "springs with damping",
         "the springs",
         lambda m, x: Change(m, springs=x, spring_damping=x),
         lambda m: any(spring.damping for spring in m.springs),
         "give the springs their stiffness, damping and free length",
     ),
-    Factor(
+    factor_of_all(
         "gyroscopic terms",
         "the gyroscopic moments w x I w",
         lambda m, x: Change(m, gyroscopic=x),
