@@ -146,7 +146,7 @@ class Comparison:
     every: float
     vary: dict[str, list[float]] = field(default_factory=dict)
     points: list[dict[str, float | Edge]] = field(default_factory=list)
-    bands: dict[str, Band] = field(default_factory=dict)
+    bands: dict[str, Band] = field(default_factory=dict, metadata={"key": "tolerances"})
     rows: list[Row] = field(default_factory=list)
     time_limit: float = 120.0
     timed: bool = True

@@ -45,6 +45,11 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
 
 
+def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
+    """The error for a key of a file that nothing reads, with the keys that there are."""
+    return InputError(field, value, f"there is no such key here; the keys are {choices(known)}")
+
+
 def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
     """Refuses settings for the first rule that they break.
 

@@ -64,13 +64,11 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     where = path.name
     tolerances = _table(f"{where}: tolerances", content.pop("tolerances", {}))
     bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in tolerances.items()}
-    given = content.pop("rows", None)
+    given = content.get("rows")
     if not isinstance(given, list) or not given:
         raise InputError(f"{where}: rows", given, "give at least one engine; write [[rows]] before each")
-    rows = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
-    comparison = validated(
-        Comparison, {**content, "name": path.stem, "bands": bands, "rows": rows, "left_out": 0}, where
-    )
+    content["rows"] = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
+    comparison = validated(Comparison, content, where, name=path.stem, bands=bands, left_out=0)
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
         raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
     known = load_scene(comparison.scene).observables

@@ -180,6 +180,6 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     """The content of a file with all that can be said without the values of parameters."""
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
-    file = validated(SceneFile, own | {"tables": tables}, str(path))
+    file = validated(SceneFile, own, str(path), tables=tables)
     check_parameters(file.parameters, _units(), path)
     return file

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.bounds import OutOfBounds
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, no_such_key
 
 _T = TypeVar("_T")
 
@@ -20,17 +21,25 @@ def strict(*types: type) -> None:
         setattr(kind, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's
 
 
-def validated(kind: type[_T], content: object, where: str) -> _T:
+def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: object) -> _T:
     """The content as this type.
+
+    Args:
+        kind: a dataclass.
+        content: of a file, or of a table in it.
+        where: what the file is called in messages.
+        **own: fields that no file has, for they are known otherwise.
 
     Raises:
         InputError: the first problem, with its place in ``where``.
     """
+    for name in own.keys() & content.keys():
+        raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
     try:
-        found: _T = _adapter(kind).validate_python(content)  # type: ignore[arg-type]  # any class can be hashed
+        found: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
         return found
     except ValidationError as error:
-        raise _first_problem(error, where) from None
+        raise _first_problem(error, where, kind, own) from None
 
 
 @cache
@@ -39,12 +48,28 @@ def _adapter(kind: type) -> TypeAdapter[Any]:
     return TypeAdapter(kind)
 
 
-def _first_problem(error: ValidationError, where: str) -> InputError:
+def _tables(kind: Any) -> list[Any]:
+    """Dataclasses that a type is, or is a list or a choice of."""
+    return [kind] if is_dataclass(kind) else [table for part in get_args(kind) for table in _tables(part)]
+
+
+def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str]:
+    """The keys of the tables at a place of a type, as files write them."""
+    tables = _tables(kind)
+    for part in place:
+        hints = [get_type_hints(table, include_extras=True) for table in tables]
+        inside = [table for hint in hints if part in hint for table in _tables(hint[part])]
+        tables = inside or [table for table in tables if getattr(table, "kind", None) == part] or tables
+    found = [item.metadata.get("key", item.name) for table in tables for item in fields(table) if item.init]
+    return [key for key in dict.fromkeys(found) if place or key not in own]
+
+
+def _first_problem(error: ValidationError, where: str, kind: type, own: Iterable[str]) -> InputError:
     """One line about the first thing that pydantic found wrong in ``where``."""
     problem = error.errors()[0]
     location = ".".join(str(part) for part in problem["loc"])
     if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
-        return InputError(f"{where}: {location}", problem["input"], "there is no such key here; remove it")
+        return no_such_key(f"{where}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], own))
     if problem["type"] in {"missing", "missing_argument"}:
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
     error_found = problem.get("ctx", {}).get("error")

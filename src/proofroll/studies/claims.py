@@ -96,7 +96,7 @@ def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
                 claim["tolerance"] = Tolerance.parse(f"{where}: {kind}.{index}.tolerance", claim.get("tolerance"))
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
-    found = validated(TradeoffClaims, {**given, "name": path.stem}, where)
+    found = validated(TradeoffClaims, given, where, name=path.stem)
     _check(where, found)
     return found
 

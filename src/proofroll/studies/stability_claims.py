@@ -168,7 +168,7 @@ def _load(path: Path) -> StabilityFile:
     content = read_toml(path)
     if content.pop("study", None) != STUDY:
         raise InputError(str(path), "study", f'only a file with study = "{STUDY}" asks for a stability map')
-    found = validated(StabilityFile, {**content, "name": path.stem}, where)
+    found = validated(StabilityFile, content, where, name=path.stem)
     _check(where, found)
     return found
 

@@ -266,3 +266,21 @@ def test_a_scene_file_that_asks(edited: Callable[[str, str], str]) -> None:
     folder = edited('title = "', 'asks = ["orientation"]\ntitle = "')
     for asks in ((), ("orientation",)):
         assert load_scene(folder, asks=asks).asks == ("orientation",)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "keys"),
+    [
+        ("mass = ", "weight = 1\nmass = ", "name, radius, mass"),
+        ('kind = "plane"', 'kind = "plane"\nangle = 0.3', "name, tilt"),
+        ("magnitude = ", "size = 1\nmagnitude = ", "magnitude, direction"),
+    ],
+)
+def test_an_unknown_key_is_told_the_known_ones(tmp_path: Path, old: str, new: str, keys: str) -> None:
+    """Whoever misspells a key reads which there are, of that table and that kind of wall."""
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    text = (data_folder("models") / "inclined_plane" / "scene.toml").read_text(encoding="utf-8")
+    (folder / "scene.toml").write_text(text.replace(f"\n{old}", f"\n{new}", 1), encoding="utf-8")
+    with pytest.raises(InputError, match=f"there is no such key here; the keys are {keys}"):
+        load_scene(str(folder))

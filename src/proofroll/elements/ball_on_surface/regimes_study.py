@@ -94,7 +94,7 @@ def load_regimes(name: str) -> RegimesStudy:
         InputError: there is none, it is broken, or its numbers make no sense.
     """
     path, content = study_file(name, STUDY)
-    found = validated(RegimesStudy, {**content, "name": path.stem}, path.name)
+    found = validated(RegimesStudy, content, path.name, name=path.stem)
     if not (math.isfinite(found.until) and found.until > 0):
         raise InputError(f"{path.name}: until", found.until, "give a positive, finite time in s")
     if not found.rolling_resistance:

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, no_such_key
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.expressions import substituted
@@ -57,10 +57,10 @@ def _repeated(field: str, repeat: Any, values: Mapping[str, float]) -> list[tupl
     """Kind, place and content of every table that a [[repeat]] stands for."""
     if not isinstance(repeat, Mapping):
         raise InputError(field, repeat, "give a table with count and what repeats")
-    index, known = repeat.get("index", "i"), {"index", "from", "count", *KINDS}
+    index, known = repeat.get("index", "i"), ("index", "from", "count", *KINDS)
     for key in repeat:
         if key not in known:
-            raise InputError(f"{field}.{key}", repeat[key], "there is no such key here; remove it")
+            raise no_such_key(f"{field}.{key}", repeat[key], known)
     if not isinstance(index, str) or not index.isidentifier() or index in values:
         raise InputError(f"{field}.index", index, "give a name that no parameter has")
     bounds = {}
@@ -84,7 +84,7 @@ def _made(kind: type[Any], field: str, table: Any) -> Any:
     known = {item.name: item.default for item in fields(kind)}
     for key in table:
         if key not in known:
-            raise InputError(f"{field}.{key}", table[key], "there is no such key here; remove it")
+            raise no_such_key(f"{field}.{key}", table[key], [*known, *["dependent"] * (kind is KINDS["joints"])])
     for key, default in known.items():
         if default is MISSING and key not in table:
             raise InputError(f"{field}.{key}", "nothing", "this key is required; add it")

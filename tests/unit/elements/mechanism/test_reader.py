@@ -217,7 +217,14 @@ BAD = {
     "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.slider.inertia.*finite"),
     "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),
     "bool": (SLIDER_CRANK.replace("mass = 0.6", "mass = true"), "bodies.slider.mass.*give one number"),
-    "unknown key": (SLIDER_CRANK.replace("mass = 0.6", "mass = 0.6\ncolour = 3"), "bodies.2.colour.*no such key"),
+    "unknown key": (
+        SLIDER_CRANK.replace("mass = 0.6", "mass = 0.6\ncolour = 3"),
+        "bodies.2.colour.*no such key here; the keys are name, mass",
+    ),
+    "unknown key of a joint": (
+        SLIDER_CRANK.replace("q0 = 0.5", "q1 = 0.5"),
+        "the keys are name, .*, q0, v0.*dependent",
+    ),
     "missing key": (SLIDER_CRANK.replace("mass = 0.6\n", ""), "bodies.2.mass.*required"),
     "unknown parameter": (SLIDER_CRANK.replace("$crank", "$lenght"), "no such parameter; choose from crank, rod"),
     "unknown kind": (SLIDER_CRANK.replace('"prismatic"', '"slider"'), "joints.guide.kind.*choose one of fixed"),
