@@ -7,7 +7,7 @@ from typing import Literal
 
 from blajer_2006.measures import Measure
 from blajer_2006.quantities import ANGLES, TIME
-from proofroll.files.validation import strict
+from proofroll.core.validation import strict
 
 CRITERIA = ("stated", "at_most", "below", "above", "order", "events")
 

@@ -9,11 +9,11 @@ from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
 from blajer_2006.quantities import known
 from proofroll.core.errors import InputError
 from proofroll.core.time_grid import time_grid
+from proofroll.core.validation import validated
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.regimes_study import load_regimes
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
-from proofroll.files.validation import validated
 
 STUDY = "figures"
 

@@ -173,7 +173,7 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     Raises:
         InputError: unknown or ill-typed option.
     """
-    from pydantic import ValidationError
+    from proofroll.core.validation import strict, validated  # pydantic takes a while to import
 
     fields = [field.name for field in dataclasses.fields(engine.settings)]
     for key, value in options.items():
@@ -190,19 +190,5 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     if preset not in presets:
         raise InputError(f"{engine.name}: preset", preset, f"{formulation} has {', '.join(presets)}")
     values = {**dataclasses.asdict(presets[preset]), **options}
-    try:
-        return _adapter(engine.settings).validate_python(values)
-    except ValidationError as error:
-        problem = error.errors()[0]
-        key = ".".join(str(part) for part in problem["loc"])
-        message = problem["msg"][0].lower() + problem["msg"][1:]
-        raise InputError(f"{engine.name}: {key}", problem["input"], message) from None
-
-
-@cache
-def _adapter(settings: Any) -> Any:
-    """What checks settings of this class."""
-    from pydantic import ConfigDict, TypeAdapter
-
-    settings.__pydantic_config__ = ConfigDict(extra="forbid", allow_inf_nan=False)
-    return TypeAdapter(settings)
+    strict(engine.settings, finite=True)
+    return validated(engine.settings, values, engine.name)

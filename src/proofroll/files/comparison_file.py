@@ -13,11 +13,11 @@ from proofroll.core.errors import InputError
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
+from proofroll.core.validation import strict, validated
 from proofroll.core.verdict import Verdict
 from proofroll.files.data_folders import study_folders
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import named_file, read_toml, study_of
-from proofroll.files.validation import strict, validated
 
 _LADDER_RUNGS = 3
 # A run for each combination of parameters takes a second: more than these are a mistake.

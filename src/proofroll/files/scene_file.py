@@ -19,11 +19,11 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
+from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_parameters import Parameter, check_parameters, values_of
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import read_toml
-from proofroll.files.validation import strict, units_of, validated
 
 
 @dataclass(frozen=True)

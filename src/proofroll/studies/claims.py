@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
+from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import read_toml, study_files
-from proofroll.files.validation import strict, validated
 from proofroll.studies.claimed import Cheapest, ClaimJudgement, Converges, Holds
 from proofroll.studies.curve import Question
 

@@ -9,9 +9,9 @@ from typing import Literal
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
+from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.toml import read_toml, study_files
-from proofroll.files.validation import strict, validated
 from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
 from proofroll.studies.first_look import axes_of

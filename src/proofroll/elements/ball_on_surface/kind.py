@@ -13,10 +13,10 @@ from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
+from proofroll.core.validation import strict, units_of, validated
 from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
 from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Declared, Surface, surface_kinds
-from proofroll.files.validation import strict, units_of, validated
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis

@@ -13,11 +13,11 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
+from proofroll.core.validation import strict, validated
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
-from proofroll.files.validation import strict, validated
 from proofroll.running.in_processes import in_processes
 from proofroll.truth.regimes import Regime, analytic_boundaries, classify
 

@@ -1,4 +1,4 @@
-"""Checks what a file says against typed dataclasses, with one line about the first thing that is wrong."""
+"""Checks what files and settings say against typed dataclasses, with one line about the first thing that is wrong."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from proofroll.core.errors import InputError, no_such_key
 _T = TypeVar("_T")
 
 
-def strict(*types: type) -> None:
-    """Makes unknown keys of these dataclasses an error; it is how pydantic is told about stdlib dataclasses."""
+def strict(*types: type, finite: bool = False) -> None:
+    """Makes unknown keys of these dataclasses an error, with ``finite`` also inf and NaN, as pydantic is told."""
     for kind in types:
-        setattr(kind, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010 -- the name is pydantic's
+        config = ConfigDict(extra="forbid", allow_inf_nan=not finite)
+        setattr(kind, "__pydantic_config__", config)  # noqa: B010 -- the name is pydantic's
 
 
 def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: object) -> _T:
@@ -74,7 +75,8 @@ def _first_problem(error: ValidationError, where: str, kind: type, own: Iterable
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):
-        return InputError(f"{where}: {location}.{error_found.field}", error_found.value, error_found.advice)
+        location = ".".join(filter(None, [location, error_found.field]))
+        return InputError(f"{where}: {location}", error_found.value, error_found.advice)
     if problem["type"] in {"union_tag_invalid", "union_tag_not_found"}:
         key = problem["ctx"]["discriminator"].strip("'")
         if problem["type"] == "union_tag_not_found":
