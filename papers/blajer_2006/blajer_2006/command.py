@@ -36,13 +36,15 @@ def figures(
     as_json: options.Json = False,
 ) -> None:
     """Draw the paper's figures from runs; exit 1 if a number that it states does not hold."""
-    from blajer_2006.drawing import looks
+    from blajer_2006 import style
     from blajer_2006.reading import load_figures
+    from blajer_2006.statement_tables import statement_table
     from blajer_2006.study import run_figures
-    from blajer_2006.writing import closing_lines, statement_table, write_figures
+    from blajer_2006.writing import closing_lines, write_figures
+    from proofroll.report.figure import styled
 
     loaded = load_figures(study)
-    with looks():  # what is missing shows before the runs rather than after them
+    with styled(style.SETTINGS):  # what is missing shows before the runs rather than after them
         pass
     runner = options.new_runner(out, fresh, jobs)
     with options.progress_bar("runs") as advance:

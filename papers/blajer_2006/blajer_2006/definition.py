@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
-from blajer_2006.measures import Measure
 from blajer_2006.quantities import ANGLES, TIME
 from proofroll.core.validation import strict
 
@@ -102,7 +101,7 @@ class Statement:
         ours: it is this project's, and not the article's.
         runs: each must fulfil it by itself; with ``order`` they are held against each other.
         of: quantity; not for ``events``.
-        measure: of the quantity; ``every`` means all its samples.
+        measure: of the quantity (:data:`blajer_2006.measures.MEASURES`); ``every`` means all its samples.
         stated: a number with the digits that the source gives; what is found must round to it.
         at_most, below, above: bounds, in the unit of the measure.
         because: why this bound, where the source gives no number.
@@ -117,7 +116,7 @@ class Statement:
     runs: list[str]
     ours: bool = False
     of: str = ""
-    measure: Measure | Literal["every", ""] = ""
+    measure: str = ""
     stated: str = ""
     at_most: float | None = None
     below: float | None = None
@@ -152,6 +151,7 @@ class Figures:
         time_limit: wall seconds a run may take [s].
     """
 
+    question: ClassVar[str] = ""  # a report's entry has one; the title says what is asked here
     name: str
     title: str
     source: str

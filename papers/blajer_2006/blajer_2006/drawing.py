@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import string
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,45 +11,36 @@ from blajer_2006 import style
 from blajer_2006.definition import Figure, Panel
 from blajer_2006.quantities import TIME
 from blajer_2006.study import FigureRun, FigureRuns
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError
 from proofroll.core.events import events_of
+from proofroll.report.figure import drawn_file, styled
 from proofroll.report.pages import element
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawn
 
-FORMATS = ("svg", "png", "pdf")
 # Samples of the truth over the curves of one row: enough to see that they lie on them, few enough to see the curves.
 _TRUTH_MARKS = 66
 # A curve that varies by less than this part of its size is constant, and its axis does not magnify its round-off.
 _CONSTANT, _ROOM = 1e-3, 0.05
 
 
-@contextmanager
-def looks() -> Iterator[None]:
-    """The style of all figures while something is drawn or saved.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
-    try:
-        import matplotlib as mpl
-    except ImportError:
-        raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
-    with mpl.rc_context(style.SETTINGS):
-        yield
-
-
 def picture(wanted: Figure, study: FigureRuns, form: str) -> bytes:
-    """A figure with panels as the content of a file, in one of :data:`FORMATS`.
+    """A figure with panels as the content of a file: ``svg``, ``png`` or ``pdf``.
 
     Raises:
         InputError: some text of the figure is no mathematics that can be drawn.
         Missing: matplotlib is not installed.
     """
-    with looks():
-        return saved(drawn(wanted, study), form, wanted)
+    with styled(style.SETTINGS):
+        made = drawn(wanted, study)
+    said = {"Title": wanted.name, "Subject" if form == "pdf" else "Description": wanted.caption}
+    try:
+        return drawn_file(form, style.SETTINGS, lambda: made, style.PIXELS_PER_INCH, said)
+    except ValueError as error:  # mathematics is read only when it is drawn
+        found = " ".join(str(error).split())[:200]
+        raise InputError(f"figure {wanted.name}", "text", f"its text cannot be drawn: {found}") from None
 
 
 def inline(wanted: Figure, study: FigureRuns, prefix: str) -> str:
@@ -60,24 +48,8 @@ def inline(wanted: Figure, study: FigureRuns, prefix: str) -> str:
     return element(picture(wanted, study, "svg").decode(), prefix)
 
 
-def saved(figure: Drawn, form: str, wanted: Figure) -> bytes:
-    """The content of a file; call it within :func:`looks`."""
-    content = io.BytesIO()
-    # Equal runs give equal files, so no date; PNG has no such field.
-    dates = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(form, {})
-    described = {"Description" if form != "pdf" else "Subject": wanted.caption}
-    try:
-        figure.savefig(
-            content, format=form, dpi=style.PIXELS_PER_INCH, metadata={"Title": wanted.name} | described | dates
-        )
-    except ValueError as error:  # mathematics is read only when it is drawn
-        said = " ".join(str(error).split())[:200]
-        raise InputError(f"figure {wanted.name}", "text", f"its text cannot be drawn: {said}") from None
-    return content.getvalue()
-
-
 def drawn(wanted: Figure, study: FigureRuns) -> Drawn:
-    """The figure as a matplotlib figure; call it within :func:`looks`."""
+    """The figure as a matplotlib figure; in the style that is set (:func:`styled`)."""
     from matplotlib.figure import Figure as New
 
     rows, columns = -(-len(wanted.panels) // wanted.columns), wanted.columns

@@ -5,14 +5,14 @@ from __future__ import annotations
 import itertools
 import math
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from blajer_2006.definition import Statement
-from blajer_2006.measures import DEFINITIONS, measured, unit_of
+from blajer_2006.measures import MEASURES, measured
 from blajer_2006.quantities import TIME
 from blajer_2006.study import FigureRun, FigureRuns
 from proofroll.core.events import events_of
@@ -44,16 +44,6 @@ def judged(study: FigureRuns) -> list[dict[str, Any]]:
     ]
 
 
-def count(statements: Sequence[Mapping[str, Any]]) -> str:
-    """How many statements hold, those of the article apart from this project's own."""
-    parts = []
-    for ours, whose in ((False, "statements"), (True, "of this project's own")):
-        verdicts = [item["holds"] for item in statements if item["ours"] is ours]
-        if verdicts:
-            parts.append(f"{verdicts.count(True)} of {len(verdicts)} {whose}")
-    return f"{' and '.join(parts)} hold"
-
-
 def rounds_to(value: float, stated: str) -> bool:
     """Whether a number is the stated one to the digits that are written: off by half a unit of the last at most."""
     number = Decimal(stated)
@@ -69,7 +59,7 @@ def _entry(study: FigureRuns, item: Statement, runs: list[str]) -> dict[str, Any
         "says": item.says,
         "source": item.source,
         "ours": item.ours,
-        "defined": DEFINITIONS.get(item.measure, "") if item.measure and item.measure != "every" else "",
+        "defined": MEASURES[item.measure].definition if item.measure in MEASURES else "",
         "because": item.because,
         "runs": runs,
         "of": item.of,
@@ -88,8 +78,8 @@ def _unit(study: FigureRuns, item: Statement) -> str:
         return "s"
     if item.events:
         return ""
-    unit = study.units[item.of]
-    return unit if item.measure == "every" or not item.measure else unit_of(item.measure, unit)
+    own = MEASURES[item.measure].unit if item.measure in MEASURES else None
+    return study.units[item.of] if own is None else own
 
 
 def _stated(item: Statement) -> str:
@@ -118,7 +108,6 @@ def _value(item: Statement, made: FigureRun) -> Measured:
         return None
     if item.measure == "every":
         return float(values[np.argmax(np.abs(values - float(item.stated)))])
-    assert item.measure  # as the file was checked for
     return measured(item.measure, made.dataset[TIME].to_numpy()[: values.size], values)
 
 

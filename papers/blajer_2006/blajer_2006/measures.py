@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing
@@ -12,32 +12,6 @@ from scipy.signal import find_peaks
 
 from proofroll.core.arrays import FloatArray
 
-Measure = Literal[
-    "maximum",
-    "minimum",
-    "mean",
-    "last",
-    "variation",
-    "half_range",
-    "first_extreme",
-    "misfit_of_sinusoid",
-    "angular_frequency",
-    "least_growth_of_amplitude",
-    "largest_step_of_mean_level",
-    "change_of_mean",
-    "growth_of_range",
-]
-# Measures without a unit; all others but the frequency keep the curve's.
-DIMENSIONLESS = frozenset({"variation", "misfit_of_sinusoid", "least_growth_of_amplitude", "growth_of_range"})
-# What a person has to know to find the same number.
-DEFINITIONS: Mapping[Measure, str] = {
-    "half_range": "the amplitude is half of maximum less minimum",
-    "misfit_of_sinusoid": "root mean square of what is left; the amplitude is that of the best sinusoid",
-    "least_growth_of_amplitude": "the amplitude of a swing is half the distance of a turning point from the mean of "
-    "its two neighbours",
-    "largest_step_of_mean_level": "the level of a swing lies in the middle between a turning point and the mean of its "
-    "two neighbours",
-}
 # A swing smaller than this part of the whole range is no oscillation of the path but noise of an engine.
 _PROMINENCE = 0.1
 _FREQUENCY_BAND = (0.8, 1.25)  # around the guess from the extremes, which is off by a few per cent
@@ -83,15 +57,12 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
     return float(found.x), left / amplitude
 
 
-def _halves(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return values[: values.size // 2], values[values.size // 2 :]
+def _halves(of: Callable[[FloatArray], float], values: FloatArray) -> tuple[float, float]:
+    """What a function makes of the first half of the curve, and of the second."""
+    return float(of(values[: values.size // 2])), float(of(values[values.size // 2 :]))
 
 
-def _variation(_: FloatArray, values: FloatArray) -> float:
-    return float(np.ptp(values) / abs(np.mean(values)))
-
-
-def _first_extreme(_: FloatArray, values: FloatArray) -> float:
+def _first_extreme(values: FloatArray) -> float:
     found = extremes(values)
     return float(found[0]) if found.size else float("nan")
 
@@ -107,63 +78,81 @@ def _centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.abs(inner - outer) / 2, (inner + outer) / 2
 
 
-def _least_growth(_: FloatArray, values: FloatArray) -> float:
+def _least_growth(values: FloatArray) -> float:
     amplitudes, _levels = _centred(values)
     return float(np.min(amplitudes[1:] / amplitudes[:-1])) if amplitudes.size > 1 else float("nan")
 
 
-def _largest_step(_: FloatArray, values: FloatArray) -> float:
+def _largest_step(values: FloatArray) -> float:
     _amplitudes, levels = _centred(values)
     return float(np.max(np.diff(levels))) if levels.size > 1 else float("nan")
 
 
-def _change(_: FloatArray, values: FloatArray) -> float:
-    first, second = _halves(values)
-    return float(np.mean(second) - np.mean(first))
+def _change(values: FloatArray) -> float:
+    first, second = _halves(np.mean, values)
+    return second - first
 
 
-def _growth_of_range(_: FloatArray, values: FloatArray) -> float:
-    first, second = _halves(values)
-    return float(np.ptp(second) / np.ptp(first))
+def _growth_of_range(values: FloatArray) -> float:
+    first, second = _halves(np.ptp, values)
+    return second / first
 
 
-_MEASURES: Mapping[Measure, Callable[[FloatArray, FloatArray], float]] = {
-    "maximum": lambda _, values: float(np.max(values)),
-    "minimum": lambda _, values: float(np.min(values)),
-    "mean": lambda _, values: float(np.mean(values)),
-    "last": lambda _, values: float(values[-1]),
-    "variation": _variation,
-    "half_range": lambda _, values: float(np.ptp(values)) / 2,
-    "first_extreme": _first_extreme,
-    "misfit_of_sinusoid": lambda times, values: sinusoid(times, values)[1],
-    "angular_frequency": lambda times, values: sinusoid(times, values)[0],
-    "least_growth_of_amplitude": _least_growth,
-    "largest_step_of_mean_level": _largest_step,
-    "change_of_mean": _change,
-    "growth_of_range": _growth_of_range,
+@dataclass(frozen=True)
+class Measure:
+    """A measure of a curve.
+
+    Attributes:
+        value: from times [s] and values, each of shape (time,).
+        unit: its own; None: the curve's.
+        definition: what a person has to know to find the same number.
+    """
+
+    value: Callable[[FloatArray, FloatArray], float]
+    unit: str | None = None
+    definition: str = ""
+
+
+def _of_values(value: Callable[[FloatArray], float], unit: str | None = None, definition: str = "") -> Measure:
+    """A measure that does not hang on the times."""
+    return Measure(lambda _, values: float(value(values)), unit, definition)
+
+
+MEASURES: Mapping[str, Measure] = {
+    "maximum": _of_values(np.max),
+    "minimum": _of_values(np.min),
+    "mean": _of_values(np.mean),
+    "last": _of_values(lambda values: values[-1]),
+    "variation": _of_values(lambda values: np.ptp(values) / abs(np.mean(values)), "1"),
+    "half_range": _of_values(
+        lambda values: np.ptp(values) / 2, definition="the amplitude is half of maximum less minimum"
+    ),
+    "first_extreme": _of_values(_first_extreme),
+    "misfit_of_sinusoid": Measure(
+        lambda times, values: sinusoid(times, values)[1],
+        "1",
+        "root mean square of what is left; the amplitude is that of the best sinusoid",
+    ),
+    "angular_frequency": Measure(lambda times, values: sinusoid(times, values)[0], "rad/s"),
+    # The smallest ratio of an amplitude to the one before it.
+    "least_growth_of_amplitude": _of_values(
+        _least_growth,
+        "1",
+        "the amplitude of a swing is half the distance of a turning point from the mean of its two neighbours",
+    ),
+    # The largest rise of the level about which it swings, from a swing to the next.
+    "largest_step_of_mean_level": _of_values(
+        _largest_step,
+        definition="the level of a swing lies in the middle between a turning point and the mean of its two neighbours",
+    ),
+    "change_of_mean": _of_values(_change),  # mean of the second half less that of the first
+    "growth_of_range": _of_values(_growth_of_range, "1"),  # range of the second half over that of the first
 }
 
 
-def measured(measure: Measure, times: FloatArray, values: FloatArray) -> float:
-    """The number; nan where the curve has too few oscillations for it or is not finite.
-
-    * ``maximum``, ``minimum``, ``mean``, ``last``, ``half_range`` (half of maximum less minimum): as they are called.
-    * ``variation``: maximum less minimum, over the size of the mean.
-    * ``first_extreme``: the first inner maximum or minimum.
-    * ``misfit_of_sinusoid``, ``angular_frequency`` [rad/s]: see :func:`sinusoid`.
-    * ``least_growth_of_amplitude``: the smallest ratio of an amplitude to the one before it.
-    * ``largest_step_of_mean_level``: the largest rise of the level about which it swings, from a swing to the next.
-    * ``change_of_mean``: mean of the second half less that of the first.
-    * ``growth_of_range``: range of the second half over that of the first.
-    """
+def measured(measure: str, times: FloatArray, values: FloatArray) -> float:
+    """The number; nan where the curve has too few oscillations for it or is not finite."""
     if not values.size or not np.all(np.isfinite(values)):
         return float("nan")
     with np.errstate(divide="ignore", invalid="ignore"):
-        return _MEASURES[measure](times, values)
-
-
-def unit_of(measure: Measure, unit: str) -> str:
-    """Unit of the measure of a curve with this unit."""
-    if measure == "angular_frequency":
-        return "rad/s"
-    return "1" if measure in DIMENSIONLESS else unit
+        return MEASURES[measure].value(times, values)

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from blajer_2006 import statement_tables
-from blajer_2006.judging import count
 from blajer_2006.reading import STUDY, load_figures
 from proofroll.report.study_parts import Part, PartEntry
 
@@ -29,6 +28,7 @@ class FiguresPart(Part):
     key: ClassVar[str] = "figures"
     order: ClassVar[float] = 10
     words: ClassVar[str] = "figures"
+    command: ClassVar[str] = "figures {.name}"
     template: ClassVar[str] = "figures.html"
     names: ClassVar[Mapping[str, Any]] = {"statements": statement_tables}
     asked: Figures
@@ -44,14 +44,7 @@ class FiguresPart(Part):
     @staticmethod
     def line(entry: PartEntry) -> str:
         """How many statements hold."""
-        return count(entry.study["statements"])
-
-    @property
-    def head(self) -> dict[str, str]:
-        """What it is."""
-        asked = self.asked
-        command = f"proofroll figures {asked.name}"
-        return {"name": asked.name, "title": asked.title, "question": "", "scene": asked.scene, "command": command}
+        return statement_tables.count(entry.study["statements"])
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """Makes the runs and the maps."""

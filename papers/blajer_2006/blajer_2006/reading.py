@@ -6,6 +6,7 @@ import re
 from decimal import Decimal, InvalidOperation
 
 from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
+from blajer_2006.measures import MEASURES
 from blajer_2006.quantities import known
 from proofroll.core.errors import InputError
 from proofroll.core.time_grid import time_grid
@@ -95,8 +96,9 @@ def _check_statement(where: str, item: Statement, found: Figures, quantities: se
             raise InputError(f"{where}.of", item.of, "a statement about events has no quantity, measure or order")
         return
     _choose(f"{where}.of", item.of, quantities)
-    if not item.measure or (item.measure == "every" and not item.stated):
-        raise InputError(f"{where}.measure", item.measure, "name a measure; every is for a stated number")
+    _choose(f"{where}.measure", item.measure, {*MEASURES, "every"})
+    if item.measure == "every" and not item.stated:
+        raise InputError(f"{where}.measure", item.measure, "every is for a stated number")
 
 
 def _choose(where: str, name: str, among: set[str]) -> None:

@@ -1,13 +1,28 @@
-"""The statements of an article as rows of a page."""
+"""The statements of an article as rows of a page and of the terminal."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from blajer_2006.judging import count
+from rich.table import Column, Table
+from rich.text import Text
+
 from proofroll.report.labels import number, unit
+from proofroll.report.screen import numeric, plain_table, unbroken
+
+_SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}
+
+
+def count(statements: Sequence[Mapping[str, Any]]) -> str:
+    """How many statements hold, those of the article apart from this project's own."""
+    parts = []
+    for ours, whose in ((False, "statements"), (True, "of this project's own")):
+        verdicts = [item["holds"] for item in statements if item["ours"] is ours]
+        if verdicts:
+            parts.append(f"{verdicts.count(True)} of {len(verdicts)} {whose}")
+    return f"{' and '.join(parts)} hold"
 
 
 def titled(name: str) -> str:
@@ -33,9 +48,26 @@ def rows(study: Mapping[str, Any]) -> list[dict[str, Any]]:
     return lines
 
 
-def counted(study: Mapping[str, Any]) -> str:
-    """How many statements hold."""
-    return count(study["statements"])
+def statement_table(content: dict[str, Any]) -> Table:
+    """What is stated, what was found, and whether it holds, one line for each."""
+    found = Column("found", justify="right", max_width=24)
+    table = plain_table(
+        Column("statement"), *unbroken("run"), *numeric("stated"), found, *unbroken(""), title=content["title"]
+    )
+    said = ""
+    for item in content["statements"]:
+        sign, look = _SIGNS[item["holds"]]
+        # The order of runs is told by the found numbers; their names are in the JSON.
+        runs = item["runs"][0] if len(item["runs"]) == 1 else f"{len(item['runs'])} runs"
+        table.add_row(
+            Text("" if item["says"] == said else item["says"]),
+            Text(runs),
+            Text(item["stated"]),
+            Text(_said(item["found"], unit(item["unit"]))),
+            Text(sign, style=look),
+        )
+        said = item["says"]
+    return table
 
 
 def _said(found: Any, of: str) -> str:

@@ -7,19 +7,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Column, Table
-from rich.text import Text
-
 from blajer_2006 import style
-from blajer_2006.drawing import looks, picture
-from blajer_2006.judging import count, judged
+from blajer_2006.drawing import picture
+from blajer_2006.judging import judged
+from blajer_2006.statement_tables import count
 from blajer_2006.study import FigureRuns, study_content
 from proofroll.elements.ball_on_surface.report.regime_map import counts
 from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
-from proofroll.report.labels import number, unit
-from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
@@ -27,8 +23,6 @@ if TYPE_CHECKING:
 
     Maps = Mapping[str, Sequence[xr.Dataset]]
 
-_SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}
-_DIGITS = 7
 _MAP_HEIGHT = 3.6  # inch
 
 
@@ -66,8 +60,7 @@ def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]
         entry["files"] = []
         for form in forms:
             if figure.regimes:
-                with looks():
-                    drawn = map_picture(maps[figure.regimes], form, style.SETTINGS, (style.WIDTH, _MAP_HEIGHT))
+                drawn = map_picture(maps[figure.regimes], form, style.SETTINGS, (style.WIDTH, _MAP_HEIGHT))
             else:
                 drawn = picture(figure, study, form)
             path = out / f"{figure.name}.{form}"
@@ -76,35 +69,6 @@ def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]
             entry["files"].append(path.name)
     write_text(out / "figures.json", json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n")
     return content
-
-
-def statement_table(content: dict[str, Any]) -> Table:
-    """What is stated, what was found, and whether it holds, one line for each."""
-    found = Column("found", justify="right", max_width=24)
-    table = plain_table(
-        Column("statement"), *unbroken("run"), *numeric("stated"), found, *unbroken(""), title=content["title"]
-    )
-    said = ""
-    for item in content["statements"]:
-        sign, look = _SIGNS[item["holds"]]
-        shown = unit(item["unit"]) if item["found"] is not None else ""
-        # The order of runs is told by the found numbers; their names are in the JSON.
-        runs = item["runs"][0] if len(item["runs"]) == 1 else f"{len(item['runs'])} runs"
-        table.add_row(
-            Text("" if item["says"] == said else item["says"]),
-            Text(runs),
-            Text(item["stated"]),
-            Text(f"{_said(item['found'])} {shown}".strip()),
-            Text(sign, style=look),
-        )
-        said = item["says"]
-    return table
-
-
-def _said(found: Any) -> str:
-    if isinstance(found, list):
-        return ", ".join(part if isinstance(part, str) else number(part, 3) for part in found) or "nothing"
-    return number(found, _DIGITS)
 
 
 def closing_lines(content: dict[str, Any], out: Path) -> list[str]:

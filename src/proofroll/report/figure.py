@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.errors import Missing
@@ -16,14 +18,9 @@ if TYPE_CHECKING:
 _NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
-def drawn_file(form: str, settings: Mapping[str, Any], drawn: Callable[[], Figure], dpi: float = 100) -> bytes:
-    """The content of a file with a figure.
-
-    Args:
-        form: ``svg``, ``png`` or ``pdf``.
-        settings: of matplotlib, by name.
-        drawn: makes the figure.
-        dpi: dots per inch of what is no line or letter.
+@contextmanager
+def styled(settings: Mapping[str, Any]) -> Iterator[None]:
+    """Settings of matplotlib, by name, while something is drawn.
 
     Raises:
         Missing: matplotlib is not installed.
@@ -34,8 +31,31 @@ def drawn_file(form: str, settings: Mapping[str, Any], drawn: Callable[[], Figur
         raise Missing("drawing needs matplotlib: pip install 'proofroll[report]'") from None
     chosen: Any = {"svg.hashsalt": "proofroll", **settings}
     with mpl.rc_context(chosen):
-        out = io.BytesIO()
-        drawn().savefig(out, format=form, dpi=dpi, metadata=_NO_DATE.get(form))
+        yield
+
+
+def drawn_file(
+    form: str,
+    settings: Mapping[str, Any],
+    drawn: Callable[[], Figure],
+    dpi: float = 100,
+    said: Mapping[str, str] = MappingProxyType({}),
+) -> bytes:
+    """The content of a file with a figure.
+
+    Args:
+        form: ``svg``, ``png`` or ``pdf``.
+        settings: of matplotlib, by name.
+        drawn: makes the figure.
+        dpi: dots per inch of what is no line or letter.
+        said: what the file says of itself, by the names that its form has for it.
+
+    Raises:
+        Missing: matplotlib is not installed.
+    """
+    out = io.BytesIO()
+    with styled(settings):
+        drawn().savefig(out, format=form, dpi=dpi, metadata={**said, **_NO_DATE.get(form, {})})
     return out.getvalue()
 
 

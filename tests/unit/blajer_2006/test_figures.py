@@ -12,15 +12,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from blajer_2006 import style
 from blajer_2006.definition import Figures
-from blajer_2006.drawing import drawn, inline, looks, picture, saved
-from blajer_2006.judging import count, judged, rounds_to
+from blajer_2006.drawing import drawn, inline, picture
+from blajer_2006.judging import judged, rounds_to
 from blajer_2006.reading import load_figures
+from blajer_2006.statement_tables import count
 from blajer_2006.study import FigureRuns, run_figures
 from blajer_2006.writing import write_figures
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
+from proofroll.report.figure import styled
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 
@@ -173,9 +176,9 @@ def _small(study: FigureRuns) -> FigureRuns:
 def test_every_axis_has_a_unit(study: FigureRuns) -> None:
     """Both axes of each panel are named with a unit, in the figure and, as one shows for all, in the file."""
     for number, figure in enumerate(study.figures.figures):
-        with looks():
-            made = drawn(figure, study)
-            axes, text = made.axes, "" if number else saved(made, "svg", figure).decode()
+        with styled(style.SETTINGS):
+            axes = drawn(figure, study).axes
+        text = "" if number else picture(figure, study, "svg").decode()
         assert len(axes) == len(figure.panels)
         for item, panel in zip(axes, figure.panels, strict=True):
             for label in (item.get_xlabel(), item.get_ylabel()):
