@@ -16,7 +16,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.report import labels
 from proofroll.report.tradeoff_tables import corner_table
 from proofroll.report.work_precision import svg
-from proofroll.studies import study_identity
+from proofroll.studies import study_store
 from proofroll.studies.curve import Question
 from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff import stored
@@ -52,7 +52,7 @@ def folder(measured: TradeoffStudy, tmp_path: Path) -> Path:
         cost = 1e-5 / (point.step or 1.0)
         steady = replace(point, seconds_per_second=cost, interval=(0.99 * cost, 1.01 * cost))
         points.append(point if point.seconds_per_second is None else steady)
-    keep(replace(measured, measured=study_identity.measured(), points=points), path)
+    keep(replace(measured, measured=study_store.measured(), points=points), path)
     return tmp_path
 
 
@@ -198,7 +198,7 @@ def test_curves_of_another_version_are_not_answered_from(
 ) -> None:
     """Curves measured with another version of an engine, or on another machine, are named stale, and why."""
     (path,) = (folder / "tradeoff").iterdir()
-    old = replace(study_identity.measured(), versions=study_identity.versions() | {"mujoco": "1.0"})
+    old = replace(study_store.measured(), versions=study_store.versions() | {"mujoco": "1.0"})
     keep(replace(measured, measured=old), path)
     code, _, err = proofroll(*asked(folder))
     assert code == 2

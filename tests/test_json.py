@@ -29,9 +29,8 @@ from proofroll.robots.records import (
     UsedTruth,
 )
 from proofroll.robots.robot_file import LintFinding
-from proofroll.studies.axes import Axis
+from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.recommend import Answer, CheckedOver, Recommendation
-from proofroll.studies.stability_places import Effort
 from proofroll.studies.stability_records import (
     Boundary,
     BoundaryPoint,
@@ -40,7 +39,7 @@ from proofroll.studies.stability_records import (
     MappedPlace,
     StabilityStudy,
 )
-from proofroll.studies.study_identity import Measured
+from proofroll.studies.study_store import Measured
 from proofroll.studies.tradeoff_records import (
     Corner,
     CurveBudget,

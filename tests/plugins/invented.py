@@ -17,11 +17,10 @@ from proofroll.report.tradeoff_part import TradeoffPart
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies import study_identity
-from proofroll.studies.axes import Axis
+from proofroll.studies import study_store
+from proofroll.studies.axes import QUICK, Axis
 from proofroll.studies.claims import claims_for
 from proofroll.studies.stability_claims import file_for
-from proofroll.studies.stability_places import QUICK
 from proofroll.studies.stability_records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
 from proofroll.studies.tradeoff_records import CurveBudget, MeasuredPoint, MeasuredQuantity, TradeoffStudy, TruthCost
 
@@ -50,7 +49,7 @@ def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
         "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [],
         "pareto": {},
         "pareto_engines": {}, "truth": TruthCost(route=""), "over": {}, "findings": [], "brief": False,
-        "measured": study_identity.measured(),
+        "measured": study_store.measured(),
     }  # fmt: skip
     return TradeoffStudy(points=list(points), **(values | more))
 
@@ -120,7 +119,7 @@ def stability_study() -> StabilityStudy:
         accurate=0.01, runs=14, boundaries=2, silent=1, refused=0, failures={"sank in": 2}, never_accurate=1,
         meanings={}, points=[silent, other], explanations=[explained],
         findings=["good depends on mass, as it should not"], step_symbols={}, places=[], absent={}, effort=QUICK,
-        measured=study_identity.measured(),
+        measured=study_store.measured(),
     )  # fmt: skip
 
 

@@ -17,9 +17,9 @@ from proofroll.report.stability_part import StabilityPart
 from proofroll.report.study_parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store
+from proofroll.studies.axes import QUICK, Effort
 from proofroll.studies.outcome import Outcome
 from proofroll.studies.stability import stability_path
-from proofroll.studies.stability_places import QUICK, Effort
 from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff import stored
 

@@ -27,9 +27,8 @@ def stability(
     from proofroll.report.stability_map import svg
     from proofroll.report.stability_tables import stability_parts
     from proofroll.running.store import write_text
-    from proofroll.studies.axes import chosen
+    from proofroll.studies.axes import QUICK, Effort, chosen
     from proofroll.studies.stability_claims import file_for
-    from proofroll.studies.stability_places import QUICK, Effort
     from proofroll.studies.stability_study import make_stability
 
     asked = file_for(scene)

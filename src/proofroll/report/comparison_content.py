@@ -21,9 +21,8 @@ from proofroll.report.comparison_records import (
     WorstJudgement,
     in_words,
 )
-from proofroll.running.case import Status
+from proofroll.running.case import Status, hosts
 from proofroll.running.environments import shown_name
-from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.planning import at_point, point_name
 

@@ -20,7 +20,7 @@ from proofroll.report.kinds import ReportKind, kind_of, report_kinds
 from proofroll.report.pages import environment, packed, rendered
 from proofroll.report.study_parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
-from proofroll.studies.hosts import said_of
+from proofroll.running.case import told_hosts
 
 if TYPE_CHECKING:
     import jinja2
@@ -124,7 +124,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
         "again": _again,
-        "said_of": said_of,
+        "told_hosts": told_hosts,
         "part_kinds": part_kinds(),
         "kind_of": _kind,
     }

@@ -13,9 +13,8 @@ from proofroll.files.json_data import MERGED
 from proofroll.running.case import EngineDescription, Status
 from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder import Ladder, absence, key_of
-from proofroll.studies.ladder_models import LadderModel, Rung, Switch
+from proofroll.studies.ladder_models import Answered, LadderModel, Need, Rung, Switch, need_of_term
 from proofroll.studies.pareto import front
-from proofroll.studies.term_worth import Side, Worth, worth_of_term
 
 
 @dataclass(frozen=True)
@@ -74,7 +73,7 @@ class TermFound:
     engine: str
     formulation: str
     because: str
-    verdict: Worth
+    verdict: Need
     reason: str
     on: SideFound | None = None
     off: SideFound | None = None
@@ -175,7 +174,7 @@ def _ran(study: Ladder, model: LadderModel, point: dict[str, float]) -> Ran:
 def _term(study: Ladder, switch: Switch) -> TermFound:
     said = (switch.term, switch.kind, switch.model.engine, switch.model.formulation, switch.because)
     if switch.on is None or switch.off is None:
-        return TermFound(*said, Worth.INHERENT, f"cannot be left out: {switch.because}")
+        return TermFound(*said, Need.INHERENT, f"cannot be left out: {switch.because}")
     point = dict(switch.on.parameters)
     on, off = (
         SideFound(dict(model.parameters), list(model.asks), _ran(study, model, point))
@@ -189,9 +188,9 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
     if on.ran.error is not None and off.ran.error is not None:
         error_change = off.ran.error - on.ran.error
     endings = [f"{answer.result.status.value}, {answer.result.message}" for answer in (with_it, without)]
-    verdict, reason = worth_of_term(
-        Side(on.ran.error, endings[0]),
-        Side(off.ran.error, endings[1]),
+    verdict, reason = need_of_term(
+        Answered(on.ran.error, endings[0]),
+        Answered(off.ran.error, endings[1]),
         change,
         cost,
         tolerance=study.tolerance,
@@ -246,23 +245,23 @@ def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, sa
 def _of_terms(content: LadderContent) -> Iterator[str]:
     """One sentence per term and verdict, over all models."""
     name, unit = content.quantity, content.unit
-    groups: dict[tuple[str, Worth], list[TermFound]] = {}
+    groups: dict[tuple[str, Need], list[TermFound]] = {}
     for found in content.terms:
         groups.setdefault((found.term, found.verdict), []).append(found)
     for (term, verdict), rows in groups.items():
         where = ", ".join(label(row) for row in rows)
         largest = max((row.change for row in rows if row.change is not None), default=None)
         match verdict:
-            case Worth.NEEDED if largest is not None:
+            case Need.NEEDED if largest is not None:
                 yield f"{term} is needed in {where}: leaving it out moves {name} by up to {largest:.2g} {unit}."
-            case Worth.NEEDED:
+            case Need.NEEDED:
                 yield f"{term} is needed in {where}: {rows[0].reason}."
-            case Worth.HARMFUL:
+            case Need.HARMFUL:
                 yield f"{term} moves {name} away from the truth in {where}, by up to {largest:.2g} {unit}."
-            case Worth.NOT_NEEDED:
+            case Need.NOT_NEEDED:
                 times = ", ".join(f"{label(row)} ({row.cost.value:.2f}×)" for row in rows if row.cost)
                 yield f"{term} is paid for but not needed in {times}: {name} moves by {largest:.1g} {unit} at most."
-            case Worth.INHERENT:
+            case Need.INHERENT:
                 yield f"{term}: it cannot be left out of {where}."
-            case Worth.NO_ANSWER:
+            case Need.NO_ANSWER:
                 yield f"{term}: {label(rows[0])} {rows[0].reason.removeprefix('with it: ')}."

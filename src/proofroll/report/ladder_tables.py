@@ -8,10 +8,10 @@ from rich.text import Text
 from proofroll.report.labels import number, step
 from proofroll.report.ladder import LadderContent, label
 from proofroll.report.screen import numeric, plain_table, unbroken
-from proofroll.studies.term_worth import Worth
+from proofroll.studies.ladder_models import Need
 
-_SHORT = {Worth.NOT_NEEDED: "not needed"}
-_STYLES = {Worth.NEEDED: "green", Worth.NOT_NEEDED: "yellow", Worth.HARMFUL: "red", Worth.NO_ANSWER: "bold red"}
+_SHORT = {Need.NOT_NEEDED: "not needed"}
+_STYLES = {Need.NEEDED: "green", Need.NOT_NEEDED: "yellow", Need.HARMFUL: "red", Need.NO_ANSWER: "bold red"}
 
 
 def ladder_parts(content: LadderContent) -> list[Table | str]:

@@ -67,8 +67,8 @@ class StabilityPart(Part):
 
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one, of all axes if there is."""
+        from proofroll.studies.axes import QUICK, Effort
         from proofroll.studies.stability import stability_path
-        from proofroll.studies.stability_places import QUICK, Effort
         from proofroll.studies.stability_records import StabilityStudy
         from proofroll.studies.study_store import kept
 
@@ -82,7 +82,7 @@ class StabilityPart(Part):
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A quick map."""
-        from proofroll.studies.stability_places import QUICK
+        from proofroll.studies.axes import QUICK
         from proofroll.studies.stability_study import make_stability
 
         self.study, path = make_stability(

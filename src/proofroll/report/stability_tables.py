@@ -12,7 +12,7 @@ from rich.text import Text
 
 from proofroll.report.labels import name_of, number, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
-from proofroll.studies.hosts import said_of
+from proofroll.running.case import told_hosts
 from proofroll.studies.stability_records import silent_ranking
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def headline(study: StabilityStudy) -> str:
         said += f" {study.refused} points were refused before the run."
     if study.never_accurate:
         said += f" At {study.never_accurate} points no step or tolerance that was affordable holds 1 %."
-    return " ".join([said, *said_of(study.hosts)])
+    return " ".join([said, *told_hosts(study.hosts)])
 
 
 def boundary_table(study: StabilityStudy) -> Table:

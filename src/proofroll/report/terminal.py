@@ -14,7 +14,7 @@ from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, step, 
 from proofroll.report.screen import Screen, numeric, plain_table, unbroken
 from proofroll.report.study_parts import part_kinds
 from proofroll.report.tables import observables
-from proofroll.studies.hosts import said_of
+from proofroll.running.case import told_hosts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,7 +122,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
-    return [*lines, *caveat_lines(content.rows), *said_of(content.hosts)]
+    return [*lines, *caveat_lines(content.rows), *told_hosts(content.hosts)]
 
 
 def part_lines(content: ReportContent) -> list[str]:

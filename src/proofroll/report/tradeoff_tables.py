@@ -18,7 +18,7 @@ from proofroll.studies.pareto import tied
 if TYPE_CHECKING:
     from proofroll.report.tradeoff_part import Advice
     from proofroll.studies.recommend import Choice, Recommendation
-    from proofroll.studies.study_identity import Measured
+    from proofroll.studies.study_store import Measured
     from proofroll.studies.tradeoff_records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
 
 _MOST_COLUMNS = 4  # of quantities, where nobody names them

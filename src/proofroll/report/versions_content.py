@@ -11,7 +11,7 @@ from rich.text import Text
 from proofroll.report.labels import SYMBOLS, number
 from proofroll.report.pages import environment, rendered
 from proofroll.report.screen import plain_table, unbroken
-from proofroll.studies.hosts import said_of
+from proofroll.running.case import told_hosts
 from proofroll.studies.version_difference import NumberKind
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
     if came or went:
         yield f"{len(came)} options are new and {len(went)} are gone, renamed ones among them."
     yield from (f"?? {sentence}" for sentence in content.lost)
-    yield from said_of(content.hosts)
+    yield from told_hosts(content.hosts)
     yield answer(content)
 
 

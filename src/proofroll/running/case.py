@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
@@ -183,3 +184,16 @@ class Result:
     def from_dict(cls, content: dict[str, Any]) -> Result:
         """The result again from ``asdict``."""
         return cls(**{**content, "status": Status(content["status"])})
+
+
+def hosts(results: Iterable[Result]) -> dict[str, int]:
+    """Machine of a cluster -> how many of the results it made; empty where all were made here."""
+    return dict(sorted(Counter(result.host for result in results if result.host).items()))
+
+
+def told_hosts(found: Mapping[str, int]) -> list[str]:
+    """A sentence about results from other machines, see :func:`hosts`; none where there are none."""
+    if not found:
+        return []
+    names = ", ".join(f"{count} on {name}" for name, count in found.items())
+    return [f"Made on machines of a cluster: {names}. No speed is measured there."]

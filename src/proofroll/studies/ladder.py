@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.dataset import observe
@@ -27,9 +27,6 @@ from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.studies.cases import case_of
 from proofroll.studies.ladder_models import LadderModel, Rung, Switch, rungs, switches
 from proofroll.studies.reference import Reference
-
-if TYPE_CHECKING:
-    pass
 
 _EVERY = 0.02  # interval between samples [s], as in the comparison files
 _TIME_LIMIT = 60.0  # wall seconds for one case

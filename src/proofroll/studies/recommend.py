@@ -11,7 +11,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import parse_engine
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.pareto import tied
-from proofroll.studies.study_identity import Measured
+from proofroll.studies.study_store import Measured
 from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.wish import MARGIN, Wish, absolute_tolerance, why_it_fails
 

@@ -17,12 +17,11 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
-from proofroll.studies.axes import Axis
+from proofroll.studies.axes import PER_PERIOD, Axis, Effort, Place, case_at, measure, places_of
 from proofroll.studies.bisection import SearchResult, search
 from proofroll.studies.curve import Curve
-from proofroll.studies.curves_asked import curves_of
 from proofroll.studies.failure import TOO_SLOW, RunOutcome, judge
-from proofroll.studies.stability_places import PER_PERIOD, Effort, Place, case_at, measure, places_of
+from proofroll.studies.sweep import curves_of
 
 # Parts into which a sampling interval is divided, about two per octave.
 _FINEST = 17

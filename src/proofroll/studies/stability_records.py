@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from proofroll.studies.axes import Axis
-from proofroll.studies.stability_places import Effort
+from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.step_numbers import Explanation
-from proofroll.studies.study_identity import Measured
+from proofroll.studies.study_store import Measured
 
 BOUNDARIES = ("stable", "accurate")
 # Boundaries this factor apart count as the same: two rungs of the ladder of steps, one of that of tolerances.

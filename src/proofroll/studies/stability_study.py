@@ -9,13 +9,12 @@ from operator import attrgetter
 from pathlib import Path
 
 from proofroll.files.scene_file import load_scene
+from proofroll.running.case import hosts
 from proofroll.running.runner import Runner
-from proofroll.studies.axes import Axis
+from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.failure import ACCURATE, REFUSED, meanings
-from proofroll.studies.hosts import hosts
 from proofroll.studies.stability import MapPoint, Progress, StabilityMap, failure_beyond, stability, stability_path
 from proofroll.studies.stability_claims import StabilityFile
-from proofroll.studies.stability_places import Effort
 from proofroll.studies.stability_records import (
     BOUNDARIES,
     Boundary,
@@ -28,8 +27,7 @@ from proofroll.studies.stability_records import (
 )
 from proofroll.studies.stability_reproducers import with_programs
 from proofroll.studies.step_numbers import explanation, step_numbers, values
-from proofroll.studies.study_identity import measured
-from proofroll.studies.study_store import keep
+from proofroll.studies.study_store import keep, measured
 
 
 def make_stability(

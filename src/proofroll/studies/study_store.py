@@ -1,20 +1,116 @@
-"""Studies that take minutes, kept as files, and believed while what they hang on is what it was."""
+"""Studies that take minutes, kept as files, and believed while what they hang on is what it was.
+
+What decides their numbers besides the question is told without importing a single engine.
+"""
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import json
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
+import proofroll
+from proofroll.core.announced import announced
+from proofroll.core.plugins import ELEMENTS, GROUP
+from proofroll.core.source_code import hash_of
+from proofroll.core.truth import TRUTHS
 from proofroll.files.atomic import ordinary_content
 from proofroll.files.json_data import plain, record
+from proofroll.running.environments import remembered
+from proofroll.running.identity import ASIDE
 from proofroll.running.store import write_text
-from proofroll.studies import study_identity
-from proofroll.studies.study_identity import Measured
+from proofroll.running.timing import machine
 
 _Study = TypeVar("_Study")
+# Folders of the package on which no result hangs.
+_ASIDE = frozenset({"cli", "conformance", "report"})
+
+
+def versions() -> dict[str, str]:
+    """Versions of proofroll, of what it can use, of packages that announce engines, and of remembered environments.
+
+    An environment ``NAME@LABEL`` has the hash of all that is installed in it for its version, and what announces
+    engines, truths or kinds of elements besides its version a hash of its code.
+    """
+    plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
+    names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}
+    found = {}
+    for name in sorted(names, key=str.lower):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    for top in sorted({point.module.partition(".")[0] for point in plug_ins} - {"proofroll"}):
+        found[f"code of {top}"] = _code_of(top)
+    for item in remembered():
+        content = "\n".join([item.version, item.interpreter, *item.packages])
+        found[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
+    return found
+
+
+def _code_of(top: str) -> str:
+    """Hash of a top package or module, which is found but not imported; empty where it lies at several places."""
+    spec = find_spec(top)
+    if spec is None or spec.origin is None:
+        return ""
+    file = Path(spec.origin)
+    return hash_of([file.parent if spec.submodule_search_locations else file], ASIDE)
+
+
+def _required() -> set[str]:
+    """Names of proofroll and of all that it can use: requirements of all extras count."""
+    return {"proofroll"} | {re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0] for text in requires("proofroll") or []}
+
+
+def code() -> str:
+    """Hash of everything in proofroll on which a result may hang."""
+    root = Path(proofroll.__file__).parent
+    content = hashlib.sha256()
+    for file in sorted(root.rglob("*.py")):
+        if file.relative_to(root).parts[0] not in _ASIDE:
+            content.update(file.read_bytes())
+    return content.hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """When, on which machine and with which versions and code a study was made."""
+
+    when: str
+    machine: dict[str, str]
+    versions: dict[str, str]
+    code: str
+
+
+def measured() -> Measured:
+    """Of a study that is being made."""
+    return Measured(datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), machine(), versions(), code())
+
+
+def changes(measured: Measured) -> list[str]:
+    """What is another than when a study was measured, as short texts; empty if it still holds here."""
+    found = []
+    then, now = measured.machine, machine()
+    found += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
+    then, now = measured.versions, versions()
+    own = _required()
+    for name in sorted(then.keys() | now.keys(), key=str.lower):
+        if name not in then and name not in own:
+            continue  # a further engine, which was not measured and changes nothing of what was
+        if "@" in name and name not in now:
+            continue  # an environment that is gone was not made anew with something else
+        if then.get(name) != now.get(name):
+            found.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
+    if measured.code != code():
+        found.append("proofroll's own code has changed")
+    return found
 
 
 def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
@@ -27,7 +123,7 @@ def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
         content = json.loads(ordinary_content(path))
         if content["seal"] != _seal(content):
             return None, ["what is stored is not what had been put there"]
-        reasons = study_identity.changes(record(Measured, content["measured"]))
+        reasons = changes(record(Measured, content["measured"]))
         return (None, reasons) if reasons else (record(kind, content), [])
     except (OSError, ValueError, KeyError, TypeError, RecursionError):  # absent, half written, or something else
         return None, []

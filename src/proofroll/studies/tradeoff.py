@@ -24,10 +24,9 @@ from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.curve import Curve, CurvePoint, Question, judged
-from proofroll.studies.curves_asked import curves_of
 from proofroll.studies.pareto import front
 from proofroll.studies.reference import Reference
-from proofroll.studies.sweep import FINER, GAIN, sweep
+from proofroll.studies.sweep import FINER, GAIN, curves_of, sweep
 from proofroll.studies.tradeoff_records import Corner
 
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from proofroll.running.case import Status
-from proofroll.studies.study_identity import Measured
+from proofroll.studies.study_store import Measured
 
 # JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
 Parameter = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]

@@ -11,17 +11,15 @@ import numpy as np
 
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
-from proofroll.running.case import Status
+from proofroll.running.case import Status, hosts, told_hosts
 from proofroll.running.runner import Runner
 from proofroll.running.timing import Timing, write_benchmarks
 from proofroll.studies.budget import budget
 from proofroll.studies.claims import TradeoffClaims
 from proofroll.studies.curve import Curve, CurvePoint, Question
-from proofroll.studies.hosts import hosts, said_of
 from proofroll.studies.pareto import front
 from proofroll.studies.recommend import by_hand
-from proofroll.studies.study_identity import measured
-from proofroll.studies.study_store import keep
+from proofroll.studies.study_store import keep, measured
 from proofroll.studies.sweep import BROKEN
 from proofroll.studies.tradeoff import Tradeoff, pareto_entries, stored, tradeoff
 from proofroll.studies.tradeoff_records import (
@@ -187,7 +185,7 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
 
 def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     """What stands out, as sentences."""
-    said = said_of(hosts(point.result for point in found.points))
+    said = told_hosts(hosts(point.result for point in found.points))
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit
     judged = [item for item in budgets if item.quantity in found.quantities and item.contradicts_declaration]

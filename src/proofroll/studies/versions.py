@@ -12,12 +12,11 @@ from typing import Any
 from proofroll.core.comparison import Comparison
 from proofroll.core.plugins import parse_engine, plain_name
 from proofroll.running.asking import describe
-from proofroll.running.case import EngineDescription, Status
+from proofroll.running.case import EngineDescription, Status, hosts
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import Interval, interleaved, ratio
 from proofroll.studies.compare import evaluate
-from proofroll.studies.hosts import hosts
 from proofroll.studies.outcome import Run
 from proofroll.studies.planning import Plan, plan
 from proofroll.studies.version_difference import (

@@ -10,10 +10,12 @@ from typing import Any
 import pytest
 from invented import invented_study, measured_point
 
-from proofroll.studies import study_identity
+from proofroll.running.environments import STAMP, VARIABLE, Environment
+from proofroll.running.timing import machine
+from proofroll.studies import study_store
+from proofroll.studies.axes import QUICK, Effort
 from proofroll.studies.stability import stability_path
 from proofroll.studies.stability_claims import file_for
-from proofroll.studies.stability_places import QUICK, Effort
 from proofroll.studies.study_store import keep, kept
 from proofroll.studies.tradeoff_records import Corner, TradeoffStudy
 
@@ -23,14 +25,14 @@ class Study:
     """The least that can be kept."""
 
     points: list[int]
-    measured: study_identity.Measured
+    measured: study_store.Measured
 
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     """A study that was kept just now."""
     path = tmp_path / "study.json"
-    keep(Study([1], study_identity.measured()), path)
+    keep(Study([1], study_store.measured()), path)
     return path
 
 
@@ -107,3 +109,65 @@ def test_a_part_of_a_map_never_takes_the_place_of_the_whole(tmp_path: Path) -> N
     ]
     assert len(set(paths)) == len(paths)
     assert stability_path(tmp_path, asked.scene, list(asked.axes), (), QUICK) == paths[1]
+
+
+def test_nothing_has_changed_since_now() -> None:
+    """What was measured here with this code still holds."""
+    assert study_store.changes(study_store.measured()) == []
+
+
+def test_engines_are_among_the_versions() -> None:
+    """Every engine's package is told with its version, without importing it."""
+    assert {"proofroll", "mujoco", "exudyn", "pin", "numpy", "scipy"} <= study_store.versions().keys()
+
+
+def test_an_environment_that_was_made_anew_is_a_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same label with other packages outdates a study; a further label, or one that is gone, does not."""
+    monkeypatch.setenv(VARIABLE, str(tmp_path))
+
+    def make(label: str, *packages: str) -> None:
+        (tmp_path / "aged" / label).mkdir(parents=True, exist_ok=True)
+        Environment("aged", label, tmp_path / "aged" / label, "1.0", [], "3.11", list(packages)).stamp()
+
+    make("1.0", "numpy==2.0")
+    before = study_store.measured()
+    make("2.0", "numpy==2.0")
+    assert study_store.changes(before) == []
+    make("1.0", "numpy==2.1")
+    (change,) = study_store.changes(before)
+    assert change.startswith("aged@1.0 ")
+    (tmp_path / "aged" / "1.0" / STAMP).unlink()
+    assert study_store.changes(before) == []
+
+
+def test_each_change_is_told() -> None:
+    """Another machine, another version, a package that is gone and other code are each one short text."""
+    other = study_store.changes(
+        study_store.Measured(
+            "then",
+            machine() | {"processor": "an abacus"},
+            {name: v for name, v in study_store.versions().items() if name != "mujoco"} | {"numpy": "1.0"},
+            "0",
+        )
+    )
+    assert len(other) == 4
+    text = "; ".join(other)
+    for words in ("processor an abacus then", "mujoco absent then", "numpy 1.0 then", "own code has changed"):
+        assert words in text
+
+
+def test_code_of_a_plug_in_is_among_the_versions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A study does not outlive the code of an engine's package, edited without a new version; nothing imports it."""
+    package = tmp_path / "edited_engine"
+    (package / "inside").mkdir(parents=True)
+    (package / "__init__.py").write_text("raise RuntimeError('imported')")
+    info = tmp_path / "edited-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: edited\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.engines]\nedited = edited_engine.adapter:Engine\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    before = study_store.measured()
+    assert study_store.changes(before) == []
+    (package / "inside" / "method.py").write_text("order = 1")
+    (change,) = study_store.changes(before)
+    assert change.startswith("code of edited_engine ")

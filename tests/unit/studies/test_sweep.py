@@ -12,8 +12,7 @@ from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.curve import Curve, CurvePoint, Question
-from proofroll.studies.curves_asked import curves_of
-from proofroll.studies.sweep import BROKEN, _first, _further, sweep
+from proofroll.studies.sweep import BROKEN, _first, _further, curves_of, sweep
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.1, "z")
 
