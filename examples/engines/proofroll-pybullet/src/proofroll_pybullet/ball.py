@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from proofroll.core.engine import Built, Regularised, Sample, whole_steps
 from proofroll.core.errors import Diverged, Refused
@@ -21,7 +20,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll_pybullet.settings import PybulletSettings
-from proofroll_pybullet.world import connected, gravity_of
+from proofroll_pybullet.world import World
 
 PROVIDES: frozenset[str] = ALL_OF_A_BALL
 INHERENT = {BallCapability.ORIENTATION: "every rigid body of PyBullet has one"}
@@ -43,18 +42,18 @@ class PybulletBall:
         self._bounded = math.isfinite(body.contact.mu_static)
         self._events: list[Event] = []
         self._status = "stick"
-        self._client = client = connected(self, body.gravity.tolist(), settings)
+        self._world = World(body.gravity.tolist(), settings)
         mu = body.contact.mu_static if self._bounded else UNBOUNDED
         self._ball = self._sphere(mu)
-        shape = pybullet.createCollisionShape(pybullet.GEOM_PLANE, planeNormal=[0, 0, 1], physicsClientId=client)
-        self._plane = pybullet.createMultiBody(0, shape, physicsClientId=client)
-        pybullet.changeDynamics(self._plane, -1, lateralFriction=1, physicsClientId=client)
+        shape = self._world.createCollisionShape(self._world.GEOM_PLANE, planeNormal=[0, 0, 1])
+        self._plane = self._world.createMultiBody(0, shape)
+        self._world.changeDynamics(self._plane, -1, lateralFriction=1)
         if settings.preset == "matched":
-            pybullet.changeDynamics(
+            self._world.changeDynamics(
                 self._ball, -1, linearDamping=0, angularDamping=0, restitution=0, maxJointVelocity=1e9,
-                activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING, physicsClientId=client,
+                activationState=self._world.ACTIVATION_STATE_DISABLE_SLEEPING,
             )  # fmt: skip
-        pybullet.resetBaseVelocity(self._ball, body.v0.tolist(), body.w0.tolist(), physicsClientId=client)
+        self._world.resetBaseVelocity(self._ball, body.v0.tolist(), body.w0.tolist())
         self._normal_force = 0.0
         if body.contact.rolling_resistance:
             self._normal_force = self._first_normal_force()
@@ -65,13 +64,11 @@ class PybulletBall:
         return cls(rolling_ball(scene), settings)
 
     def _sphere(self, mu: float) -> int:
-        body, client = self._body, self._client
-        shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=body.ball.radius, physicsClientId=client)
-        ball: int = pybullet.createMultiBody(
-            body.ball.mass, shape, basePosition=body.p0.tolist(), physicsClientId=client
-        )
+        body = self._body
+        shape = self._world.createCollisionShape(self._world.GEOM_SPHERE, radius=body.ball.radius)
+        ball: int = self._world.createMultiBody(body.ball.mass, shape, basePosition=body.p0.tolist())
         inertia = [body.ball.inertia] * 3
-        pybullet.changeDynamics(ball, -1, localInertiaDiagonal=inertia, lateralFriction=mu, physicsClientId=client)
+        self._world.changeDynamics(ball, -1, localInertiaDiagonal=inertia, lateralFriction=mu)
         return ball
 
     def advance(self, t: float) -> None:
@@ -92,13 +89,11 @@ class PybulletBall:
             raise Diverged(f"PyBullet's ball is nowhere at t = {self._steps * self._settings.dt:g} s")
         reach = self._body.ball.radius + gap
         foot = [x + reach * n for x, n in zip(p, e1, strict=True)]
-        pybullet.resetBasePositionAndOrientation(self._plane, foot, _upright(*e1), physicsClientId=self._client)
+        self._world.resetBasePositionAndOrientation(self._plane, foot, _upright(*e1))
         if self._body.contact.rolling_resistance:
             torque = self._resistance(np.array(e1))
-            pybullet.applyExternalTorque(
-                self._ball, -1, torque.tolist(), pybullet.WORLD_FRAME, physicsClientId=self._client
-            )
-        pybullet.stepSimulation(physicsClientId=self._client)
+            self._world.applyExternalTorque(self._ball, -1, torque.tolist(), self._world.WORLD_FRAME)
+        self._world.stepSimulation()
         if self._body.contact.rolling_resistance:
             self._normal_force = self._contact()[0]
 
@@ -114,10 +109,10 @@ class PybulletBall:
 
     def _first_normal_force(self) -> float:
         """That of a first step, which is then taken back [N]."""
-        state = pybullet.saveState(physicsClientId=self._client)
+        state = self._world.saveState()
         self._step()
-        pybullet.restoreState(state, physicsClientId=self._client)
-        pybullet.removeState(state, physicsClientId=self._client)
+        self._world.restoreState(state)
+        self._world.removeState(state)
         return self._normal_force
 
     def _follow(self, start: float, end: float) -> None:
@@ -136,7 +131,7 @@ class PybulletBall:
 
     def _contact(self) -> tuple[float, Any]:
         """Normal force and friction on the ball in the last step [N]."""
-        points = pybullet.getContactPoints(self._ball, self._plane, physicsClientId=self._client)
+        points = self._world.getContactPoints(self._ball, self._plane)
         if not points:
             return 0.0, np.zeros(3)
         _, _, _, _, _, _, _, _, _, N, f1, d1, f2, d2 = points[0]
@@ -144,17 +139,11 @@ class PybulletBall:
 
     def _pose(self) -> tuple[Sequence[float], Sequence[float]]:
         """Centre [m] and orientation, scalar last."""
-        found: tuple[Sequence[float], Sequence[float]] = pybullet.getBasePositionAndOrientation(
-            self._ball, physicsClientId=self._client
-        )
-        return found
+        return self._world.getBasePositionAndOrientation(self._ball)
 
     def _velocities(self) -> tuple[Sequence[float], Sequence[float]]:
         """Of the centre [m/s], and angular [rad/s]."""
-        found: tuple[Sequence[float], Sequence[float]] = pybullet.getBaseVelocity(
-            self._ball, physicsClientId=self._client
-        )
-        return found
+        return self._world.getBaseVelocity(self._ball)
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; the force is that of the last step, and none at time 0."""
@@ -163,17 +152,17 @@ class PybulletBall:
         force = None
         if self._steps:
             N, friction = self._contact()
-            plane = pybullet.getBasePositionAndOrientation(self._plane, physicsClientId=self._client)[1]
-            normal = np.array(pybullet.getMatrixFromQuaternion(plane)).reshape(3, 3)[:, 2]
+            plane = self._world.getBasePositionAndOrientation(self._plane)[1]
+            normal = np.array(self._world.getMatrixFromQuaternion(plane)).reshape(3, 3)[:, 2]
             force = N * normal + friction
         sticking = self._status == "stick" if self._bounded else None
         return Sample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force, sticking)
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`."""
-        told = pybullet.getDynamicsInfo(self._ball, -1, physicsClientId=self._client)
-        mu = float(told[1]) * float(pybullet.getDynamicsInfo(self._plane, -1, physicsClientId=self._client)[1])
-        shape = pybullet.getCollisionShapeData(self._ball, -1, physicsClientId=self._client)[0]
+        told = self._world.getDynamicsInfo(self._ball, -1)
+        mu = float(told[1]) * float(self._world.getDynamicsInfo(self._plane, -1)[1])
+        shape = self._world.getCollisionShapeData(self._ball, -1)[0]
         f = self._body.contact.rolling_resistance
         terms = {BallCapability.ORIENTATION}
         terms |= {BallCapability.BOUNDED_FRICTION} if self._bounded else set()
@@ -184,7 +173,7 @@ class PybulletBall:
         return Built(
             mass=float(told[0]),
             inertia=np.array(told[2], dtype=np.float64),
-            gravity=gravity_of(self._client),
+            gravity=self._world.gravity(),
             ball_radius=float(shape[3][0]),
             rolling_resistance=f,
             mu_static=mu,

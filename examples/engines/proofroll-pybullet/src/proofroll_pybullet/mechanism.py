@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pybullet
 
 from proofroll.core.engine import Regularised, Sample, whole_steps
 from proofroll.core.errors import Diverged, Refused
@@ -23,7 +22,7 @@ from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
 from proofroll_pybullet.settings import PybulletSettings
-from proofroll_pybullet.world import connected, gravity_of
+from proofroll_pybullet.world import World
 
 _CAPABILITY = MechanismCapability
 PROVIDES: frozenset[str] = frozenset(
@@ -51,14 +50,14 @@ class PybulletMechanism:
                 raise Refused(f"{body.name} has no mass; PyBullet would take it for a part of the world")
         self._mechanism, self._settings, self._steps = mechanism, settings, 0
         self._tree = Tree(mechanism)
-        self._client = client = connected(self, mechanism.gravity, settings)
+        self._world = World(mechanism.gravity, settings)
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "mechanism.urdf"
             file.write_text(urdf(mechanism), encoding="utf-8")
-            flags = pybullet.URDF_USE_INERTIA_FROM_FILE  # else it weighs collision shapes, of which there are none
-            self._robot = pybullet.loadURDF(str(file), useFixedBase=True, flags=flags, physicsClientId=client)
-        count = pybullet.getNumJoints(self._robot, physicsClientId=client)
-        told = [pybullet.getJointInfo(self._robot, index, physicsClientId=client) for index in range(count)]
+            flags = self._world.URDF_USE_INERTIA_FROM_FILE  # else it weighs collision shapes, of which there are none
+            self._robot = self._world.loadURDF(str(file), useFixedBase=True, flags=flags)
+        count = self._world.getNumJoints(self._robot)
+        told = [self._world.getJointInfo(self._robot, index) for index in range(count)]
         self._links = {info[12].decode(): index for index, info in enumerate(told)} | {WORLD: -1}
         self._joints = [self._links[joint.child] for joint in mechanism.joints]
         self._forced = [joint for joint in mechanism.joints if joint.torque or joint.stiffness or joint.damping]
@@ -68,11 +67,11 @@ class PybulletMechanism:
             for far in held_points(mechanism, loop):  # one point alone leaves a revolute loop in space free to turn
                 on_a = self._from_com(loop.body_a, loop.position_a + far * loop.frame_a[:, 2])
                 on_b = self._from_com(loop.body_b, loop.position_b + far * loop.frame_b[:, 2])
-                held = pybullet.createConstraint(
+                held = self._world.createConstraint(
                     self._robot, self._links[loop.body_a], self._robot, self._links[loop.body_b],
-                    pybullet.JOINT_POINT2POINT, [0, 0, 1], on_a, on_b, physicsClientId=client,
+                    self._world.JOINT_POINT2POINT, [0, 0, 1], on_a, on_b,
                 )  # fmt: skip
-                pybullet.changeConstraint(held, maxForce=_LARGE, physicsClientId=client)
+                self._world.changeConstraint(held, maxForce=_LARGE)
 
     @classmethod
     def build(cls, scene: Scene, settings: PybulletSettings) -> PybulletMechanism:
@@ -81,21 +80,20 @@ class PybulletMechanism:
 
     def _start(self, joint: Joint, index: int) -> None:
         """Puts a joint where it starts, without the motor that PyBullet gives it to hold it."""
-        robot, client = self._robot, self._client
+        robot = self._robot
         if self._settings.preset == "matched":
-            pybullet.changeDynamics(
+            self._world.changeDynamics(
                 robot, index, linearDamping=0, angularDamping=0, jointDamping=0, maxJointVelocity=_LARGE,
-                physicsClientId=client,
             )  # fmt: skip
         if joint.nv == 1:
-            pybullet.resetJointState(robot, index, joint.q0[0], joint.v0[0], physicsClientId=client)
-            pybullet.setJointMotorControl2(robot, index, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+            self._world.resetJointState(robot, index, joint.q0[0], joint.v0[0])
+            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=0)
         elif joint.nv == 3:
             q = [*joint.q0[1:], joint.q0[0]]
-            pybullet.resetJointStateMultiDof(robot, index, q, list(joint.v0), physicsClientId=client)
-            pybullet.setJointMotorControlMultiDof(
-                robot, index, pybullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1], positionGain=0, velocityGain=0,
-                force=[0, 0, 0], physicsClientId=client,
+            self._world.resetJointStateMultiDof(robot, index, q, list(joint.v0))
+            self._world.setJointMotorControlMultiDof(
+                robot, index, self._world.POSITION_CONTROL, targetPosition=[0, 0, 0, 1], positionGain=0, velocityGain=0,
+                force=[0, 0, 0],
             )  # fmt: skip
 
     def _from_com(self, body: str, position: Any) -> list[float]:
@@ -106,16 +104,14 @@ class PybulletMechanism:
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
-        dt, client = self._settings.dt, self._client
+        dt = self._settings.dt
         for _ in range(whole_steps(self._steps * dt, t, dt)):
             for joint in self._forced:
                 index = self._links[joint.child]
-                q, v, *_ = pybullet.getJointState(self._robot, index, physicsClientId=client)
+                q, v, *_ = self._world.getJointState(self._robot, index)
                 force = joint.torque - joint.stiffness * (q - joint.rest) - joint.damping * v
-                pybullet.setJointMotorControl2(
-                    self._robot, index, pybullet.TORQUE_CONTROL, force=force, physicsClientId=client
-                )
-            pybullet.stepSimulation(physicsClientId=client)
+                self._world.setJointMotorControl2(self._robot, index, self._world.TORQUE_CONTROL, force=force)
+            self._world.stepSimulation()
             self._steps += 1
         if not all(map(math.isfinite, self._state()[1])):
             raise Diverged(f"PyBullet's joint velocities are not finite at t = {t:g} s")
@@ -126,10 +122,10 @@ class PybulletMechanism:
         v: list[float] = []
         for joint, index in zip(self._mechanism.joints, self._joints, strict=True):
             if joint.nv == 1:
-                place, rate, *_ = pybullet.getJointState(self._robot, index, physicsClientId=self._client)
+                place, rate, *_ = self._world.getJointState(self._robot, index)
                 q, v = [*q, place], [*v, rate]
             elif joint.nv == 3:
-                turned, rates, *_ = pybullet.getJointStateMultiDof(self._robot, index, physicsClientId=self._client)
+                turned, rates, *_ = self._world.getJointStateMultiDof(self._robot, index)
                 q, v = [*q, turned[3], *turned[:3]], [*v, *rates]
         return np.array(q), np.array(v)
 
@@ -143,7 +139,7 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         mass, com, inertia = [], [], []
         for body in self._mechanism.bodies:
-            told = pybullet.getDynamicsInfo(self._robot, self._links[body.name], physicsClientId=self._client)
+            told = self._world.getDynamicsInfo(self._robot, self._links[body.name])
             x, y, z, w = told[4]
             R = from_quaternion((w, x, y, z))
             mass.append(told[0])
@@ -152,7 +148,7 @@ class PybulletMechanism:
         moves = bool(self._mechanism.loops) and bool(np.any(self._mechanism.start()[1]))
         soft = {name: Regularised(1.0, _ROWS) for name in ("acceleration", "angular_acceleration") if moves}
         return MechanismBuilt(
-            np.array(mass), np.array(com), np.array(inertia), gravity=gravity_of(self._client), regularised=soft
+            np.array(mass), np.array(com), np.array(inertia), gravity=self._world.gravity(), regularised=soft
         )
 
 

@@ -1,8 +1,9 @@
-"""A world of PyBullet for one model: connected, and closed with the model."""
+"""PyBullet's functions and constants for one model."""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import weakref
 from collections.abc import Sequence
 from typing import Any
@@ -13,29 +14,31 @@ import pybullet
 from proofroll_pybullet.settings import PybulletSettings
 
 
-def connected(owner: Any, gravity: Sequence[float], settings: PybulletSettings) -> int:
-    """Number of a world that ends with its owner."""
-    client: int = pybullet.connect(pybullet.DIRECT)
-    weakref.finalize(owner, _disconnect, client)
-    pybullet.setGravity(*gravity, physicsClientId=client)
-    pybullet.setTimeStep(settings.dt, physicsClientId=client)
-    pybullet.setPhysicsEngineParameter(
-        numSolverIterations=settings.iterations, enableFileCaching=0, physicsClientId=client
-    )
-    if settings.preset == "matched":  # nothing is soft, and nothing is corrected in two ways
-        pybullet.setPhysicsEngineParameter(
-            erp=1, contactERP=1, frictionERP=0, contactSlop=0, globalCFM=0, useSplitImpulse=0,
-            solverResidualThreshold=0, physicsClientId=client,
-        )  # fmt: skip
-    return client
+class World:
+    """What the module ``pybullet`` has, for a world of its own, which ends with this."""
+
+    def __init__(self, gravity: Sequence[float], settings: PybulletSettings) -> None:
+        self._number = pybullet.connect(pybullet.DIRECT)
+        weakref.finalize(self, _disconnect, self._number)
+        self.setGravity(*gravity)
+        self.setTimeStep(settings.dt)
+        self.setPhysicsEngineParameter(numSolverIterations=settings.iterations, enableFileCaching=0)
+        if settings.preset == "matched":  # nothing is soft, and nothing is corrected in two ways
+            self.setPhysicsEngineParameter(
+                erp=1, contactERP=1, frictionERP=0, contactSlop=0, globalCFM=0, useSplitImpulse=0,
+                solverResidualThreshold=0,
+            )  # fmt: skip
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(pybullet, name)
+        return functools.partial(found, physicsClientId=self._number) if callable(found) else found
+
+    def gravity(self) -> Any:
+        """As PyBullet has it [m/s²], shape (3,)."""
+        told = self.getPhysicsEngineParameters()
+        return np.array([told[f"gravityAcceleration{axis}"] for axis in "XYZ"])
 
 
-def gravity_of(client: int) -> Any:
-    """As PyBullet has it [m/s²], shape (3,)."""
-    told = pybullet.getPhysicsEngineParameters(physicsClientId=client)
-    return np.array([told[f"gravityAcceleration{axis}"] for axis in "XYZ"])
-
-
-def _disconnect(client: int) -> None:
+def _disconnect(number: int) -> None:
     with contextlib.suppress(pybullet.error):  # the interpreter may be ending
-        pybullet.disconnect(client)
+        pybullet.disconnect(number)
