@@ -1,4 +1,4 @@
-"""A mechanism in MuJoCo: start, steps, and what is read back."""
+"""A mechanism in MuJoCo: start, steps, and what is read back of its model and its states."""
 
 from __future__ import annotations
 
@@ -9,20 +9,28 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.core.engine import Sample
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.joint import child_in_parent
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
-from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of, unsaid
+from proofroll.elements.mechanism.sampling import (
+    DEPENDENT,
+    WITH_AXIS,
+    MechanismBuilt,
+    independent,
+    mechanism_of,
+    unsaid,
+)
 from proofroll.engines.mujoco import mechanism_model
-from proofroll.engines.mujoco.mechanism_built import read_back
-from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
+from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, mass_matrix, silent
 from proofroll.engines.mujoco.settings import MujocoSettings, check
 
 _CAPABILITY = MechanismCapability
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+# The answer of hard loops has round-off of its own, most where rows depend on each other.
+_MARGIN = 1.1
 PROVIDES = (
     ALL_JOINTS
     | FORCES
@@ -136,7 +144,71 @@ class MujocoMechanism(SteppedModel):
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        return read_back(self._model, self._evaluated(), self._mechanism, self._settings.impedances[0])
+        model, data, bodies, joints = self._model, self._evaluated(), self._bodies, self._mechanism.joints
+        axes = np.zeros((len(bodies), 9))
+        for flat, body in zip(axes, bodies, strict=True):
+            mujoco.mju_quat2Mat(flat, model.body_iquat[body])
+        R = axes.reshape(-1, 3, 3)
+        rows = self._equality_rows(data)
+        rank = independent(rows)
+        found = self._accelerations(data)
+        return MechanismBuilt(
+            mass=model.body_mass[bodies].copy(),
+            com=model.body_ipos[bodies].copy(),
+            inertia=np.einsum("nij,nj,nkj->nik", R, model.body_inertia[bodies], R),
+            joint_position=np.array([data.site(f"{number}").xpos for number in range(len(joints))]),
+            joint_axis=np.array([self._axis(data, number, joint.kind) for number, joint in enumerate(joints)]),
+            gravity=model.opt.gravity.copy(),
+            rows=len(rows),
+            rank=rank,
+            mobility=int(model.nv) - rank,
+            acceleration=found["acceleration"],
+            angular_acceleration=found["angular_acceleration"],
+            regularised=self._softened(data, rows, found) if len(rows) else {},
+        )
+
+    def _axis(self, data: Any, number: int, kind: str) -> Array:
+        """Of the turning or sliding along z of a joint's frame, in the world."""
+        if kind not in WITH_AXIS:
+            return np.full(3, np.nan)
+        part = 0 if kind == "universal" else len(mechanism_model.PARTS[kind]) - 1
+        return np.array(data.xaxis[self._model.joint(f"{number}.{part}").id])
+
+    def _equality_rows(self, data: Any) -> Array:
+        """Rows of the equality constraints on MuJoCo's velocities, shape (rows, nv)."""
+        J = np.zeros((data.nefc, self._model.nv))
+        if data.ne and mujoco.mj_isSparse(self._model):
+            mujoco.mju_sparse2dense(J, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
+        elif data.ne:
+            J[:] = np.reshape(data.efc_J, J.shape)
+        return J[: data.ne]
+
+    def _accelerations(self, data: Any) -> dict[str, Array]:
+        """Of the bodies' origins, and angular, shape (bodies, 3) each."""
+        mujoco.mj_rnePostConstraint(self._model, data)
+        found = np.zeros((len(self._bodies), 6))
+        for row, body in zip(found, self._bodies, strict=True):
+            mujoco.mj_objectAcceleration(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
+        # MuJoCo's are those that a sensor feels
+        return {"acceleration": found[:, 3:] + self._model.opt.gravity, "angular_acceleration": found[:, :3].copy()}
+
+    def _softened(self, data: Any, rows: Array, soft: dict[str, Array]) -> dict[str, Regularised]:
+        """What MuJoCo's soft loops change: its answer against that of its own matrices with hard loops.
+
+        Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus
+        what softness explains and no more: rows that are wrong or missing are so in both answers.
+        """
+        into = np.linalg.solve(mass_matrix(self._model, data), rows.T)
+        without = data.qacc - into @ data.efc_force[: data.ne]
+        missing = data.efc_aref[: data.ne] - rows @ without
+        data.qacc[:] = without + into @ np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing
+        at_rest = self._settings.impedances[0]
+        because = f"loops are soft, of impedance {at_rest:g} at rest; hard ones would change that much"
+        found = {}
+        for name, hard in self._accelerations(data).items():
+            difference = float(np.abs(hard - soft[name]).max() / max(np.abs(hard).max(), np.finfo(float).tiny))
+            found[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
+        return found
 
     def _evaluate(self, data: Any) -> None:
         self._model.opt.disableflags &= ~_NO_SENSORS
