@@ -41,15 +41,13 @@ class CutApart:
             self.root[k : k + 3, k : k + 3] = np.eye(3) / np.sqrt(body.mass)
             self.root[k + 3 : k + 6, k + 3 : k + 6] = np.linalg.inv(np.linalg.cholesky(self.inertia[i])).T
         self.weight = np.array([body.mass for body in bodies])[:, None] * self.gravity
-        ends = [
-            (j.parent, j.child, j.position, j.child_position, j.parent_frame, j.child_frame) for j in mechanism.joints
-        ] + [(c.body_a, c.body_b, c.position_a, c.position_b, c.frame_a, c.frame_b) for c in mechanism.loops]
-        com = np.vstack([self.com, np.zeros(3)])
-        self.a = np.array([index[end[0]] % (n + 1) for end in ends])
-        self.b = np.array([index[end[1]] % (n + 1) for end in ends])
-        self.at_a = np.array([end[2] for end in ends]) - com[self.a]
-        self.at_b = np.array([end[3] for end in ends]) - com[self.b]
-        self.A, self.B = np.array([end[4] for end in ends])[:, :, :2], np.array([end[5] for end in ends])[:, :, 2]
+        ends, com = mechanism.connections, np.vstack([self.com, np.zeros(3)])
+        self.a = np.array([index[end.a] % (n + 1) for end in ends])
+        self.b = np.array([index[end.b] % (n + 1) for end in ends])
+        self.at_a = np.array([end.position_a for end in ends]) - com[self.a]
+        self.at_b = np.array([end.position_b for end in ends]) - com[self.b]
+        self.A = np.array([end.frame_a for end in ends])[:, :, :2]
+        self.B = np.array([end.frame_b for end in ends])[:, :, 2]
         self.rank = 0
         motion = Tree(mechanism).at(*mechanism.start())
         R, w = motion.R_WB[:n], motion.w_WB[:n]

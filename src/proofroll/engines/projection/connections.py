@@ -81,24 +81,18 @@ class ProjectedConnections:
         count, index = len(mechanism.bodies), mechanism.body_index
         self._count = count
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
-        cut = [
-            (j.kind, j.parent, j.child, j.position, j.child_position, j.parent_frame, j.child_frame)
-            for j in mechanism.joints
-        ] + [
-            (loop.kind, loop.body_a, loop.body_b, loop.position_a, loop.position_b, loop.frame_a, loop.frame_b)
-            for loop in mechanism.loops
-        ]
-        self.a = np.array([index[item[1]] % (count + 1) for item in cut], dtype=np.intp)
-        self.b = np.array([index[item[2]] % (count + 1) for item in cut], dtype=np.intp)
-        at_a = np.array([item[3] for item in cut]) - com[self.a]
-        at_b = np.array([item[4] for item in cut]) - com[self.b]
-        self._at_a = np.concatenate([np.array([item[5] for item in cut]), at_a[:, :, None]], axis=2)
-        self._at_b = np.concatenate([np.array([item[6] for item in cut]), at_b[:, :, None]], axis=2)
-        points = [(number, k) for number, item in enumerate(cut) for k in FACTS[item[0]].translations]
-        angles = [(number, *pair) for number, item in enumerate(cut) for pair in FACTS[item[0]].rotations]
+        cut = mechanism.connections
+        self.a = np.array([index[item.a] % (count + 1) for item in cut], dtype=np.intp)
+        self.b = np.array([index[item.b] % (count + 1) for item in cut], dtype=np.intp)
+        at_a = np.array([item.position_a for item in cut]) - com[self.a]
+        at_b = np.array([item.position_b for item in cut]) - com[self.b]
+        self._at_a = np.concatenate([np.array([item.frame_a for item in cut]), at_a[:, :, None]], axis=2)
+        self._at_b = np.concatenate([np.array([item.frame_b for item in cut]), at_b[:, :, None]], axis=2)
+        points = [(number, k) for number, item in enumerate(cut) for k in FACTS[item.kind].translations]
+        angles = [(number, *pair) for number, item in enumerate(cut) for pair in FACTS[item.kind].rotations]
         self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
         self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
-        locked = np.array([len(FACTS[item[0]].translations) for item in cut], dtype=np.intp)
+        locked = np.array([len(FACTS[item.kind].translations) for item in cut], dtype=np.intp)
         # whether a row's direction moves with body a
         self._moves = (locked[self._point] < 3)[:, None]
         self._moving, self._fixed = self._moves.astype(float), np.eye(3)[self._axis]
