@@ -1,8 +1,8 @@
 """Exudyn without the adapter: one call of its solver over the whole horizon, with sensors that keep the samples.
 
-The model in minimal coordinates is built here. For the three with rigid bodies the items and their consistent start
-come from the adapter's builders, since a user would add the same ones; all user functions that run while Exudyn
-integrates are written here, for the vertical cylinder.
+The model in minimal coordinates is built here. For mechanisms, and for the three with a rigid ball, the items and their
+consistent start come from the adapter's builders, since a user would add the same ones; all user functions that run
+while Exudyn integrates are written here, for the vertical cylinder.
 """
 
 from __future__ import annotations
@@ -14,42 +14,45 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.integration import new_system, simulation_settings
 from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
-from proofroll_benchmarks.bare.mechanisms import exudyn_solver
 
 Start = tuple[FloatArray, FloatArray]
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`; with bounded friction ``generic`` watches for slip, and ends there."""
+    restarted = "Newton's method is restarted at every sample, and ends within its tolerance"
     if is_mechanism(scene):
-        return exudyn_solver(scene, settings)
+        return Bare(_mechanism(scene, settings), 1e-7, restarted)
     body = in_vertical_cylinder(scene)
     loop = {"generic": _generic, "carrier": _carrier, "rolling_disc": _rolling_disc, "contact": _contact}
-    tolerances = {
-        # Newton's method is restarted at every sample by the adapter, and stops anywhere within its tolerance.
-        "contact": (
-            1e-8,
-            "Newton's method is restarted at every sample, and the stiff contact magnifies what it leaves",
-        ),
-    }
-    tolerance, because = tolerances.get(
-        settings.formulation, (1e-9, "Newton's method is restarted at every sample, and ends within its tolerance")
-    )
-    return Bare(loop[settings.formulation](body, settings), tolerance, because)
+    run = loop[settings.formulation](body, settings)
+    if settings.formulation == "contact":
+        return Bare(run, 1e-8, f"{restarted}, which the stiff contact magnifies")
+    return Bare(run, 1e-9, restarted)
 
 
-def _solve(system: Any, settings: Any, times: FloatArray, start: Start | None, stopped: list[str]) -> None:
+def _solve(
+    system: Any,
+    settings: Any,
+    times: FloatArray,
+    start: Start | None = None,
+    stopped: Sequence[str] = (),
+    *,
+    dependent: bool = False,
+) -> None:
     """Exudyn's solver over the whole time, without its stopwatches; ``stopped`` says why a user function ended it."""
-    options = simulation_settings(settings)
+    options = simulation_settings(settings, dependent=dependent)
     time = options.timeIntegration
     time.numberOfSteps, time.endTime = round(float(times[-1]) / settings.dt), float(times[-1])
     options.solution.sensors.active = True
@@ -78,6 +81,25 @@ def _sensors(system: Any, node: Any, forces: Sequence[tuple[Any, Any]], state: S
         system.AddSensor(
             items.SensorObject(objectNumber=item, storeInternal=True, writeToFile=False, outputVariableType=variable)
         )
+
+
+def _mechanism(scene: Scene, settings: Any) -> Callable[[FloatArray], FloatArray]:
+    if settings.formulation != "redundant":
+        raise Refused("there is a bare loop of mechanisms only for redundant coordinates")
+    built = Redundant(scene, settings)
+    system, dependent = built.system, built.integration.options.linearSolver.ignoreSingularJacobian
+    origins = [(built.bodies[body.name], [-float(x) for x in body.com]) for body in mechanism_of(scene).bodies]
+    for number, place in origins:
+        for variable in (Output.Position, Output.Velocity, Output.AngularVelocity, Output.RotationMatrix):
+            kept = {"storeInternal": True, "writeToFile": False, "outputVariableType": variable}
+            system.AddSensor(items.SensorBody(bodyNumber=number, localPosition=place, **kept))
+    system.Assemble()
+
+    def run(times: FloatArray) -> FloatArray:
+        _solve(system, settings, times, dependent=dependent)
+        return np.array([system.GetObjectOutputBody(number, Output.Position, place) for number, place in origins])
+
+    return run
 
 
 def _generic(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:
@@ -142,7 +164,7 @@ def _generic(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
     system.Assemble()
 
     def run(times: FloatArray) -> FloatArray:
-        _solve(system, settings, times, None, stopped)
+        _solve(system, settings, times, stopped=stopped)
         out, angle, height = system.systemData.GetODE2Coordinates()[:3].tolist()
         return np.array([(c + out) * math.cos(angle), (c + out) * math.sin(angle), height])
 

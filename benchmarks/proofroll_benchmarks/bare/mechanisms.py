@@ -1,7 +1,7 @@
-"""Mechanisms without adapters: MuJoCo's and Exudyn's own loops, and plain numpy around Pinocchio's terms.
+"""Steps of scipy and of Runge and Kutta, and mechanisms of revolute joints by these: plain numpy around terms.
 
-Models come from the adapters' builders, since a user would make the same bodies, joints and constraints; what runs in
-time is written here, for revolute joints and loops. Each engine is imported where it is used.
+Pinocchio's model comes from the adapter's builder, since a user would make the same bodies and joints; what runs in
+time is written here.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from scipy.integrate import DOP853
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
@@ -18,74 +19,6 @@ from proofroll.elements.mechanism.sampling import independent, mechanism_of
 from proofroll_benchmarks.bare import Bare
 
 _SAME_STEPS = "the same steps; sums are in another order"
-_RESTARTED = "Newton's method is restarted at every sample by the adapter, and ends anywhere within its tolerance"
-
-
-def mujoco_steps(scene: Scene, settings: Any) -> Bare:
-    """``mj_step`` from sample to sample, without the sensors that only a sample asks for."""
-    import mujoco
-
-    from proofroll.engines.mujoco.mechanism import MujocoMechanism
-
-    model, data = MujocoMechanism(scene, settings).native
-    model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-    bodies = [model.body(body.name).id for body in mechanism_of(scene).bodies]
-    bad = mujoco.mjtWarning.mjWARN_BADQACC
-
-    def run(times: FloatArray) -> FloatArray:
-        for interval in np.diff(times).tolist():
-            mujoco.mj_step(model, data, round(interval / settings.dt))
-            if data.warning[bad].number:
-                raise Diverged("MuJoCo's accelerations are not finite or huge")
-        mujoco.mj_forward(model, data)
-        return np.array(data.xpos[bodies])
-
-    return Bare(run, 1e-12, _SAME_STEPS)
-
-
-def exudyn_solver(scene: Scene, settings: Any) -> Bare:
-    """One call of Exudyn's solver over the whole time, with sensors that keep what a sample would tell."""
-    from proofroll.engines.exudyn.integration import simulation_settings
-    from proofroll.engines.exudyn.native import Output, exu, items
-    from proofroll.engines.exudyn.redundant import Redundant
-
-    if settings.formulation != "redundant":
-        raise Refused("there is a bare loop of mechanisms only for redundant coordinates")
-    built = Redundant(scene, settings)
-    system, bodies, mechanism = built.system, built.bodies, mechanism_of(scene)
-    dependent = built.integration.options.linearSolver.ignoreSingularJacobian
-    kept: dict[str, int] = {}
-    for body in mechanism.bodies:
-        for variable in (Output.Position, Output.Velocity, Output.AngularVelocity, Output.RotationMatrix):
-            number = system.AddSensor(
-                items.SensorBody(
-                    bodyNumber=bodies[body.name],
-                    localPosition=[-float(x) for x in body.com],
-                    storeInternal=True,
-                    writeToFile=False,
-                    outputVariableType=variable,
-                )
-            )
-            if variable == Output.Position:
-                kept[body.name] = number
-    system.Assemble()
-    options = simulation_settings(settings, dependent=dependent)
-    options.solution.sensors.active = True
-    solver = exu.MainSolverImplicitSecondOrder()
-
-    def run(times: FloatArray) -> FloatArray:
-        time = options.timeIntegration
-        time.numberOfSteps, time.endTime = round(float(times[-1]) / settings.dt), float(times[-1])
-        options.solution.sensors.writePeriod = float(times[1])
-        solver.InitializeSolver(system, options)
-        timer = solver.timer
-        timer.useTimer = False
-        solver.timer = timer
-        if not solver.SolveSteps(system, options):
-            raise Diverged("Exudyn's solver failed")
-        return np.array([system.GetSensorStoredData(kept[body.name])[-1, 1:4] for body in mechanism.bodies])
-
-    return Bare(run, 1e-7, _RESTARTED)
 
 
 def pinocchio_null_space(scene: Scene, settings: Any) -> Bare:
@@ -174,6 +107,19 @@ def projection_rows(scene: Scene, settings: Any) -> Bare:
         return bodies.origins(_rk4(bodies.rates, bodies.start, times, settings.dt, after))
 
     return Bare(run, 1e-10, _SAME_STEPS)
+
+
+def dop853(solver: DOP853, times: FloatArray, accepted: Callable[[DOP853, float], None]) -> None:
+    """Steps of which one ends at each time; ``accepted`` may change the state after each of them."""
+    for t in times[1:].tolist():
+        solver.t_bound, solver.status = t, "running"
+        while solver.status == "running":
+            wanted = solver.h_abs
+            if solver.step() is not None:
+                raise Diverged("the step size fell to nothing")
+            if solver.t == t:
+                solver.h_abs = max(wanted, solver.h_abs)
+            accepted(solver, t)
 
 
 def _rk4(

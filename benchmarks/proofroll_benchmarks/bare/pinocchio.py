@@ -1,6 +1,7 @@
 """Pinocchio without the adapter: its kinematics, dynamics and contact solver, with the cylinder's directions by hand.
 
-The models are built here. Rows with rolling run under scipy's DOP853, as the adapter's preset ``matched`` does.
+The models with rows are built here; the plane and its solver come from the adapter's builder. Rows with rolling run
+under scipy's DOP853, as the adapter's preset ``matched`` does.
 """
 
 from __future__ import annotations
@@ -17,11 +18,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION
+from proofroll.engines.pinocchio.plane_contact import PlaneContact
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
-from proofroll_benchmarks.bare.mechanisms import pinocchio_null_space
-
-# What the adapter gives Pinocchio's cone where friction is unbounded.
-_UNBOUNDED = 1e6
+from proofroll_benchmarks.bare.mechanisms import dop853, pinocchio_null_space
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
@@ -200,88 +200,54 @@ def _rows_run(
         q[:n], v = y[:n], y[n:]
         return np.concatenate([v[:n], mechanism.respond(q, v)])
 
+    def accepted(solver: DOP853, t: float) -> None:
+        q[:n] = solver.y[:n]
+        v = mechanism.project(q, solver.y[n:])
+        solver.y = np.concatenate([q[:n], v])
+        solver.f = rates(solver.t, solver.y)
+        friction, press = mechanism.contact(v)
+        if press < 0 or friction > mu * press:
+            raise Diverged(f"the ball slips or leaves the wall at {t:g} s, for which there is no bare loop")
+
     def run(times: FloatArray) -> FloatArray:
         start = np.concatenate([q[:n], mechanism.v])
         # A hundredth of the natural sizes, for components in turning axes pass through zero all the time.
         atol = 1e-2 * settings.rtol * mechanism.sizes
         solver = DOP853(rates, 0.0, start, np.inf, rtol=settings.rtol, atol=atol)
-        for t in times[1:].tolist():
-            solver.t_bound, solver.status = t, "running"
-            while solver.status == "running":
-                wanted = solver.h_abs
-                if solver.step() is not None:
-                    raise Diverged("the step size fell to nothing")
-                if solver.t == t:
-                    solver.h_abs = max(wanted, solver.h_abs)
-                q[:n] = solver.y[:n]
-                v = mechanism.project(q, solver.y[n:])
-                solver.y = np.concatenate([q[:n], v])
-                solver.f = rates(solver.t, solver.y)
-                friction, press = mechanism.contact(v)
-                if press < 0 or friction > mu * press:
-                    raise Diverged(f"the ball slips or leaves the wall at {t:g} s, for which there is no bare loop")
+        dop853(solver, times, accepted)
         return mechanism.centre(q)
 
     return run
-
-
-class _PlaneContact:
-    """Translation and spherical joint, a plane that is posed anew, and Pinocchio's solver of contact with friction."""
-
-    def __init__(self, body: RollingBall, settings: Any) -> None:
-        model = self.model = pin.Model()
-        model.gravity.linear = body.gravity
-        carriage = model.addJoint(0, pin.JointModelTranslation(), pin.SE3.Identity(), "centre")
-        self.ball = model.addJoint(carriage, pin.JointModelSpherical(), pin.SE3.Identity(), "ball")
-        model.appendBodyToJoint(self.ball, _ball(body), pin.SE3.Identity())
-        self.data = model.createData()
-        point = pin.PointContactConstraintModel(model, 0, pin.SE3.Identity(), self.ball, pin.SE3.Identity())
-        self.models, self.datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
-        self.models.append(pin.ConstraintModel(point))
-        self.datas.append(self.models[0].createData())
-        self.point, self.point_data = self.models[0].extract(), self.datas[0].extract()
-        self.solver, self.options, self.result = (
-            pin.PGSConstraintSolver(3),
-            pin.PGSSolverSettings(),
-            pin.PGSSolverResult(),
-        )
-        for name in ("feasibility", "complementarity"):
-            for bound in ("absolute", "relative"):
-                setattr(self.options, f"{bound}_{name}_tol", settings.solver_tolerance)
-        self.q, self.v = np.array([*body.p0, 0.0, 0.0, 0.0, 1.0]), np.concatenate([body.v0, body.w0])
-        # The masses of a ball are the same in every configuration, and off the diagonal there is nothing.
-        self.inverse = np.array(pin.computeMinverse(model, self.data, self.q))
-
-    def solve(self, delassus: Any, free: FloatArray, mu: float) -> tuple[FloatArray, bool]:
-        """Impulse [N s], and whether it is inside the cone."""
-        self.point.setFriction(mu)
-        self.result.reset()
-        if not self.solver.solve(delassus, free, self.models, self.datas, self.options, self.result):
-            raise Diverged("Pinocchio's solver did not converge")
-        impulse = np.array(self.result.retrieveConstraintImpulses())
-        F1, F2, N = impulse.tolist()
-        if N <= 0:
-            raise Diverged("the ball leaves the wall, for which there is no bare loop")
-        return impulse, math.hypot(F1, F2) < mu * N * (1 - 1e-9)
 
 
 def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray]:  # noqa: PLR0915 -- one loop, as a user writes it down
     """Velocity-level steps, each with the plane tangent to the cylinder at the ball."""
     a, c, dt, f = body.ball.radius, body.surface.length_scales[0], settings.dt, body.contact.rolling_resistance
     leapfrog, bounded = settings.integrator == "leapfrog", math.isfinite(body.contact.mu_static)
-    mu_s = body.contact.mu_static if bounded else _UNBOUNDED
-    mu_k = body.contact.mu_kinetic if bounded else _UNBOUNDED
-    known = _PlaneContact(body, settings)
-    model, data, ball, solve, inverse = known.model, known.data, known.ball, known.solve, known.inverse
-    point, point_data = known.point, known.point_data
+    mu_s = body.contact.mu_static if bounded else UNBOUNDED_FRICTION["pgs"]
+    mu_k = body.contact.mu_kinetic if bounded else UNBOUNDED_FRICTION["pgs"]
+    known = PlaneContact(body, "pgs", settings.solver_tolerance)
+    model, data, ball, inverse, point, point_data = (
+        known.model, known.data, known.ball, known.inverse, known.point, known.point_data
+    )  # fmt: skip
     axes, torque, shift = np.zeros((3, 3)), np.zeros(6), np.zeros(3)
     axes[2, 1] = -1.0
     arm, foot = np.zeros(3), np.zeros(3)
     on_wall, on_ball = point.joint1_placement, point.joint2_placement  # what is written there is in the contact
     events: list[tuple[float, bool]] = []
 
+    def solve(delassus: Any, free: FloatArray, mu: float) -> tuple[FloatArray, bool]:
+        """Impulse [N s], and whether it is inside the cone."""
+        impulse = known.impulse(delassus, free, mu)
+        if impulse is None:
+            raise Diverged("Pinocchio's solver did not converge")
+        F1, F2, N = impulse.tolist()
+        if N <= 0:
+            raise Diverged("the ball leaves the wall, for which there is no bare loop")
+        return impulse, math.hypot(F1, F2) < mu * N * (1 - 1e-9)
+
     def run(times: FloatArray) -> FloatArray:
-        q, v, span, sticks, normal_force = known.q, known.v, 0.5 * dt if leapfrog else dt, True, 0.0
+        q, v, span, sticks, normal_force = known.q0, known.v0, 0.5 * dt if leapfrog else dt, True, 0.0
         count = round(float(times[-1]) / dt)
         for number in range(count):
             pin.computeJointJacobians(model, data, q)

@@ -19,7 +19,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
-from proofroll_benchmarks.bare.mechanisms import projection_rows
+from proofroll_benchmarks.bare.mechanisms import dop853, projection_rows
 
 Equations = tuple[FloatArray, Callable[[float, FloatArray], FloatArray], Callable[[FloatArray], FloatArray], FloatArray]
 
@@ -65,20 +65,15 @@ def _run(body: RollingBall, settings: Any, equations: Equations) -> Callable[[Fl
                 check(t + dt, x_now)
         return x_now
 
+    def accepted(solver: DOP853, _: float) -> None:
+        if settings.eliminates:
+            solver.y = eliminated(solver.y)
+            solver.f = rates(solver.t, solver.y)
+        check(solver.t, solver.y)
+
     def controlled_steps(times: FloatArray) -> FloatArray:
         solver = DOP853(rates, 0.0, x, np.inf, rtol=settings.rtol, atol=settings.rtol * _scales(body, n - 2))
-        for t in times[1:].tolist():
-            solver.t_bound, solver.status = t, "running"
-            while solver.status == "running":
-                wanted = solver.h_abs
-                if solver.step() is not None:
-                    raise Diverged("the step size fell to nothing")
-                if solver.t == t:
-                    solver.h_abs = max(wanted, solver.h_abs)
-                if settings.eliminates:
-                    solver.y = eliminated(solver.y)
-                    solver.f = rates(solver.t, solver.y)
-                check(solver.t, solver.y)
+        dop853(solver, times, accepted)
         return np.asarray(solver.y)
 
     def run(times: FloatArray) -> FloatArray:
