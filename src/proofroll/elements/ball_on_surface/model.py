@@ -40,6 +40,15 @@ ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {
 }
 
 
+def terms_held(*, resists: object, slips: object = False, turns: object = False) -> frozenset[str]:
+    """What a model holds besides rolling, if it does; for :attr:`proofroll.core.engine.Built.terms`.
+
+    Rolling resistance, friction that is bounded, and the ball's orientation.
+    """
+    held = {"ROLLING_RESISTANCE": resists, "BOUNDED_FRICTION": slips, "ORIENTATION": turns}
+    return frozenset(BallCapability[name] for name, is_there in held.items() if is_there)
+
+
 @dataclass(frozen=True)
 class Ball:
     """A rigid ball whose central inertia is the same about every axis.

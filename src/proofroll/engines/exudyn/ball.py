@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
 from proofroll.engines.exudyn.friction import slow
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
@@ -62,15 +61,11 @@ class RigidBall:
             gap=gap,
             acceleration=self.system.GetNodeOutput(self.node, Output.Acceleration),
             angular_acceleration=self.system.GetNodeOutput(self.node, Output.AngularAcceleration),
-            terms=frozenset(self._terms()),
+            terms=terms_held(
+                resists="TorqueVector" in loads(self.system),
+                turns=self.system.GetNode(self.node)["nodeType"] == "RigidBodyEP",
+            ),
         )
-
-    def _terms(self) -> Iterator[BallCapability]:
-        """What Exudyn's items hold besides rolling."""
-        if "TorqueVector" in loads(self.system):
-            yield BallCapability.ROLLING_RESISTANCE
-        if self.system.GetNode(self.node)["nodeType"] == "RigidBodyEP":
-            yield BallCapability.ORIENTATION
 
 
 def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatArray, w: FloatArray) -> tuple[Any, Any]:

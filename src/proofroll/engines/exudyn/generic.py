@@ -8,7 +8,6 @@ constant coefficients. What is tested is Exudyn's integration of a system with m
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
 from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
@@ -200,6 +199,7 @@ class Generic(ExudynModel):
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`. Gravity, f and μk stem from the forces Exudyn computed."""
         mass, data = self._mass_matrix(), self.system.systemData
+        slips = isinstance(self.integration, SwitchedIntegration)
         q, q_t, q_tt = data.GetODE2Coordinates(), data.GetODE2Coordinates_t(), data.GetODE2Coordinates_tt()
         tangents, frame = self.local.tangents, self._body.surface.frame(q[1:3])
         acceleration = tangents @ q_tt[1:3] + np.einsum("ijk,j,k->i", self.local.second, q_t[1:3], q_t[1:3])
@@ -212,17 +212,10 @@ class Generic(ExudynModel):
             gravity=self._gravity,
             ball_radius=float(self._rows()[0, 5]),
             rolling_resistance=self._resistance,
-            mu_static=self.integration.mu_static if isinstance(self.integration, SwitchedIntegration) else None,
+            mu_static=self.integration.mu_static if slips else None,
             mu_kinetic=self._mu_kinetic,
             gap=-float(q[0]),
             acceleration=frame @ acceleration,
             angular_acceleration=frame @ angular_acceleration,
-            terms=frozenset(self._terms()),
+            terms=terms_held(resists=self._resistance, slips=slips),
         )
-
-    def _terms(self) -> Iterator[BallCapability]:
-        """What there is besides rolling; rolling resistance if Exudyn computed its moment."""
-        if self._resistance:
-            yield BallCapability.ROLLING_RESISTANCE
-        if isinstance(self.integration, SwitchedIntegration):
-            yield BallCapability.BOUNDED_FRICTION

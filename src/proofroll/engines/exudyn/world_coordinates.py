@@ -17,7 +17,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.engine import Built, Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
 from proofroll.engines.exudyn.ball import resisting
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, items
@@ -95,7 +95,7 @@ class WorldCoordinates(ExudynModel):
             gap=None,
             acceleration=acceleration[:3],
             angular_acceleration=acceleration[3:],
-            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if f else ()),
+            terms=terms_held(resists=f),
         )
 
 

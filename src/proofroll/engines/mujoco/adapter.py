@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self
 
 import mujoco
@@ -15,7 +15,7 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.chart import Chart
@@ -205,18 +205,14 @@ class Mujoco(SteppedModel):
             gap=None if gap is None else float(gap),
             acceleration=acceleration,
             angular_acceleration=turning,
-            terms=frozenset(self._terms()),
+            terms=terms_held(
+                # a contact of six dimensions resists rolling by itself
+                resists=self._formulation.resists or int(model.geom_condim[self._geom]) >= ROLLS,
+                slips=self._friction,
+                turns=int(model.joint("spin").type[0]) in _TURNING_JOINTS,
+            ),
             regularised=softness(self._body, self._settings),
         )
-
-    def _terms(self) -> Iterator[BallCapability]:
-        """What the model and the steps hold besides rolling; a contact of six dimensions resists rolling by itself."""
-        if self._formulation.resists or int(self._model.geom_condim[self._geom]) >= ROLLS:
-            yield BallCapability.ROLLING_RESISTANCE
-        if self._friction is not None:
-            yield BallCapability.BOUNDED_FRICTION
-        if int(self._model.joint("spin").type[0]) in _TURNING_JOINTS:
-            yield BallCapability.ORIENTATION
 
     def _coefficients(self) -> tuple[float, float]:
         """Static and kinetic coefficient of friction that MuJoCo's contact has, or will have."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
     natural_acceleration,
     newton_euler,
 )
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION, ContactSteps
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -79,18 +78,12 @@ class ContactRun(ContactSteps):
                 impulse=0.0 if self.solver == "pgs" else self.tolerance,
                 unbounded=None if self.bounded else self._unbounded,
             ),
-            terms=frozenset(self._terms(lever)),
+            terms=terms_held(
+                resists=lever,
+                slips=contact.friction(self.mu_static) != self._unbounded,
+                turns=contact.model.joints[contact.ball].nq == _QUATERNION,
+            ),
         )
-
-    def _terms(self, lever: float) -> Iterator[BallCapability]:
-        """What there is besides rolling: the torque's lever [m], the cone, and a joint that turns the ball."""
-        contact = self.contact
-        if lever:
-            yield BallCapability.ROLLING_RESISTANCE
-        if contact.friction(self.mu_static) != self._unbounded:
-            yield BallCapability.BOUNDED_FRICTION
-        if contact.model.joints[contact.ball].nq == _QUATERNION:
-            yield BallCapability.ORIENTATION
 
     def events(self) -> tuple[Event, ...]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`; none with unbounded friction."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import Built, Sample
 from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
@@ -93,14 +91,5 @@ class RowsRun:
             gap=mechanism.gap(q),
             acceleration=of_ball.linear.copy(),
             angular_acceleration=of_ball.angular.copy(),
-            terms=frozenset(self._terms(torque)),
+            terms=terms_held(resists=torque.any(), slips=mu_kinetic is not None, turns=self.motion.turns),
         )
-
-    def _terms(self, torque: FloatArray) -> Iterator[BallCapability]:
-        """What there is besides rolling, with the torque of rolling resistance as it is put to the joints."""
-        if torque.any():
-            yield BallCapability.ROLLING_RESISTANCE
-        if self.motion.mu_static is not None:
-            yield BallCapability.BOUNDED_FRICTION
-        if self.motion.turns:
-            yield BallCapability.ORIENTATION

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Self
 
 import numpy as np
@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
 from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
@@ -221,17 +221,8 @@ class Projection:
             mu_kinetic=self._friction.mu_kinetic if self._friction else None,
             acceleration=kin.local.frame @ acceleration[:3],
             angular_acceleration=kin.local.frame @ acceleration[3:],
-            terms=frozenset(self._terms()),
+            terms=terms_held(resists=ball.rolling_resistance, slips=self._bounded, turns=len(x) > _WITHOUT_ORIENTATION),
         )
-
-    def _terms(self) -> Iterator[BallCapability]:
-        """What the equations hold besides rolling."""
-        if self._ball.rolling_resistance:
-            yield BallCapability.ROLLING_RESISTANCE
-        if self._bounded:
-            yield BallCapability.BOUNDED_FRICTION
-        if len(self._motion.x) > _WITHOUT_ORIENTATION:
-            yield BallCapability.ORIENTATION
 
 
 def _scales(body: RollingBall, angles: int) -> FloatArray:

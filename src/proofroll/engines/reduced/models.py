@@ -18,7 +18,7 @@ from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, para
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
 
@@ -67,7 +67,7 @@ class ReducedModel(ABC):
             rolling_resistance=f,
             acceleration=acceleration,
             angular_acceleration=self._turning(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], acceleration),
-            terms=frozenset({BallCapability.ROLLING_RESISTANCE} if f else ()),
+            terms=terms_held(resists=f),
         )
 
     def _turning(self, p: FloatArray, v: FloatArray, w: FloatArray, acceleration: FloatArray) -> FloatArray | None:

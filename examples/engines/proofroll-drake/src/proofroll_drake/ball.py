@@ -19,7 +19,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall, terms_held
 from proofroll_drake.settings import DrakeSettings
 
 PROVIDES: frozenset[str] = ROLLS | {BallCapability.ORIENTATION}
@@ -104,5 +104,5 @@ class DrakeBall:
             rolling_resistance=f,
             acceleration=rates[3:],
             angular_acceleration=rates[:3],
-            terms=frozenset({BallCapability.ORIENTATION} | ({BallCapability.ROLLING_RESISTANCE} if f else set())),
+            terms=terms_held(resists=f, turns=True),
         )

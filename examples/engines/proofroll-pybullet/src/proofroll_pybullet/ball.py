@@ -18,7 +18,7 @@ from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -164,9 +164,6 @@ class PybulletBall:
         mu = float(told[1]) * float(self._world.getDynamicsInfo(self._plane, -1)[1])
         shape = self._world.getCollisionShapeData(self._ball, -1)[0]
         f = self._body.contact.rolling_resistance
-        terms = {BallCapability.ORIENTATION}
-        terms |= {BallCapability.BOUNDED_FRICTION} if self._bounded else set()
-        terms |= {BallCapability.ROLLING_RESISTANCE} if f else set()
         soft = {"acceleration": Regularised(min(1.0, self._bend()), _FLAT)}
         if not self._bounded:
             soft |= {f"1 / {kind} friction": Regularised(1 / UNBOUNDED, _NUMBER) for kind in ("static", "kinetic")}
@@ -178,7 +175,7 @@ class PybulletBall:
             rolling_resistance=f,
             mu_static=mu,
             mu_kinetic=mu,
-            terms=frozenset(terms),
+            terms=terms_held(resists=f, slips=self._bounded, turns=True),
             regularised=soft,
         )
 
