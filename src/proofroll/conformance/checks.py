@@ -12,7 +12,7 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
-from proofroll.conformance.subject import Subject, UnlikeSceneError, explained, lacking, scenes
+from proofroll.conformance.subject import Subject, UnlikeSceneError, explained, lacking, scenes, truth_scenes
 
 # One per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
@@ -142,7 +142,7 @@ def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
             first = cache(partial(_first, engine, settings))
             for check in _OF_PRESETS:
                 yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, first, check)
-            for found, of_found in ((scenes(), _OF_SCENES), (response.truth_scenes(), _OF_TRUTHS)):
+            for found, of_found in ((scenes(), _OF_SCENES), (truth_scenes(), _OF_TRUTHS)):
                 for (name, scene), check in itertools.product(found.items(), of_found):
                     if lacking(engine, formulation, scene):
                         continue  # refused before it is built; that something is left `provides_for_some_scene` holds

@@ -96,14 +96,14 @@ def resolution_and_order_are_told(engine: Any) -> None:
 
 def bad_settings_give_one_line(engine: Any) -> None:
     """A setting that does not exist or makes no sense gives one line with its name and value, not a traceback."""
-    first = next(iter(engine.presets.values()))
-    resolution = next(iter(first.values())).resolution
+    first = next(iter(next(iter(engine.presets.values())).values()))
+    chosen, resolution = {"formulation": first.formulation, "preset": first.preset}, first.resolution
     bad: list[tuple[str, object]] = [("no_such_setting", 1), ("formulation", "no_such"), ("preset", "no_such")]
     if resolution is not None:
         bad += [(resolution, value) for value in (0, -1.0, math.nan, math.inf, "text", None)]
     for name, value in bad:
         try:
-            found = resolve_settings(engine, {**_as_chosen(first), name: value})
+            found = resolve_settings(engine, {**chosen, name: value})
         except InputError as error:
             text = str(error)
             require("\n" not in text, f"the message about {name}={value!r} has more than one line: {text!r}")
@@ -114,9 +114,3 @@ def bad_settings_give_one_line(engine: Any) -> None:
             ) from error
         else:
             raise AssertionError(f"{name}={value!r} was accepted: {found}")
-
-
-def _as_chosen(presets: Any) -> dict[str, str]:
-    """Formulation and preset as a user would write them."""
-    preset = next(iter(presets))
-    return {"formulation": presets[preset].formulation, "preset": preset}

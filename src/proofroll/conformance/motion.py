@@ -13,8 +13,7 @@ from unittest import SkipTest
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.conformance.response import truth_scenes
-from proofroll.conformance.subject import Subject, bits, lacking, require, scenes
+from proofroll.conformance.subject import Subject, bits, lacking, require, scenes, truth_scenes
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError

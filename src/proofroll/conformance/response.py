@@ -5,18 +5,17 @@ from __future__ import annotations
 import dataclasses
 import math
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from unittest import SkipTest
 
 import numpy as np
 
-from proofroll.conformance.subject import Subject, UnlikeSceneError
+from proofroll.conformance.subject import Subject, UnlikeSceneError, truth_scenes
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
 from proofroll.core.dataset import columns_of, scales
 from proofroll.core.first_steps import MOST, first_steps, softness
 from proofroll.core.observable import Role
-from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 
 if TYPE_CHECKING:
@@ -32,16 +31,6 @@ _MOST = 0.1
 # An error is at most twice the change from a step to its half; as much again is spared for the terms beyond the first.
 _MARGIN = 4.0
 _ROUND_OFF = 1e-8
-
-
-def truth_scenes() -> dict[str, Scene]:
-    """Scenes of every kind of element that show a frame taken for another."""
-    return {name: scene for kind in load_element_kinds() for name, scene in _truth_scenes(kind).items()}
-
-
-@cache
-def _truth_scenes(kind: Any) -> dict[str, Scene]:
-    return dict(kind.truth_scenes())
 
 
 def first_steps_fit_the_scene(subject: Subject) -> None:
@@ -89,12 +78,7 @@ def _times(step: float | None) -> FloatArray:
 
 def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:
     """State and first reactions of the engine at all times but the first."""
-    engine = subject.build()
-    samples = [engine.sample()]
-    for t in times[1:].tolist():
-        engine.advance(t)
-        samples.append(engine.sample())
-    found = columns_of(subject.scene, times, samples)
+    found = columns_of(subject.scene, times, subject.samples(times))
     moved = {name: found[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in found}
     reactions = {name for name, item in subject.scene.observables.items() if item.role == Role.REACTION}
     return {  # what an engine does not say of reactions is no error

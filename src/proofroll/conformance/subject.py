@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -30,12 +30,17 @@ _SAMPLES, _PART = 36, 100
 
 def scenes() -> dict[str, Scene]:
     """The scenes on which every kind of element has its engines checked; of each kind the most demanding first."""
-    return {name: scene for kind in load_element_kinds() for name, scene in _scenes(kind).items()}
+    return {name: scene for kind in load_element_kinds() for name, scene in _made(kind.conformance_scenes).items()}
+
+
+def truth_scenes() -> dict[str, Scene]:
+    """Scenes of every kind of element that show a frame taken for another."""
+    return {name: scene for kind in load_element_kinds() for name, scene in _made(kind.truth_scenes).items()}
 
 
 @cache
-def _scenes(kind: Any) -> dict[str, Scene]:
-    return dict(kind.conformance_scenes())
+def _made(by: Callable[[], Mapping[str, Scene]]) -> Mapping[str, Scene]:
+    return by()
 
 
 def lacking(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
@@ -76,6 +81,15 @@ class Subject:
         engine = self.build()
         engine.advance(t)
         return engine
+
+    def samples(self, times: FloatArray) -> list[Sample]:
+        """What the engine gives at times [s], of which the first is 0."""
+        engine = self.build()
+        found = [engine.sample()]
+        for t in times[1:].tolist():
+            engine.advance(t)
+            found.append(engine.sample())
+        return found
 
     def finer(self, factor: float) -> Subject:
         """The same with the resolution (step or tolerance) times ``factor``."""
@@ -150,15 +164,11 @@ def explained(error: UnlikeSceneError) -> str:
         interval = max(math.floor(interval / step), 1) * step
     times = np.asarray(interval * np.arange(_SAMPLES), dtype=np.float64)
     try:
-        engine = subject.build()
-        lines = [line.as_dict() for line in certify(engine, scene)]
+        lines = [line.as_dict() for line in certify(subject.build(), scene)]
         causes = [] if all(line["holds"] for line in lines) else diagnosed(scene, lines, step=step)
         if not causes:
-            samples = [engine.sample()]
-            for t in times[1:].tolist():
-                engine.advance(t)
-                samples.append(engine.sample())
-            causes = diagnosed(scene, lines, from_samples(scene, times, samples), truth(scene, times), step)
+            run = from_samples(scene, times, subject.samples(times))
+            causes = diagnosed(scene, lines, run, truth(scene, times), step)
     except (Diverged, Refused, InputError):
         return sentence  # the check has said what it found; there is no run that tells more
     except Exception as behind:  # anybody's engine, on a longer run than the check made
