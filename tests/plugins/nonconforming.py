@@ -17,14 +17,34 @@ from proofroll.elements.ball_on_surface.element import changed
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 
+FAILS: dict[type[Tiny], str] = {}
 
-class Unannounced(Tiny):
+
+class Breaking(Tiny):
+    """An engine that the check ``breaks`` must notice. Settings of its own are its only preset."""
+
+    def __init_subclass__(cls, breaks: str = "") -> None:
+        """Lists it."""
+        if breaks:
+            FAILS[cls] = breaks
+        if "settings" in vars(cls):
+            cls.presets = {"midpoint": {"matched": cls.settings()}}
+
+    def sample(self) -> Sample:
+        """What it tells, right or not."""
+        return self._told(super().sample())
+
+    def _told(self, right: Sample) -> Sample:
+        return right
+
+
+class Unannounced(Breaking, breaks="name_is_the_entry_point"):
     """No package has an entry point of this name."""
 
     name = "unannounced"
 
 
-class Versionless(Tiny):
+class Versionless(Breaking, breaks="version_is_told"):
     """The version is a number."""
 
     @staticmethod
@@ -33,7 +53,7 @@ class Versionless(Tiny):
         return 2
 
 
-class ProvidesText(Tiny):
+class ProvidesText(Breaking, breaks="provides_capabilities"):
     """Says what it provides in its own words."""
 
     provides: ClassVar[Any] = frozenset({"rolling", BallCapability.ROLLING})
@@ -50,14 +70,13 @@ class MutableSettings:
     order: ClassVar[int] = 2
 
 
-class Mutable(Tiny):
+class Mutable(Breaking, breaks="settings_are_a_frozen_dataclass"):
     """Its settings can be changed after the fact."""
 
     settings = MutableSettings
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": MutableSettings()}}
 
 
-class MixedUp(Tiny):
+class MixedUp(Breaking, breaks="presets_are_complete"):
     """Its preset calls itself something else."""
 
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"default": TinySettings()}}
@@ -73,11 +92,10 @@ class OrderlessSettings(TinySettings):
         return 1.5
 
 
-class Orderless(Tiny):
+class Orderless(Breaking, breaks="resolution_and_order_are_told"):
     """Says no order that is one."""
 
     settings = OrderlessSettings
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": OrderlessSettings()}}
 
 
 @dataclass(frozen=True)
@@ -87,14 +105,13 @@ class LaxSettings(TinySettings):
     dt: float = 1e-3
 
 
-class Lax(Tiny):
+class Lax(Breaking, breaks="bad_settings_give_one_line"):
     """Accepts a negative step."""
 
     settings = LaxSettings
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": LaxSettings()}}
 
 
-class Boastful(Tiny):
+class Boastful(Breaking, breaks="provides_what_it_says"):
     """Says that it provides rolling resistance, and refuses every scene with it."""
 
     @classmethod
@@ -105,13 +122,13 @@ class Boastful(Tiny):
         return super().build(scene, settings)
 
 
-class Floating(Tiny):
+class Floating(Breaking, breaks="provides_for_some_scene"):
     """Provides what no scene requires, and nothing else."""
 
     provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": frozenset({"levitation"})}
 
 
-class Silent(Tiny):
+class Silent(Breaking, breaks="builds_or_refuses"):
     """Refuses without a word."""
 
     @classmethod
@@ -122,7 +139,7 @@ class Silent(Tiny):
         return super().build(scene, settings)
 
 
-class Heavy(Tiny):
+class Heavy(Breaking, breaks="certificate_holds"):
     """Builds a ball of twice the inertia."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -131,7 +148,7 @@ class Heavy(Tiny):
         super().__init__(changed(scene, ball=heavy), settings)
 
 
-class Doubled(Heavy):
+class Doubled(Heavy, breaks="certificate_holds"):
     """Builds a ball of twice the mass, and calls that a softened mass."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -143,7 +160,7 @@ class Doubled(Heavy):
         return _excused(super().built())
 
 
-class Pulled(Tiny):
+class Pulled(Breaking, breaks="certificate_holds"):
     """Lives in one and a half times the gravity, and calls that softened."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -162,19 +179,18 @@ def _excused(built: Built) -> Built:
     return dataclasses.replace(built, regularised=dict.fromkeys(names, excuse))
 
 
-class Mute(Tiny):
+class Mute(Breaking):
     """Says nothing of what it built but what it must, and gives no force."""
 
     def built(self) -> Built:
         """The scene's own resistance, whatever it does with it."""
         return Built(rolling_resistance=self.body.contact.rolling_resistance)
 
-    def sample(self) -> Sample:
-        """The state alone."""
-        return dataclasses.replace(super().sample(), force=None)
+    def _told(self, right: Sample) -> Sample:
+        return dataclasses.replace(right, force=None)
 
 
-class Damped(Mute):
+class Damped(Mute, breaks="first_steps_fit_the_scene"):
     """Its velocity is damped by 4 % per second, and it does not say so."""
 
     def rates(self, x: Any) -> Any:
@@ -182,16 +198,15 @@ class Damped(Mute):
         return super().rates(x) - np.array([0, 0, 0.04, 0.04, 0.04]) * x
 
 
-class Clamped(Mute):
+class Clamped(Mute, breaks="first_steps_fit_the_scene"):
     """Its spin is clamped at 30 rad/s as soon as it moves, and it does not say so."""
 
-    def sample(self) -> Sample:
-        """Never faster."""
-        right = super().sample()
-        return dataclasses.replace(right, w_WB=np.clip(right.w_WB, -30, 30) if self.t else right.w_WB)
+    def _told(self, right: Sample) -> Sample:
+        silent = super()._told(right)
+        return dataclasses.replace(silent, w_WB=np.clip(silent.w_WB, -30, 30) if self.t else silent.w_WB)
 
 
-class Unresisting(Mute):
+class Unresisting(Mute, breaks="first_steps_fit_the_scene"):
     """Says that there is rolling resistance, and ignores it."""
 
     def rates(self, x: Any) -> Any:
@@ -200,27 +215,23 @@ class Unresisting(Mute):
         return reduced_rates(dataclasses.replace(self.body, contact=contact), x)[0]
 
 
-class Drifting(Tiny):
+class Drifting(Breaking, breaks="moves_as_the_truth"):
     """Its position moves by a thousandth faster than its velocity says."""
 
-    def sample(self) -> Sample:
-        """Ahead of itself."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         ahead = self.body.surface.position(self.x[:2] + 1e-3 * self.t * self.x[2:4])
         return dataclasses.replace(right, p_WB=ahead)
 
 
-class Beating(Tiny):
+class Beating(Breaking, breaks="moves_as_the_truth"):
     """Off by a beat that is over at every hundredth of a second, where everybody samples."""
 
-    def sample(self) -> Sample:
-        """A tenth of a millimetre along the wall."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         along = self.body.surface.frame(self.x[:2])[:, 2]
         return dataclasses.replace(right, p_WB=right.p_WB + 1e-4 * np.sin(200 * np.pi * self.t) * along)
 
 
-class Wasteful(Tiny):
+class Wasteful(Breaking, breaks="builds_only_what_is_required"):
     """Carries rolling resistance along where nobody asked for it."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -228,7 +239,7 @@ class Wasteful(Tiny):
         self.resists = True  # a torque of zero is a torque all the same
 
 
-class Thrifty(Tiny):
+class Thrifty(Breaking, breaks="builds_only_what_is_required"):
     """Leaves out what the scene requires."""
 
     def built(self) -> Built:
@@ -236,7 +247,7 @@ class Thrifty(Tiny):
         return dataclasses.replace(super().built(), terms=frozenset())
 
 
-class Turning(Tiny):
+class Turning(Breaking, breaks="builds_only_what_is_required"):
     """Follows the orientation without being asked, and without saying why."""
 
     def built(self) -> Built:
@@ -244,39 +255,32 @@ class Turning(Tiny):
         right = super().built()
         return dataclasses.replace(right, terms=(right.terms or frozenset()) | {BallCapability.ORIENTATION})
 
-    def sample(self) -> Sample:
-        """With an orientation."""
-        return dataclasses.replace(super().sample(), q_WB=np.array([1.0, 0, 0, 0]))
+    def _told(self, right: Sample) -> Sample:
+        return dataclasses.replace(right, q_WB=np.array([1.0, 0, 0, 0]))
 
 
-class Row(Tiny):
+class Row(Breaking, breaks="samples_are_well_formed"):
     """Gives its position as a row of a matrix."""
 
-    def sample(self) -> Sample:
-        """The wrong shape."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         return Sample(right.p_WB[None], right.v_WB, right.w_WB)
 
 
-class Hushed(Tiny):
+class Hushed(Breaking, breaks="samples_are_well_formed"):
     """Gives a force at time 0, and none later."""
 
-    def sample(self) -> Sample:
-        """Falls silent."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         return right if self.t == 0 else dataclasses.replace(right, force=None)
 
 
-class Views(Tiny):
+class Views(Breaking, breaks="reading_back_changes_nothing"):
     """Gives the array that it goes on working with."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
         self.p = np.zeros(3)
 
-    def sample(self) -> Sample:
-        """Overwrites what it gave before."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         self.p[:] = right.p_WB
         return Sample(self.p, right.v_WB, right.w_WB, force=right.force)
 
@@ -286,7 +290,7 @@ class Views(Tiny):
         self.sample()
 
 
-class Moody(Tiny):
+class Moody(Breaking, breaks="advance_is_repeatable"):
     """Moves a little differently each time it is built."""
 
     count = 0
@@ -297,7 +301,7 @@ class Moody(Tiny):
         self.x = self.x * (1 + 1e-15 * Moody.count)
 
 
-class Forgetful(Tiny):
+class Forgetful(Breaking, breaks="advance_in_two_parts"):
     """Leaves out a step whenever it is stopped."""
 
     def advance(self, t: float) -> None:
@@ -307,18 +311,16 @@ class Forgetful(Tiny):
         super().advance(t)
 
 
-class Restless(Tiny):
+class Restless(Breaking, breaks="sampling_changes_nothing"):
     """Moves when it is looked at."""
 
-    def sample(self) -> Sample:
-        """Not innocent."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         if self.t > 0:
             self.x = self.x * (1 + 1e-15)
         return right
 
 
-class Shared(Tiny):
+class Shared(Breaking, breaks="engines_do_not_disturb_each_other"):
     """Keeps its state where every other one keeps it too."""
 
     state: ClassVar[dict[str, Any]] = {}
@@ -333,24 +335,21 @@ class Shared(Tiny):
         Shared.state["x"] = value
 
 
-class Millimetres(Tiny):
+class Millimetres(Breaking, breaks="velocities_are_the_rates"):
     """Gives its velocity in mm/s, but only after the start."""
 
-    def sample(self) -> Sample:
-        """The wrong unit."""
-        right = super().sample()
+    def _told(self, right: Sample) -> Sample:
         return dataclasses.replace(right, v_WB=right.v_WB * (1000 if self.t else 1))
 
 
-class BodyFrame(Tiny):
+class BodyFrame(Breaking, breaks="velocities_are_the_rates"):
     """Gives an orientation that does not turn as its angular velocity says."""
 
-    def sample(self) -> Sample:
-        """Stands still."""
-        return dataclasses.replace(super().sample(), q_WB=np.array([1.0, 0, 0, 0]))
+    def _told(self, right: Sample) -> Sample:
+        return dataclasses.replace(right, q_WB=np.array([1.0, 0, 0, 0]))
 
 
-class FirstOrder(Tiny):
+class FirstOrder(Breaking, breaks="order_is_as_declared"):
     """Declares the second order and has the first."""
 
     def advance(self, t: float) -> None:
@@ -372,44 +371,7 @@ class AdaptiveSettings:
     dt: ClassVar[float] = 1e-3
 
 
-class Deaf(Tiny):
+class Deaf(Breaking, breaks="tolerance_has_an_effect"):
     """Its tolerance does nothing."""
 
     settings = AdaptiveSettings
-    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {"midpoint": {"matched": AdaptiveSettings()}}
-
-
-FAILS: Mapping[type[Tiny], str] = {
-    Unannounced: "name_is_the_entry_point",
-    Versionless: "version_is_told",
-    ProvidesText: "provides_capabilities",
-    Mutable: "settings_are_a_frozen_dataclass",
-    MixedUp: "presets_are_complete",
-    Orderless: "resolution_and_order_are_told",
-    Lax: "bad_settings_give_one_line",
-    Boastful: "provides_what_it_says",
-    Floating: "provides_for_some_scene",
-    Silent: "builds_or_refuses",
-    Heavy: "certificate_holds",
-    Doubled: "certificate_holds",
-    Pulled: "certificate_holds",
-    Damped: "first_steps_fit_the_scene",
-    Clamped: "first_steps_fit_the_scene",
-    Unresisting: "first_steps_fit_the_scene",
-    Drifting: "moves_as_the_truth",
-    Beating: "moves_as_the_truth",
-    Wasteful: "builds_only_what_is_required",
-    Thrifty: "builds_only_what_is_required",
-    Turning: "builds_only_what_is_required",
-    Row: "samples_are_well_formed",
-    Hushed: "samples_are_well_formed",
-    Views: "reading_back_changes_nothing",
-    Moody: "advance_is_repeatable",
-    Forgetful: "advance_in_two_parts",
-    Restless: "sampling_changes_nothing",
-    Shared: "engines_do_not_disturb_each_other",
-    Millimetres: "velocities_are_the_rates",
-    BodyFrame: "velocities_are_the_rates",
-    FirstOrder: "order_is_as_declared",
-    Deaf: "tolerance_has_an_effect",
-}
