@@ -15,8 +15,8 @@ from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.files.toml import study_of
 from proofroll.files.trajectory_file import read
-from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.comparison_summary import outcome_content
 from proofroll.report.html import templates
 from proofroll.report.labels import number
 from proofroll.report.scene_sheet import scene_sheet

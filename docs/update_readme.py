@@ -18,7 +18,7 @@ from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regim
 from proofroll.elements.ball_on_surface.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
-from proofroll.report.comparison_content import outcome_content
+from proofroll.report.comparison_summary import outcome_content
 from proofroll.report.growing_report import write_report
 from proofroll.report.work_precision import svg
 from proofroll.running.runner import Runner

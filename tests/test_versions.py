@@ -16,7 +16,7 @@ from other_pythons import seeing
 
 from proofroll.core.plugins import load_engine, release
 from proofroll.files.json_data import record
-from proofroll.report.versions_content import answer, lines, page, table
+from proofroll.report.versions import answer, lines, page, table
 from proofroll.studies.versions import VersionsStudy
 
 Proofroll = Callable[..., tuple[int, str, str]]

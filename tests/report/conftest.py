@@ -30,7 +30,7 @@ from proofroll.report.growing_report import begun, write_report
 from proofroll.report.html import page
 from proofroll.report.plots import PointCurves
 from proofroll.report.replay_records import Replay
-from proofroll.report.report_content import ReportContent, report_content
+from proofroll.report.report_records import ReportContent, report_content
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome, Run

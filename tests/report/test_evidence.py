@@ -22,7 +22,7 @@ from proofroll.report.comparison_records import Claims, Cost
 from proofroll.report.html import page
 from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves
-from proofroll.report.report_content import report_content
+from proofroll.report.report_records import report_content
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.report.tables import cost_title, costs, expectations
 from proofroll.running.store import Store

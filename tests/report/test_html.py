@@ -21,7 +21,7 @@ from proofroll.report.html import page
 from proofroll.report.labels import number, symbol
 from proofroll.report.pages import packed
 from proofroll.report.plots import EngineCurve, kept, point_curves
-from proofroll.report.report_content import report_content
+from proofroll.report.report_records import report_content
 from proofroll.report.scores import Score, recommendation
 from proofroll.running.store import Store
 from proofroll.studies.outcome import Outcome

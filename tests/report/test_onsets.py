@@ -25,7 +25,7 @@ from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
 from proofroll.report.labels import MEANINGS, SYMBOLS
 from proofroll.report.plots import Bound, point_curves
-from proofroll.report.report_content import ReportContent, ReportedTruth, report_content
+from proofroll.report.report_records import ReportContent, ReportedTruth, report_content
 from proofroll.report.scores import scores
 from proofroll.report.terminal import closing_lines, console, verdict_table
 from proofroll.running.case import Case, EngineFacts, Result, Status

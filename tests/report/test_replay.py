@@ -32,7 +32,7 @@ from proofroll.report.html import page
 from proofroll.report.plots import point_curves
 from proofroll.report.replay import WIDEST_TURN, frame_times, replay_content
 from proofroll.report.replay_library import thinned, three
-from proofroll.report.report_content import ReportContent, report_content
+from proofroll.report.report_records import ReportContent, report_content
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from proofroll.report.report_content import ReportContent
+from proofroll.report.report_records import ReportContent
 from proofroll.report.study_parts import PartEntry
 from proofroll.report.terminal import WIDTH, console, first_lines, part_lines, verdict_table
 

@@ -13,13 +13,13 @@ from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import judge
-from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.comparison_summary import outcome_content
 from proofroll.report.findings import findings
 from proofroll.report.html import page
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.plots import point_curves
-from proofroll.report.report_content import report_content
+from proofroll.report.report_records import report_content
 from proofroll.report.summary import three_sentences
 from proofroll.report.terminal import closing_lines, verdict_table
 from proofroll.report.verdict_matrix import counted, overview

@@ -36,7 +36,7 @@ def compare(
     Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set is for
     these.
     """
-    from proofroll.report.comparison_content import outcome_content
+    from proofroll.report.comparison_summary import outcome_content
     from proofroll.report.terminal import verdict_parts
     from proofroll.running.worker_pool import Workers
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from proofroll.report.growing_report import Report
-    from proofroll.report.report_content import ReportContent
+    from proofroll.report.report_records import ReportContent
     from proofroll.report.study_parts import Part
     from proofroll.running.runner import Runner
     from proofroll.studies.outcome import Outcome

@@ -40,7 +40,7 @@ def versions(
     Environments that are missing are made, as by `proofroll engines add`; workers of a cluster need their own. Speed is
     measured here, and never decides the exit code.
     """
-    from proofroll.report.versions_content import heading, lines, page, robot_table, table
+    from proofroll.report.versions import heading, lines, page, robot_table, table
 
     readers = {point.name: point for point in announced(SUBJECTS)}
     robot = readers.get(Path(subject).suffix.removeprefix("."))

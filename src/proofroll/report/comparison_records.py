@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +10,12 @@ from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.diagnosis.of_scene import Diagnosis
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
-from proofroll.report.labels import number, unit
+from proofroll.report.labels import names, number, unit
 from proofroll.running.case import Status
 from proofroll.running.timing import Timing
 
 if TYPE_CHECKING:
-    from proofroll.report.report_content import ComparisonEvidence
+    from proofroll.report.report_records import ComparisonEvidence
 
 
 @dataclass(frozen=True)
@@ -192,6 +192,11 @@ class ReportedComparison:
     def runs_of(self, row: int) -> list[ReportedRun]:
         """Those of one row."""
         return [run for run in self.runs if run.row == row]
+
+    def lines(self) -> Iterator[tuple[str, ReportedRow, list[ReportedRun]]]:
+        """Each row with a short name, unlike that of any other, and its runs."""
+        for place, (name, row) in enumerate(zip(names(self.rows), self.rows, strict=True)):
+            yield name, row, self.runs_of(place)
 
     def headlines(self, role: str) -> list[str]:
         """Names of the observables that summaries show, of a role (:class:`proofroll.core.observable.Role`)."""

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proofroll.core.events import EVENT_ORDER
+from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, number, off_by, unjudged, with_caveat
 from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, closest, furthest_off, recommendation, scores
-
-if TYPE_CHECKING:
-    from proofroll.report.comparison_records import ReportedComparison
-    from proofroll.report.kinds import ReportKind
 
 
 @dataclass(frozen=True)

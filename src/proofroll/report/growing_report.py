@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import plain
@@ -17,15 +16,11 @@ from proofroll.report.kinds import kind_of
 from proofroll.report.plots import PointCurves, point_curves
 from proofroll.report.replay import joined, replay_content
 from proofroll.report.replay_records import Replay
-from proofroll.report.report_content import ReportContent, Sentences, report_content
+from proofroll.report.report_records import ReportContent, Sentences, report_content
 from proofroll.report.study_parts import Part, PartEntry, absent, attempt
 from proofroll.report.summary import three_sentences
 from proofroll.running.store import Store, write_text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from proofroll.studies.outcome import Outcome
+from proofroll.studies.outcome import Outcome
 
 
 @dataclass

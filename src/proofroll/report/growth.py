@@ -12,7 +12,7 @@ from proofroll.report.labels import names
 
 if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison
-    from proofroll.report.report_content import ReportedTruth
+    from proofroll.report.report_records import ReportedTruth
 
 # Fewer points tell no exponent.
 _FEWEST = 3

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from proofroll.report.comparison_records import ReportedComparison, ReportedRun
     from proofroll.report.plots import PointCurves
     from proofroll.report.replay_records import Replay
-    from proofroll.report.report_content import ReportContent
+    from proofroll.report.report_records import ReportContent
 
 _EXPONENT = re.compile(r"\d[\d.]*e-\d+")
 
@@ -43,7 +43,7 @@ def page(
     """The HTML page.
 
     Args:
-        content: from :func:`proofroll.report.report_content.report_content`.
+        content: from :func:`proofroll.report.report_records.report_content`.
         curves: from :func:`proofroll.report.plots.point_curves`, one list for each comparison.
         pictures: of the further studies, markup by name; what is not there is left out.
         replay: as the comparisons' kind of element gives it; None: the page has none.

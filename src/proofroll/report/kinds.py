@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from proofroll.report.pen import Picture
     from proofroll.report.plots import PointCurves
     from proofroll.report.replay_records import ReplayKind
-    from proofroll.report.report_content import ReportedTruth
+    from proofroll.report.report_records import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run
 

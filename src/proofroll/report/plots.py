@@ -15,7 +15,7 @@ from proofroll.core.observable import Observable, Role
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read, read_some
-from proofroll.report.comparison_content import runs_at
+from proofroll.report.comparison_summary import runs_at
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
 from proofroll.studies.outcome import Outcome, Run

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_some
-from proofroll.report.comparison_content import outcome_content, runs_at
+from proofroll.report.comparison_summary import outcome_content, runs_at
 from proofroll.report.labels import names
 from proofroll.report.pages import packed
 from proofroll.report.replay_library import three

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.files.scene_parameters import Parameter
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from proofroll.files.scene_parameters import Parameter
-    from proofroll.report.pen import Picture
+from proofroll.report.pen import Picture
 
 # Values of one parameter that are listed one by one.
 _LISTED = 5

@@ -5,13 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
-from proofroll.report.labels import names
-
-if TYPE_CHECKING:
-    from proofroll.core.verdict import Judgement
-    from proofroll.report.comparison_records import ReportedComparison, ReportedRun
+from proofroll.core.verdict import Judgement
+from proofroll.report.comparison_records import ReportedComparison, ReportedRun
 
 DECADES = range(1, 14)
 # The error of motion and forces, relative to their sizes, for which the first paragraphs name a setting.
@@ -45,14 +41,13 @@ class Score:
 
 def scores(content: ReportedComparison) -> list[Score]:
     """One score per row of the comparison."""
-    judged = _judged(content)
+    judged = {name for row in content.rows for name in row.observables}
     coordinates, forces_of = (
         [name for name in content.headlines(role) if name in judged] for role in ("motion", "reaction")
     )
     points = {run.point for run in content.runs}
     found = []
-    for index, (name, row) in enumerate(zip(names(content.rows), content.rows, strict=True)):
-        runs = content.runs_of(index)
+    for index, (name, row, runs) in enumerate(content.lines()):
         everywhere = {run.point for run in runs} == points
         motion, forces = (_relative(runs, group) if everywhere else None for group in (coordinates, forces_of))
         found.append(Score(index, name, motion, forces, row.seconds_per_second))
@@ -119,10 +114,6 @@ def furthest_off(content: ReportedComparison, runs: Sequence[ReportedRun]) -> Ju
     judged = (judgement for run in runs for judgement in run.judgements if judgement.observable in motion)
     finite = [item for item in judged if item.verdict != "ill-posed" and math.isfinite(item.error)]
     return max(finite, key=lambda item: item.error / item.scale, default=None)
-
-
-def _judged(content: ReportedComparison) -> list[str]:
-    return list(dict.fromkeys(name for row in content.rows for name in row.observables))
 
 
 def _relative(runs: list[ReportedRun], group: Sequence[str]) -> float | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.table import Table
 from rich.text import Text
@@ -13,10 +12,7 @@ from rich.text import Text
 from proofroll.report.labels import name_of, number, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts
-from proofroll.studies.stability_records import silent_ranking
-
-if TYPE_CHECKING:
-    from proofroll.studies.stability_records import BoundaryPoint, ExplainedBoundary, StabilityStudy
+from proofroll.studies.stability_records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking
 
 
 def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:

@@ -10,15 +10,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
-
-if TYPE_CHECKING:
-    from proofroll.running.runner import Runner
+from proofroll.running.runner import Runner
 
 GROUP = "proofroll.report_parts"
 Tell = Callable[[str, int], None]

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from math import log
+from typing import Any
 
-from proofroll.report.labels import name_of, names, number, off_by, step, symbol, unit, with_caveat
+from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.labels import name_of, number, off_by, step, symbol, unit, with_caveat
 from proofroll.report.scores import EVERYDAY, cheapest, closest, furthest_off, scores
-
-if TYPE_CHECKING:
-    from proofroll.report.comparison_records import ReportedComparison
-    from proofroll.report.study_parts import PartEntry
-    from proofroll.studies.recommend import Answer
-    from proofroll.studies.stability_records import StabilityStudy
-    from proofroll.studies.tradeoff_records import TradeoffStudy
+from proofroll.report.study_parts import PartEntry
+from proofroll.studies.recommend import Answer
+from proofroll.studies.stability_records import StabilityStudy
+from proofroll.studies.tradeoff_records import TradeoffStudy
 
 
 def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
@@ -34,8 +33,8 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
     rows = [row for comparison in comparisons for row in comparison.rows]
     counts = Counter(row.verdict.value for row in rows)
     agree = "agrees" if counts["agrees"] == 1 else "agree"
-    said = f"Of {len(rows)} settings in {_comparisons(len(comparisons))}, "
-    said += f"{counts['agrees']} {agree} with the truth everywhere"
+    where = "one comparison" if len(comparisons) == 1 else f"{len(comparisons)} comparisons"
+    said = f"Of {len(rows)} settings in {where}, {counts['agrees']} {agree} with the truth everywhere"
     rest = {
         "unconfirmed": "at this step, with a limit that is not confirmed",
         "incomplete": "without reporting all that is judged",
@@ -52,10 +51,6 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
         f"{said}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
         f"whose forces within {number(best.forces)} of the largest."
     )
-
-
-def _comparisons(count: int) -> str:
-    return "one comparison" if count == 1 else f"{count} comparisons"
 
 
 def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityStudy]) -> str:
@@ -77,8 +72,7 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
 def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
     """For each row that differs though each of its runs ended as done: relative error, name, and what is off."""
     found = []
-    for index, (name, row) in enumerate(zip(names(comparison.rows), comparison.rows, strict=True)):
-        runs = comparison.runs_of(index)
+    for name, row, runs in comparison.lines():
         if row.verdict != "differs" or any(run.status != "done" for run in runs):
             continue
         worst = furthest_off(comparison, runs)
@@ -119,7 +113,5 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
 
 def _from_everyday(answer: Answer, study: TradeoffStudy) -> tuple[bool, float]:
     """How far a tolerance is from the usual one: of the study's own quantity first, and then by its logarithm."""
-    from math import log
-
     scale = study.quantities[answer.quantity].scale or 1.0
     return answer.quantity != study.quantity, abs(log(answer.tolerance / scale / EVERYDAY))

@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proofroll.core.certificate import Standing, not_reported
+from proofroll.core.verdict import Judgement
+from proofroll.report.comparison_records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.labels import names, number, symbol
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from proofroll.core.verdict import Judgement
-    from proofroll.report.comparison_records import (
-        Claims,
-        Cost,
-        ReportedComparison,
-        ReportedRow,
-        ReportedRun,
-    )
 
 
 def observables(content: ReportedComparison) -> dict[str, str]:
@@ -70,8 +61,8 @@ def _where(values: Mapping[str, Sequence[float]]) -> str:
 def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedRun]]:
     """For each timed row its name, its slowest and its fastest case."""
     lines = []
-    for index, name in enumerate(names(content.rows)):
-        timed = sorted((run.cost.median, at, run) for at, run in enumerate(content.runs_of(index)) if run.cost)
+    for name, _, runs in content.lines():
+        timed = sorted((run.cost.median, at, run) for at, run in enumerate(runs) if run.cost)
         if timed:
             lines.append((name, timed[-1][-1], timed[0][-1]))
     return lines
@@ -121,8 +112,8 @@ def belief(content: ReportedComparison) -> list[Belief]:
     """Why to believe it: for each row its certificates and its audit of reactions, the worst over all points."""
     lines = []
     audits = [name for name, item in content.observables.items() if item.audit]
-    for index, (name, row) in enumerate(zip(names(content.rows), content.rows, strict=True)):
-        lines_of_all = [line for run in content.runs_of(index) for line in run.certificate]
+    for name, row, runs in content.lines():
+        lines_of_all = [line for run in runs for line in run.certificate]
         certificate = [line for line in lines_of_all if line["standing"] != Standing.NOT_REPORTED]
         exact = [line["difference"] for line in certificate if not line["because"] and line["difference"] is not None]
         lines.append(
@@ -141,10 +132,10 @@ def belief(content: ReportedComparison) -> list[Belief]:
 
 def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
     """Name of each row with a proven cause of its difference, the cause, and what to do."""
-    shown = zip(names(content.rows), content.rows, strict=True)
-    return [(name, told.cause.sentence, told.cause.cause.remedy) for name, row in shown for told in row.diagnosis]
+    found = ((name, told.cause) for name, row, _ in content.lines() for told in row.diagnosis)
+    return [(name, cause.sentence, cause.cause.remedy) for name, cause in found]
 
 
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
     """What was remarked of each row, with its name."""
-    return [(name, text) for name, row in zip(names(content.rows), content.rows, strict=True) for text in row.remarks]
+    return [(name, text) for name, row, _ in content.lines() for text in row.remarks]

@@ -10,17 +10,17 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.verdict import Verdict
-from proofroll.report.labels import SYMBOLS, caveat_lines, names, number, step, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, number, step, unjudged, verdict_text
 from proofroll.report.screen import Screen, numeric, plain_table, unbroken
 from proofroll.report.study_parts import part_kinds
-from proofroll.report.tables import observables
+from proofroll.report.tables import observables, remarks
 from proofroll.running.case import told_hosts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from proofroll.report.comparison_records import ReportedComparison, WorstJudgement
-    from proofroll.report.report_content import ReportContent
+    from proofroll.report.report_records import ReportContent
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
@@ -105,11 +105,10 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     lines = [f"{len(rows)} engine settings, {len(content.runs)} runs in all: {said}."]
-    shown = list(zip(names(rows), rows, strict=True))
-    for name, row in shown:
+    for name, row, _ in content.lines():
         lines += [f"{SYMBOLS[row.verdict]} {name}: {row.reason}"] if row.reason else []
         lines += [f"  {told.cause.sentence}" for told in row.diagnosis]
-    lines += [f"* {name}: {remark}" for name, row in shown for remark in row.remarks]
+    lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
     if content.contradictions:
         count = len(content.contradictions)
         said = "1 finding contradicts" if count == 1 else f"{count} findings contradict"

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+from proofroll.core.verdict import Judgement
+from proofroll.report.comparison_records import Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.labels import SYMBOLS, error, number, symbol, unit, unjudged, verdict_text
 from proofroll.report.tables import observables
-
-if TYPE_CHECKING:
-    from proofroll.core.verdict import Judgement
-    from proofroll.report.comparison_records import Cost, ReportedComparison, ReportedRow, ReportedRun
 
 
 @dataclass(frozen=True)

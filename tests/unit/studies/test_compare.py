@@ -20,7 +20,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
-from proofroll.report.comparison_content import outcome_content
+from proofroll.report.comparison_summary import outcome_content
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.scene import Scene
     from proofroll.report.comparison_records import ReportedComparison
-    from proofroll.report.report_content import ReportedTruth
+    from proofroll.report.report_records import ReportedTruth
     from proofroll.running.store import Store
     from proofroll.studies.outcome import Run
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
@@ -21,13 +21,11 @@ from proofroll.report.comparison_records import (
     WorstJudgement,
     in_words,
 )
-from proofroll.running.case import Status, hosts
+from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
+from proofroll.running.store import Store
 from proofroll.studies.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.planning import at_point, point_name
-
-if TYPE_CHECKING:
-    from proofroll.running.store import Store
 
 
 def outcome_content(outcome: Outcome) -> ReportedComparison:
@@ -168,28 +166,27 @@ def _worst(runs: list[Run], name: str) -> WorstJudgement:
     return WorstJudgement(**known, point=point_name(where.parameters), largest=largest)
 
 
-def _setting(run: Run, preset: str | None, resolution: str | None) -> str:
+def _setting(engine: str, facts: EngineFacts) -> str:
     """The preset, and whatever else the comparison file chose besides the step: ``cone=pyramidal``."""
-    usual = {"formulation", "preset", resolution}
-    chosen = [f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items() if key not in usual]
+    usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
+    chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
     shown = [] if preset is None or (chosen and preset == "matched") else [preset]
     return " ".join([*shown, *chosen])
 
 
 def _settings(run: Run) -> dict[str, Any]:
     """The fields of :class:`Setting`."""
-    settings = run.facts.settings if run.facts else {}
-    resolution = run.facts.resolution if run.facts else None
+    facts = run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
     return {
         "engine": run.row.engine,
-        "name": shown_name(run.facts.name if run.facts else run.row.engine.partition("[")[0]),
-        "formulation": settings.get("formulation"),
-        "preset": settings.get("preset"),
-        "setting": _setting(run, settings.get("preset"), resolution),
-        "resolution": resolution,
-        "resolution_value": settings.get(resolution) if resolution else None,
-        "declared_order": run.facts.order if run.facts else None,
-        "caveat": run.facts.caveat if run.facts else "",
+        "name": shown_name(facts.name),
+        "formulation": facts.settings.get("formulation"),
+        "preset": facts.settings.get("preset"),
+        "setting": _setting(run.row.engine, facts),
+        "resolution": facts.resolution,
+        "resolution_value": facts.settings.get(facts.resolution or ""),
+        "declared_order": facts.order,
+        "caveat": facts.caveat,
     }
 
 

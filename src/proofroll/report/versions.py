@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from rich.table import Column, Table
 from rich.text import Text
@@ -13,9 +12,7 @@ from proofroll.report.pages import environment, rendered
 from proofroll.report.screen import plain_table, unbroken
 from proofroll.running.case import told_hosts
 from proofroll.studies.version_difference import NumberKind
-
-if TYPE_CHECKING:
-    from proofroll.studies.versions import SettingDifference, VersionsStudy
+from proofroll.studies.versions import SettingDifference, VersionsStudy
 
 _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
 

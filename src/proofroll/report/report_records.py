@@ -7,26 +7,24 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
-from proofroll.report.comparison_content import outcome_content
 from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.comparison_summary import outcome_content
 from proofroll.report.findings import Findings, findings
 from proofroll.report.growth import Growth, growth
 from proofroll.report.kinds import kind_of
 from proofroll.report.scene_sheet import SceneSheet, scene_sheet
 from proofroll.report.study_parts import PartEntry, part_kinds
 from proofroll.report.summary import three_sentences
+from proofroll.running.store import Store
 from proofroll.running.timing import machine
 from proofroll.studies.findings import load_findings
-
-if TYPE_CHECKING:
-    from proofroll.running.store import Store
-    from proofroll.studies.outcome import Outcome
+from proofroll.studies.outcome import Outcome
 
 
 @dataclass(frozen=True)
