@@ -18,7 +18,7 @@ def export(
     settings: options.Set = None,
 ) -> None:
     """Write the model that an engine builds of a scene, as its own tools read it."""
-    from proofroll.running.model_file import model_file
+    from proofroll.running.asking import model_file
     from proofroll.running.store import write_text
     from proofroll.studies.cases import single_case
 

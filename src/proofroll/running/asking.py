@@ -10,16 +10,17 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from proofroll.core.engine_abilities import Term
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import ProofrollError, Refused
 from proofroll.core.plugins import parse_engine
 from proofroll.running.case import Case, EngineDescription, EngineFacts
 from proofroll.running.worker_pool import Workers
 
 _START_UP_SECONDS = 60.0
+_WRITING_SECONDS = 300.0
 
 
 def _answers(
-    requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None
+    requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = _START_UP_SECONDS
 ) -> list[dict[str, Any] | ProofrollError]:
     """What engines answer to requests, or why they do not, in the order given; their processes start together."""
     found: dict[int, dict[str, Any] | ProofrollError] = {}
@@ -30,7 +31,7 @@ def _answers(
                 continue
             try:
                 with lent.lend(engine) as worker:
-                    found[index] = worker.request(request, _START_UP_SECONDS)
+                    found[index] = worker.request(request, seconds)
             except ProofrollError as error:
                 found[index] = error
 
@@ -112,9 +113,26 @@ def prepare(engine: str, workers: Workers) -> None:
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:
     """Engines' programs for cases (:class:`proofroll.core.engine_abilities.Reproduces`), each or None and why not."""
-    requests = [(case.engine.name, {"do": "reproduce", "case": dataclasses.asdict(case)}) for case in cases]
-    answers = _answers(requests, workers)
-    return [(None, str(a)) if isinstance(a, ProofrollError) else (a["program"], a["message"]) for a in answers]
+    told = _answers([_to_write(case, "reproducer") for case in cases], workers)
+    return [(None, str(a)) if isinstance(a, ProofrollError) else (a.get("text"), a.get("message", "")) for a in told]
+
+
+def model_file(case: Case) -> str:
+    """The text of the file of a model that an engine's own tools read.
+
+    Raises:
+        Refused: the engine writes none, or none of this scene.
+    """
+    (told,) = _answers([_to_write(case, "model_file")], None, _WRITING_SECONDS)
+    if isinstance(told, ProofrollError):
+        raise told
+    if "text" not in told:
+        raise Refused(f"{case.engine.name}: {told['message']}")
+    return str(told["text"])
+
+
+def _to_write(case: Case, what: str) -> tuple[str, dict[str, Any]]:
+    return case.engine.name, {"do": "write", "case": dataclasses.asdict(case), "what": what}
 
 
 @contextlib.contextmanager

@@ -19,39 +19,31 @@ _MOST_BUILDING = 5.0
 
 
 def time_once(case: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """One measurement of a case's speed: clean runs for about this many wall seconds, one after another."""
+    """One measurement of a case's speed: clean runs for about this many wall seconds, one after another.
+
+    Of the truth they are whole runs of both routes together.
+    """
     from proofroll.core.time_grid import time_grid
+    from proofroll.core.truth import truth
     from proofroll.running.loading import loaded, scene_of
 
-    wanted = Case.from_dict(case)
+    wanted, clock = Case.from_dict(case), time.perf_counter
     scene = scene_of(wanted)
     times = time_grid(wanted.until, wanted.every)
-    if wanted.engine.name == "truth":
-        return _time_truth(scene, times, seconds)
-    kind, settings = loaded(wanted)
+    kind, settings = (None, None) if wanted.engine.name == "truth" else loaded(wanted)
     elapsed = simulated = 0.0
-    start = time.perf_counter()
-    while elapsed < seconds and time.perf_counter() - start < _MOST_BUILDING * seconds:
+    start = clock()
+    while elapsed < seconds and clock() - start < _MOST_BUILDING * seconds:
         try:
-            wall, t = _clean_run(build(kind, scene, settings), times, seconds - elapsed)
+            if kind is None:
+                began = clock()
+                truth(scene, times)
+                wall, t = clock() - began, float(times[-1])
+            else:
+                wall, t = _clean_run(build(kind, scene, settings), times, seconds - elapsed)
         except (Refused, Diverged) as error:
             return {"seconds_per_second": None, "message": str(error)}
         elapsed, simulated = elapsed + wall, simulated + t
-    return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
-
-
-def _time_truth(scene: Any, times: Any, seconds: float) -> dict[str, Any]:
-    """As :func:`time_once`, of both routes of the truth together; at least one whole run."""
-    from proofroll.core.truth import truth
-
-    start, runs, elapsed = time.perf_counter(), 0, 0.0
-    while not runs or elapsed < seconds:
-        try:
-            truth(scene, times)
-        except (Refused, Diverged) as error:
-            return {"seconds_per_second": None, "message": str(error)}
-        runs, elapsed = runs + 1, time.perf_counter() - start
-    simulated = runs * float(times[-1])
     return {"seconds_per_second": elapsed / simulated, "message": f"{simulated:g} s simulated"}
 
 

@@ -50,7 +50,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         "resolve": resolve,
         "run": run,
         "time": time_once,
-        "reproduce": reproduce,
+        "write": write,
         "call": call,
     }
     name = request.pop("do")
@@ -71,23 +71,23 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
         gc.enable()
 
 
-def reproduce(case: dict[str, Any]) -> dict[str, Any]:
-    """The engine's own program for a case, or why there is none."""
-    from proofroll.core.engine_abilities import Reproduces
+def write(case: dict[str, Any], what: str) -> dict[str, Any]:
+    """The text that an engine writes of a case, its ``reproducer`` or ``model_file``; or why it writes none."""
+    from proofroll.core.engine_abilities import Reproduces, WritesModels
     from proofroll.running.loading import loaded, scene_of
 
     wanted = Case.from_dict(case)
     kind, settings = loaded(wanted)
-    if not isinstance(kind, Reproduces):
-        return {
-            "program": None,
-            "message": f"{wanted.engine.name} offers no program of its own",
-        }
+    ability, lacking = {
+        "reproducer": (Reproduces, f"{wanted.engine.name} offers no program of its own"),
+        "model_file": (WritesModels, "it writes no file of its model"),
+    }[what]
+    if not isinstance(kind, ability):
+        return {"message": lacking}
     try:
-        program = kind.reproducer(scene_of(wanted), settings)
+        return {"text": getattr(kind, what)(scene_of(wanted), settings)}
     except Refused as error:
-        return {"program": None, "message": str(error)}
-    return {"program": program, "message": ""}
+        return {"message": str(error)}
 
 
 def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
