@@ -95,36 +95,28 @@ class Cause:
         return f"{self.says} ({self.quantity} off by {self.before:.2g}{unit}, by {self.after:.1g}{unit} with that)"
 
 
-class Hypothesis(Protocol):
-    """A cause that can be tested. A new one is one function (:func:`hypothesis`) or small class in the element's tuple.
+@dataclass(frozen=True)
+class Hypothesis:
+    """A cause that can be tested. A new one is one function (:func:`hypothesis`) in the element's tuple.
 
     Attributes:
         id: unique within the kind of element.
         grounds: what it tests, and on what grounds that proves it.
+        test: gives causes worth looking at; those that do not close the difference are dropped by :func:`diagnose`.
     """
-
-    @property
-    def id(self) -> str: ...  # noqa: D102 -- see the class
-
-    @property
-    def grounds(self) -> str: ...  # noqa: D102 -- see the class
-
-    def test(self, evidence: Evidence) -> Iterable[Cause]:
-        """Causes worth looking at; those that do not close the difference are dropped by :func:`diagnose`."""
-
-
-@dataclass(frozen=True)
-class FunctionHypothesis:
-    """See :class:`Hypothesis`."""
 
     id: str
     grounds: str
     test: Callable[[Evidence], Iterable[Cause]]
 
+    def proven(self, evidence: Evidence) -> bool:
+        """Whether some cause of it is."""
+        return any(cause.proven for cause in self.test(evidence))
 
-def hypothesis(name: str, grounds: str) -> Callable[[Callable[[Evidence], Iterable[Cause]]], FunctionHypothesis]:
+
+def hypothesis(name: str, grounds: str) -> Callable[[Callable[[Evidence], Iterable[Cause]]], Hypothesis]:
     """Makes a :class:`Hypothesis` of the function that tests it, with this name as its id."""
-    return lambda test: FunctionHypothesis(name, grounds, test)
+    return lambda test: Hypothesis(name, grounds, test)
 
 
 @runtime_checkable
@@ -132,11 +124,11 @@ class ExplainsRuns(Protocol):
     """What a kind of element (:class:`proofroll.core.element.ElementKind`) has besides, if it can explain its runs."""
 
     @staticmethod
-    def hypotheses() -> Sequence[Any]:
-        """Its hypotheses, each as :class:`Hypothesis` says; those that concern what an engine says come first."""
+    def hypotheses() -> Sequence[Hypothesis]:
+        """Its hypotheses; those that concern what an engine says come first."""
 
 
-def diagnose(evidence: Evidence, hypotheses: Sequence[Any]) -> list[Cause]:
+def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause]:
     """The proven causes, the best first: with the fewest fitted numbers, then with the smallest part left.
 
     Of those that explain the same quantity few more are kept, if they do so as well: as alternatives.
@@ -160,7 +152,7 @@ def _rivals(cause: Cause, first: Cause) -> bool:
     return as_good and whole and cause.id != first.id
 
 
-def hypotheses_of(element: Element) -> Sequence[Any]:
+def hypotheses_of(element: Element) -> Sequence[Hypothesis]:
     """Those of the element's kind: the one in whose package it is defined."""
     from proofroll.core.plugins import load_element_kinds
 

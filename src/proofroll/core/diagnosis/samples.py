@@ -6,13 +6,12 @@ Its variables are ``p_WB``, ``v_WB``, ``w_WB`` and perhaps ``q_WB``; what else i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, above_round_off, apart, hypothesis
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
 from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import Reported
@@ -55,26 +54,22 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
         yield Cause("float32", says, TWIST[0], "m", before, 0.0, "compute and report in double precision")
 
 
-@dataclass(frozen=True)
-class AnotherClock:
-    """All that is said belongs to another time than it is said to.
+def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[str, ...]) -> Hypothesis:
+    """That all that is said belongs to another time than it is said to.
 
-    Attributes:
+    Args:
         state: of an element and a run: all that is said of the motion [m], shape (time, …).
         covers: what it explains.
     """
 
-    state: Callable[[Any, xr.Dataset], FloatArray]
-    covers: tuple[str, ...]
-    id: str = "late"
-    grounds: str = "the whole state is the true one, at times that are shifted by one time or stretched by one factor"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis(
+        "late", "the whole state is the true one, at times that are shifted by one time or stretched by one factor"
+    )
+    def test(evidence: Evidence) -> Iterator[Cause]:
         found = both(evidence)
         if found is None:
             return
-        said, true = (self.state(evidence.element, data) for data in found)
+        said, true = (state(evidence.element, data) for data in found)
         if said.shape != true.shape or not above_round_off(apart(said, true), float(np.max(np.abs(true)))):
             return
         time = found[1]["time"].to_numpy()
@@ -83,24 +78,27 @@ class AnotherClock:
             delay, before, after = moved
             says = f"every sample is {said_delay(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
-            yield Cause("late", says, "state", "m", before, after, remedy, 1, self.covers)
+            yield Cause("late", says, "state", "m", before, after, remedy, 1, covers)
         paced = stretched(time, said, true)
         if paced is not None:
             rate, before, after = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
-            yield Cause("clock", says, "state", "m", before, after, remedy, 1, self.covers)
+            yield Cause("clock", says, "state", "m", before, after, remedy, 1, covers)
 
-    def proven(self, evidence: Evidence) -> bool:
-        """Whether the clock explains the run, so that no single variable is to blame."""
-        return any(cause.proven for cause in self.test(evidence))
+    return test
 
 
-@dataclass(frozen=True)
-class ReportedVectors:
-    """Positions, velocities and angular velocities, one by one.
+def reported_vectors(
+    units: Mapping[str, tuple[str, str]],
+    frames: Callable[[Evidence], Mapping[str, FloatArray]],
+    clock: Hypothesis,
+    least: Callable[[Any, str], float] = lambda *_: 0.0,
+    besides: Callable[[Reported, Evidence], Iterable[Cause]] = lambda *_: (),
+) -> Hypothesis:
+    """That positions, velocities or angular velocities, one by one, are told wrongly.
 
-    Attributes:
+    Args:
         units: variable -> what it is in words, and its unit.
         frames: in which they may be given by mistake, at each time of the true run.
         clock: which explains all of them, if it does.
@@ -108,49 +106,38 @@ class ReportedVectors:
         besides: what else one of them may be.
     """
 
-    units: Mapping[str, tuple[str, str]]
-    frames: Callable[[Evidence], Mapping[str, FloatArray]]
-    clock: AnotherClock
-    least: Callable[[Any, str], float] = lambda *_: 0.0
-    besides: Callable[[Reported, Evidence], Iterable[Cause]] = lambda *_: ()
-    id: str = "said"
-    grounds: str = (
+    @hypothesis(
+        "said",
         "the true vectors with another sign, unit, order of axes, frame, limit or time are what the engine says, "
-        "sample by sample; no equation is needed"
+        "sample by sample; no equation is needed",
     )
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    def test(evidence: Evidence) -> Iterator[Cause]:
         found = both(evidence)
-        if found is None or self.clock.proven(evidence):
+        if found is None or clock.proven(evidence):
             return
         run, truth = found
-        time, frames = truth["time"].to_numpy(), self.frames(evidence)
-        for name, (what, unit) in self.units.items():
-            said, true, least = run[name].to_numpy(), truth[name].to_numpy(), self.least(evidence.element, name)
-            told = Reported(name, what, unit, said, true, time, frames, least).after_start()
+        time, own = truth["time"].to_numpy(), frames(evidence)
+        for name, (what, unit) in units.items():
+            said, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
+            told = Reported(name, what, unit, said, true, time, own, size).after_start()
             yield from told.causes(evidence.step)
-            yield from self.besides(told, evidence)
+            yield from besides(told, evidence)
+
+    return test
 
 
-@dataclass(frozen=True)
-class Attitudes:
-    """Quaternions are in another order, of inverse rotations, or not of unit length.
+def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothesis:
+    """That quaternions are in another order, of inverse rotations, or not of unit length.
 
-    Attributes:
-        true: the true ones, scalar first, shape (time, …, 4).
+    ``true_ones`` gives the true ones, scalar first, shape (time, …, 4).
     """
 
-    true: Callable[[Evidence], FloatArray]
-    id: str = "quaternion"
-    grounds: str = "the true quaternions in another order or inverted are what is said, up to their sign"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis("quaternion", "the true quaternions in another order or inverted are what is said, up to their sign")
+    def test(evidence: Evidence) -> Iterator[Cause]:
         found = both(evidence)
         if found is None or "q_WB" not in found[0]:
             return
-        said, true = found[0]["q_WB"].to_numpy(), self.true(evidence)
+        said, true = found[0]["q_WB"].to_numpy(), true_ones(evidence)
         if said.shape != true.shape:
             return
         if len(said) > 1 and apart(np.abs(said[0]), np.abs(true[0])) < _START:
@@ -166,6 +153,8 @@ class Attitudes:
             remedy = "give a unit quaternion of the body, scalar first"
             yield Cause("quaternion", says, "q_WB", "1", before, after, remedy)
 
+    return test
+
 
 def _turned(said: FloatArray, other: FloatArray) -> float:
     """How far quaternions are apart, up to their signs."""
@@ -173,33 +162,31 @@ def _turned(said: FloatArray, other: FloatArray) -> float:
     return apart(said * signs, other)
 
 
-@dataclass(frozen=True)
-class AtStart:
-    """Signs, units and axes of velocities and accelerations at time 0.
+def at_start(
+    frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str], *, rates: bool = True
+) -> Hypothesis:
+    """That velocities and accelerations at time 0 have other signs, units or axes.
 
-    Attributes:
-        frames: of an element at time 0, in which a vector may be given by mistake; each of shape (vectors, 3, 3).
+    Args:
+        frames_of: of an element at time 0, in which a vector may be given by mistake; each of shape (vectors, 3, 3).
         follows: quantities that follow from the velocities.
         rates: whether accelerations are looked at, where nothing else differs.
     """
+    state, accelerations = ({name for name, _, _ in vectors} for vectors in (_STATE, _RATES))
 
-    frames: Callable[[Any], Mapping[str, FloatArray]]
-    follows: frozenset[str]
-    rates: bool = True
-    id: str = "said at time 0"
-    grounds: str = "the scene's own vectors with another sign, unit or axes are those of the certificate"
-
-    def test(self, evidence: Evidence) -> Iterator[Cause]:
-        """See :class:`proofroll.core.diagnosis.Hypothesis`."""
+    @hypothesis(
+        "said at time 0", "the scene's own vectors with another sign, unit or axes are those of the certificate"
+    )
+    def test(evidence: Evidence) -> Iterator[Cause]:
         wrong = {str(line["quantity"]): line for line in differing(evidence.lines)}
-        state = {name for name, _, _ in _STATE}
-        rates = {name for name, _, _ in _RATES}
-        for vectors, others in ((_STATE, state | rates | self.follows), (_RATES if self.rates else (), set())):
+        for vectors, others in ((_STATE, state | accelerations | follows), (_RATES if rates else (), set())):
             for name, what, unit in vectors:
                 if name not in wrong or not set(wrong) <= others | {name}:
                     continue
                 said, true = (np.reshape(wrong[name][key], (-1, 3)) for key in ("found", "expected"))
                 if said.shape != true.shape:
                     continue
-                frames = {key: frame[None] for key, frame in self.frames(evidence.element).items()}
+                frames = {key: frame[None] for key, frame in frames_of(evidence.element).items()}
                 yield from Reported(name, what, unit, said[None], true[None], np.zeros(1), frames).causes(evidence.step)
+
+    return test

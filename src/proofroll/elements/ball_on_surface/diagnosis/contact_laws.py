@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, FunctionHypothesis, apart, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, apart, hypothesis
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.diagnosis.equations import (
     COVERED,
@@ -31,7 +31,7 @@ _TURNS = 0.4
 
 def other_law(
     name: str, says: str, law: Callable[[RollingBall], Law], remedy: str, applies: Callable[[RollingBall], bool]
-) -> FunctionHypothesis:
+) -> Hypothesis:
     """That the contact has another law than the scene's, without a number to fit, if the scene has what it is about."""
 
     @hypothesis(name, "the other law gives the accelerations and forces at every sample, with no number fitted")

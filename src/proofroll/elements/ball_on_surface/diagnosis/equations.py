@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.held import ABOVE, Held
+from proofroll.core.diagnosis.fitting import ABOVE, Residuals
 from proofroll.core.diagnosis.lines import differing, left
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -148,7 +148,7 @@ def response(
     return found[:3], found[3:6], found[6:]
 
 
-def held_against(evidence: Evidence) -> Iterator[Held[Law]]:
+def held_against(evidence: Evidence) -> Iterator[Residuals[Law]]:
     """The certificate, if something in it differs; the run, unless the equations hold there as for the truth."""
     body = evidence.element.rolling
     wrong = differing(evidence.lines)
@@ -160,7 +160,7 @@ def held_against(evidence: Evidence) -> Iterator[Held[Law]]:
 
         what = " and ".join(str(line["quantity"]) for line in wrong[:2]) + (" and more" if len(wrong) > 2 else "")
         before = float(np.max(np.abs(left(evidence.lines, {}, GIVEN)), initial=0.0))
-        yield Held(left_of_lines, f"at time 0 {what}, relative,", "1", before, CLOSES_EXACTLY, COVERED)
+        yield Residuals(left_of_lines, f"at time 0 {what}, relative,", "1", before, CLOSES_EXACTLY, COVERED)
     if evidence.run is None or evidence.truth is None or (_leaves(evidence.run) and not _leaves(evidence.truth)):
         return  # off the wall another law holds, and an impact has no derivative
     seen, true = states(body, evidence.run), states(body, evidence.truth)
@@ -174,7 +174,7 @@ def held_against(evidence: Evidence) -> Iterator[Held[Law]]:
     plain = Law(body)
     before = float(np.max(np.abs(residuals(body, seen, plain))))
     if np.isfinite(before) and before > ABOVE * float(np.max(np.abs(residuals(body, true, plain)))):
-        yield Held(left_of_run, "motion", "m/s^2", before, CLOSES, COVERED)
+        yield Residuals(left_of_run, "motion", "m/s^2", before, CLOSES, COVERED)
 
 
 def _leaves(data: xr.Dataset) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.diagnosis import Cause, Evidence, FunctionHypothesis, hypothesis
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import known_factor, said_factor, telling
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, held_against, is_bounded
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -42,7 +42,7 @@ def number(
     remedy: str,
     possible: Callable[[float], bool] = lambda _: True,
     only: Callable[[RollingBall], bool] = lambda _: True,
-) -> FunctionHypothesis:
+) -> Hypothesis:
     """That a number of the scene is another one in the engine.
 
     Args:
@@ -80,7 +80,7 @@ def _snapped(factor: float) -> float:
     return known[0] if known else factor
 
 
-def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy: str) -> FunctionHypothesis:
+def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy: str) -> Hypothesis:
     """That a force or moment acts which the scene does not have, with one coefficient, in ``says`` as ``{value}``."""
 
     @hypothesis(name, "the load with one coefficient closes accelerations and forces at every sample")

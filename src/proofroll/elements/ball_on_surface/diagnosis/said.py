@@ -14,11 +14,11 @@ from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import fitted
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
-    AnotherClock,
-    AtStart,
-    Attitudes,
-    ReportedVectors,
+    another_clock,
+    at_start,
     both,
+    reported_quaternions,
+    reported_vectors,
     single_precision_run,
 )
 from proofroll.core.diagnosis.vectors import Reported, into
@@ -74,7 +74,7 @@ def _frames(evidence: Evidence) -> dict[str, FloatArray]:
     return frames(evidence.element.rolling, evidence.truth)
 
 
-CLOCK = AnotherClock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
+CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 
 
 @hypothesis("said force", "the true force with another sign, unit, frame or time is what the engine says")
@@ -201,12 +201,12 @@ def _attitudes(evidence: Evidence) -> FloatArray:
 SAID: tuple[Any, ...] = (
     CLOCK,
     starts_late,
-    ReportedVectors(_UNITS, _frames, CLOCK),
+    reported_vectors(_UNITS, _frames, CLOCK),
     reported_force,
     at_the_contact,
     stale_normal,
-    AtStart(_axes_at_start, frozenset({"slip", "N", "F2", "F3"})),
+    at_start(_axes_at_start, frozenset({"slip", "N", "F2", "F3"})),
     force_at_start,
     single_precision_run,
-    Attitudes(_attitudes),
+    reported_quaternions(_attitudes),
 )

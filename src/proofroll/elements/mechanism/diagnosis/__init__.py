@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.diagnosis.held import AnyGravity
+from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.held import held_against
 from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
 from proofroll.elements.mechanism.diagnosis.said import SAID
 from proofroll.elements.mechanism.diagnosis.structure import loop_lacks_row, lost_coupling, other_axis
 
-GRAVITY = AnyGravity(
+GRAVITY = any_gravity(
     held_against,
     lambda element: np.array(element.mechanism.gravity),
     lambda element, gravity: Change(element.mechanism, gravity=gravity),

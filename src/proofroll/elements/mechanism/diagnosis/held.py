@@ -9,8 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.fitting import FACTORS
-from proofroll.core.diagnosis.held import ABOVE, Held
+from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals
 from proofroll.core.diagnosis.lines import differing
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start
 
@@ -28,7 +27,7 @@ _FOLLOWS = frozenset(
 )
 
 
-def held_against(evidence: Evidence) -> Iterator[Held[Change]]:
+def held_against(evidence: Evidence) -> Iterator[Residuals[Change]]:
     """The start by the certificate, if its accelerations differ; the run, if it does not balance as the truth."""
     mechanism = evidence.element.mechanism
     plain = Change(mechanism)
@@ -55,15 +54,15 @@ def held_against(evidence: Evidence) -> Iterator[Held[Change]]:
 
 def _held(
     states: MechanismStates, at: str, before: float, closes: float, alone: bool, tells: Any = slice(None)
-) -> Held[Change]:
+) -> Residuals[Change]:
     def left(change: Change | None) -> FloatArray:
         return np.asarray(states.left(change or Change(states.mechanism))[tells])
 
     quantity = f"balance of the equations of motion {at}, relative,"
-    return Held(left, quantity, "1", before, closes, ("motion", *COVERED), alone)
+    return Residuals(left, quantity, "1", before, closes, ("motion", *COVERED), alone)
 
 
-def best(held: Held[Change], change: Callable[[float], Change]) -> tuple[float, int]:
+def best(held: Residuals[Change], change: Callable[[float], Change]) -> tuple[float, int]:
     """The factor that balances a linear equation, and how many numbers were fitted: none if it is a known one.
 
     Where there is one equation, any factor would do, and only those that mistakes make are looked at.

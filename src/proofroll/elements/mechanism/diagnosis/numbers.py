@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence, FunctionHypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import said_factor, telling
-from proofroll.core.diagnosis.held import Held
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
+from proofroll.core.diagnosis.fitting import Residuals, said_factor, telling
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.held import best, held_against
 from proofroll.elements.mechanism.model import Mechanism
@@ -23,7 +22,7 @@ def factor_of_all(
     change: Callable[[Mechanism, float], Change],
     has: Callable[[Mechanism], bool],
     remedy: str,
-) -> FunctionHypothesis:
+) -> Hypothesis:
     """That a number of all bodies or joints, of a mechanism that has such, has a factor on it in the engine."""
 
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
@@ -144,7 +143,7 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
             yield from _about_origin(held, mechanism, mass, com, inertia)
 
 
-def _reordered(held: Held[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
+def _reordered(held: Residuals[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
     """Moments of inertia along other axes, and products of inertia with the other sign."""
     remedy = "look at the order of moments and products of inertia, and at the sign of the products"
     for order in list(itertools.permutations(range(3)))[1:]:
@@ -159,7 +158,7 @@ def _reordered(held: Held[Change], mechanism: Mechanism, inertia: FloatArray) ->
 
 
 def _about_origin(
-    held: Held[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
+    held: Residuals[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
 ) -> Iterator[Cause]:
     """Steiner's part once too often or once too few, and centres of mass forgotten."""
     steiner = mass[:, None, None] * (

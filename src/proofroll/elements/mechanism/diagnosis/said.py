@@ -10,11 +10,11 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
 from proofroll.core.diagnosis.samples import (
-    AnotherClock,
-    AtStart,
-    Attitudes,
-    ReportedVectors,
+    another_clock,
+    at_start,
     both,
+    reported_quaternions,
+    reported_vectors,
     single_precision_run,
 )
 from proofroll.core.diagnosis.vectors import Reported
@@ -139,12 +139,12 @@ def _about_centres(told: Reported, placed: Placed, truth: Any, whole: list[Any],
     yield told.cause("point of moment", says, told.true + np.cross(at, force), remedy)
 
 
-CLOCK = AnotherClock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))
+CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))
 SAID: tuple[Any, ...] = (
     CLOCK,
-    ReportedVectors(_UNITS, _frames, CLOCK, _size, _of_centres),
-    AtStart(_axes_at_start, frozenset(), rates=False),
-    Attitudes(_attitudes),
+    reported_vectors(_UNITS, _frames, CLOCK, _size, _of_centres),
+    at_start(_axes_at_start, frozenset(), rates=False),
+    reported_quaternions(_attitudes),
     single_precision_run,
     reactions,
 )
