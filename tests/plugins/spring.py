@@ -42,6 +42,7 @@ class Spring:
         Observable("pull", "N", "force of the spring", Role.REACTION, floor=1e-9, headline=True),
         Observable("energy_error", "J", "energy now minus energy at the start", Role.RESIDUAL, floor=1e-9),
     )
+    askable: ClassVar[Mapping[str, str]] = {}
     failing_events: ClassVar[Mapping[str, str]] = {}
     failures: ClassVar[Mapping[str, str]] = {"far out": "the mass is ten times farther than at the start"}
 
@@ -67,15 +68,6 @@ class Spring:
         """Back to the middle."""
         start = np.array([[-(self.rate**2) * self.x0, 0.0, 0.0]])
         return FirstMotion(start, np.zeros((1, 3)), self.rate**2 * abs(self.x0), 1e-3 / self.rate)
-
-    @property
-    def askable(self) -> tuple[str, ...]:
-        """Nothing can be asked for."""
-        return ()
-
-    def asked(self, name: str) -> str | None:
-        """Nothing can be asked for."""
-        return None
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """The phase of a step."""

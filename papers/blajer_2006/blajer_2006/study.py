@@ -11,8 +11,8 @@ from blajer_2006.quantities import TIME, known, quantity
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import ProofrollError
 from proofroll.core.plugins import parse_engine
-from proofroll.elements.ball_on_surface.element import ASKED, rolling_ball
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.asking import describe, resolve
@@ -115,8 +115,8 @@ def run_figures(
     assert isinstance(truth, EngineFacts)
     # Asked for only of an engine that has it: without it all but the angles can still be drawn.
     formulation = str(facts.settings.get("formulation"))
-    follows = spec.name != TRUTH and ASKED[ORIENTATION] in describe(spec.name, runner.workers).provides[formulation]
-    asks = (ORIENTATION,) if follows and figures.wants_orientation else ()
+    provided = () if spec.name == TRUTH else describe(spec.name, runner.workers).provides[formulation]
+    asks = (ORIENTATION,) if BallCapability.ORIENTATION in provided and figures.wants_orientation else ()
     cases = {name: _case(figures, planned.parameters, facts, asks) for name, planned in figures.runs.items()}
     truths = {
         name: _case(figures, planned.parameters, truth, _turned(planned.parameters))

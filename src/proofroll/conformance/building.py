@@ -88,11 +88,11 @@ def builds_only_what_is_required(subject: Subject) -> None:
     settings = subject.settings
     excused = set(getattr(subject.engine, "inherent", {}).get(settings.formulation, {}))
     wished = [field.name for field in dataclasses.fields(settings) if getattr(settings, field.name) is True]
-    excused |= {item.asked(name) for item in elements for name in wished}
+    excused |= {item.askable.get(name) for item in elements for name in wished}
     wasted = terms - subject.scene.requires - excused
     require(not wasted, f"{_listed(wasted)} is in the model, which the scene does not require")
     follows = engine.sample().q_WB is not None
-    told = bool(terms & {item.asked("orientation") for item in elements})
+    told = bool(terms & {item.askable.get("orientation") for item in elements})
     require(follows == told, f"the orientation is {'' if told else 'not '}in the model, yet a sample tells otherwise")
 
 
@@ -107,7 +107,7 @@ def samples_are_well_formed(subject: Subject) -> None:
     _well_formed(start.sample(), bodies, "at time 0")
     orientation = start.sample().q_WB
     # One that can be asked for counts from the start; any other is part of the scene, and the certificate holds it.
-    if orientation is not None and any(element.asked("orientation") for element in subject.scene.elements):
+    if orientation is not None and any("orientation" in element.askable for element in subject.scene.elements):
         identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
         require(identity < 1e-12, f"q_WB at time 0 is {orientation} instead of 1, 0, 0, 0")
     moved = subject.at(subject.span(1)).sample()

@@ -116,11 +116,8 @@ class Element(Protocol):
         """What a formulation must provide to represent it with these numbers; each is a text for a person."""
 
     @property
-    def askable(self) -> tuple[str, ...]:
-        """Names of what may be asked for besides the motion."""
-
-    def asked(self, name: str) -> str | None:
-        """What a formulation must provide where ``name`` is asked for besides the motion; None: nothing of the kind."""
+    def askable(self) -> Mapping[str, str]:
+        """What may be asked for besides the motion, by name, and what a formulation must provide where it is."""
 
     @property
     def observables(self) -> tuple[Observable, ...]:

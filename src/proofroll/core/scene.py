@@ -54,7 +54,7 @@ class Scene:
             if "." in name and len(names) > 1:
                 raise InputError("scene", name, "a dot parts a quantity from its element; name the element without")
         for name in self.asks:
-            if not any(element.asked(name) for element in self.elements):
+            if not any(name in element.askable for element in self.elements):
                 known = choices(dict.fromkeys(known for element in self.elements for known in element.askable))
                 advice = f"no element of the scene has that to ask for; choose {known}" if known else "ask for nothing"
                 raise InputError("asks", name, advice)
@@ -69,8 +69,8 @@ class Scene:
     def requires(self) -> frozenset[str]:
         """What a formulation must be able to represent; no more than the scene needs."""
         needs = {need for element in self.elements for need in element.requires}
-        asked = {element.asked(name) for element in self.elements for name in self.asks}
-        return frozenset(needs | {need for need in asked if need})
+        asked = {element.askable[name] for element in self.elements for name in self.asks if name in element.askable}
+        return frozenset(needs | asked)
 
     def label(self, element: Element, name: str) -> str:
         """Name of an element's variable or observable in the scene: with the element's where there are several."""

@@ -31,7 +31,7 @@ class EachAlone:
     def __init__(self, kind: Any, scene: Scene, settings: Any) -> None:
         self.parts, self._others = {}, []
         for element in scene.elements:
-            alone = dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.asked, scene.asks)))
+            alone = dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.askable.get, scene.asks)))
             own = _settings_for(kind, alone, settings)
             require_provided(kind, own.formulation, alone)
             self.parts[element.name] = kind.build(alone, own)

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
 
-# What may be asked for besides the motion, and what a formulation must then be able to give.
-ASKED: Mapping[str, BallCapability] = {"orientation": BallCapability.ORIENTATION}
 # Part of the speed below which an initial slip is the round-off of rolling.
 _ROUND_OFF = 1e-12
 
@@ -102,15 +100,10 @@ class BallOnSurface:
     optional: ClassVar[frozenset[str]] = frozenset(
         {BallCapability.ROLLING_RESISTANCE, BallCapability.BOUNDED_FRICTION, BallCapability.ORIENTATION}
     )
-
-    @property
-    def askable(self) -> tuple[str, ...]:
-        """See the protocol."""
-        return tuple(ASKED)
-
-    def asked(self, name: str) -> str | None:
-        """See the protocol."""
-        return ASKED.get(name)
+    askable: ClassVar[Mapping[str, str]] = {"orientation": BallCapability.ORIENTATION}
+    softened: ClassVar[frozenset[str]] = frozenset(name for name in certificate.CAPS if not name.startswith("1 / "))
+    failures: ClassVar[Mapping[str, str]] = failure.MEANINGS
+    failing_events: ClassVar[Mapping[str, str]] = {"lift_off": failure.LEFT}
 
     @cached_property
     def rolling(self) -> RollingBall:
@@ -165,11 +158,6 @@ class BallOnSurface:
         """See the protocol; None for a ball at rest under rolling resistance, which has no direction yet."""
         return natural.first_motion(self.rolling)
 
-    @property
-    def softened(self) -> frozenset[str]:
-        """See the protocol."""
-        return frozenset(name for name in certificate.CAPS if not name.startswith("1 / "))
-
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
         """See :class:`proofroll.core.element_abilities.KnowsAnotherScene`."""
         friction = truth["needed_friction"].to_numpy()
@@ -208,16 +196,6 @@ class BallOnSurface:
     def certify(self, built: Any, sample: Sample) -> list[Line]:
         """See the protocol."""
         return certificate.certify(self.rolling, built, sample)
-
-    @property
-    def failures(self) -> Mapping[str, str]:
-        """See the protocol."""
-        return failure.MEANINGS
-
-    @property
-    def failing_events(self) -> Mapping[str, str]:
-        """See the protocol."""
-        return {"lift_off": failure.LEFT}
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:
         """See the protocol."""

@@ -46,7 +46,6 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) ->
     """Compares what was built, and the sample at time 0, with the mechanism; silence has a line that says so."""
     require_shapes(built, _SHAPES)
     mechanism, start, found = element.mechanism, element.start, element.first_motion
-    assert found is not None  # a mechanism always knows how it sets off
     lines: list[Line] = []
 
     def compare(quantity: str, unit: str, expected: Any, given: Any, scale: float) -> None:
@@ -103,7 +102,6 @@ def _compare_reactions(
     if sample.joint_force is None or sample.joint_torque is None:
         return
     found = element.first_motion
-    assert found is not None  # as below
     wrench = np.where(element.analysis.determinate, element.first_wrench, np.nan)
     natural = sum(body.mass for body in element.mechanism.bodies) * found.scale
     force = max(float(np.nanmax(np.abs(wrench[:, :3]), initial=0.0)), natural)
@@ -115,7 +113,6 @@ def _compare_reactions(
 def _turning(element: MechanismElement, soft: bool) -> float:
     """What angular accelerations are measured by [rad/s²]; of a soft model by the natural one, as accelerations are."""
     found = element.first_motion
-    assert found is not None  # as above
     least = (1.0 if soft else _LEAST) * found.scale / element.length
     return max(float(np.max(np.abs(found.angular_acceleration))), least)
 

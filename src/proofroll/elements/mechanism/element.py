@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
-from proofroll.elements.mechanism.certificate import certify
+from proofroll.elements.mechanism.certificate import CAPS, certify
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
@@ -52,10 +52,14 @@ class MechanismElement:
 
     mechanism: Mechanism
 
-    @property
-    def name(self) -> str:
-        """There is one in a scene."""
-        return "mechanism"
+    name: ClassVar[str] = "mechanism"  # there is one in a scene
+    askable: ClassVar[Mapping[str, str]] = {}  # all is given
+    softened: ClassVar[frozenset[str]] = frozenset(CAPS)
+    failures: ClassVar[Mapping[str, str]] = {
+        OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
+        ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
+    }
+    failing_events: ClassVar[Mapping[str, str]] = {}
 
     @property
     def bodies(self) -> tuple[str, ...]:
@@ -72,15 +76,6 @@ class MechanismElement:
         """See the protocol."""
         redundant = {MechanismCapability.REDUNDANT} if self.analysis.redundant else set()
         return frozenset(required(self.mechanism) | redundant)
-
-    @property
-    def askable(self) -> tuple[str, ...]:
-        """Nothing: all is given."""
-        return ()
-
-    def asked(self, name: str) -> str | None:  # noqa: ARG002 -- the protocol's
-        """Nothing can be asked for: all is given."""
-        return None
 
     @cached_property
     def start(self) -> Placed:
@@ -194,7 +189,7 @@ class MechanismElement:
         )
 
     @property
-    def first_motion(self) -> FirstMotion | None:
+    def first_motion(self) -> FirstMotion:
         """See the protocol."""
         found = self._solution
         motion = found.motion
@@ -207,11 +202,6 @@ class MechanismElement:
         """What each joint and loop does to its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
         wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
         return wrench
-
-    @property
-    def softened(self) -> frozenset[str]:
-        """See the protocol."""
-        return frozenset({"acceleration", "angular acceleration", "forces", "torques"})
 
     def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
@@ -249,19 +239,6 @@ class MechanismElement:
     def certify(self, built: Any, sample: Sample) -> list[Line]:
         """See the protocol."""
         return certify(self, built, sample)
-
-    @property
-    def failures(self) -> Mapping[str, str]:
-        """See the protocol."""
-        return {
-            OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
-            ENERGY_GAIN: f"the energy grew by more than {GAIN:.0%} of what its weight or speed can make",
-        }
-
-    @property
-    def failing_events(self) -> Mapping[str, str]:
-        """None."""
-        return {}
 
     def signs(self, dataset: xr.Dataset, truth: xr.Dataset | None) -> list[Sign]:  # noqa: ARG002 -- the protocol's
         """See the protocol."""
