@@ -96,7 +96,7 @@ def _request(written: Path, file: RobotFile, truth: RobotTruth, options: dict[st
     robot = truth.robot
     children = {joint.name: joint.child for joint in robot.moving}
     what = (written, file.kind, file.base, BASE_JOINT, options, children)
-    return Request(*what, truth.states, truth.torques(), robot.gravity, robot)
+    return Request(*what, truth.states, truth.torques, robot.gravity, robot)
 
 
 # A URDF says nothing about its base: both are tried.
@@ -126,7 +126,7 @@ def test_real_engines(
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
     answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
-    row = judged(file, truth, 1e-14, spec, answer, truth.torques())
+    row = judged(file, truth, 1e-14, spec, answer)
     assert row.refused is None
     assert row.unexplained is None, row.layers
     assert {cause.id for cause in row.causes} == expected
@@ -220,7 +220,7 @@ def _held(robot: Robot, truth: RobotTruth) -> Reading:
     states = truth.states
     d, placed = body_recursion(robot, states), poses(robot, states)
     asked = states.stacked(states.acceleration, robot)
-    torque = np.concatenate([truth.torques()[joint.name] for joint in robot.moving], axis=1)
+    torque = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
     forward = np.linalg.solve(d.M, (torque - d.h - passive(robot, states))[..., None])[..., 0]
     groups = robot.groups
     return Reading(
@@ -248,7 +248,7 @@ def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> Im
     robot, held = (read_urdf(file) for file in files)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, _held(held, truth), "")
-    return judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
+    return judged(files[0], truth, 1e-14, parse_engine("planted"), answer)
 
 
 @pytest.mark.parametrize("base", ["fixed", "free"])
@@ -320,7 +320,7 @@ def test_planted_causes_in_mjcf(
         robots.append(reading.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, _held(robots[1], truth), "")
-    row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer, truth.torques())
+    row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer)
     assert [found.id for found in row.causes] == [cause]
     assert row.status == "explained"
 
@@ -333,6 +333,6 @@ def test_free_base_that_was_fixed(tmp_path: Path) -> None:
     robot, held = read_urdf(free), read_urdf(fixed)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, dataclasses.replace(_held(held, truth)), "")
-    row = judged(free, truth, 1e-14, parse_engine("planted"), answer, truth.torques())
+    row = judged(free, truth, 1e-14, parse_engine("planted"), answer)
     assert [cause.id for cause in row.causes] == ["free_base_is_fixed"]
     assert row.status == "explained"

@@ -70,9 +70,10 @@ def check(
         sampled = random_states(robot, states, seed)
         truth = RobotTruth.of(robot, sampled)
         bar = _bar(truth)
-        torques = truth.torques()
         children = {joint.name: joint.child for joint in robot.moving}
-        request = Request(written, file.kind, base, BASE_JOINT, {}, children, sampled, torques, robot.gravity, robot)
+        request = Request(
+            written, file.kind, base, BASE_JOINT, {}, children, sampled, truth.torques, robot.gravity, robot
+        )
 
         def row(spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
             own = dataclasses.replace(request, options=options)
@@ -85,7 +86,7 @@ def check(
                 return ImporterRow(engine=str(spec), status="missing", refused=str(error))
             except WorkerDied as error:
                 return ImporterRow(engine=str(spec), status=str(error.status), refused=str(error))
-            found = judged(file, truth, bar, spec, answer, torques)
+            found = judged(file, truth, bar, spec, answer)
             if _is_another_version(spec, answer.version, compiler):
                 found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))
             return found

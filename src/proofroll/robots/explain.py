@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from xml.etree.ElementTree import Element
 
 from proofroll.robots.hypotheses import RobotEvidence, RobotHypothesis, hypotheses
 from proofroll.robots.layers import LAYERS, RobotTruth, differences, first_failing
-from proofroll.robots.model import Array, Robot
+from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
 
@@ -49,45 +49,59 @@ class _Step:
     causes: tuple[RobotCause, ...] = ()
 
 
-def explain(
-    file: RobotFile,
-    truth: RobotTruth,
-    torques: dict[str, Array],
-    reading: Reading,
-    engine: str,
-    tolerances: dict[str, float],
-    recompiled: Callable[[Element], Robot | None] = lambda _: None,
-) -> tuple[tuple[RobotCause, ...], str | None]:
-    """The causes of all differences, and the first layer that they leave unexplained.
-
-    The forward dynamics were asked for the ``torques``, by joint; a layer holds up to its tolerance. For ``recompiled``
-    see :class:`proofroll.robots.hypotheses.RobotEvidence`.
-    """
-    step = _Step(truth, differences(truth, torques, reading))
-    ranked = sorted(hypotheses(), key=lambda item: engine not in item.known)
-    while (layer := first_failing(step.found, tolerances)) is not None:
-        closed = _closed(step, layer, ranked, engine, tolerances, _Trial(file, torques, reading, recompiled))
-        if closed is None:
-            return step.causes, layer
-        step = closed
-    return step.causes, None
-
-
 @dataclasses.dataclass(frozen=True)
-class _Trial:
-    """Evaluates a hypothesis."""
+class Search:
+    """Looks for the causes of what an engine holds.
+
+    Attributes:
+        file: what was read.
+        reading: what the engine holds.
+        engine: its name.
+        tolerances: up to which a layer holds.
+        recompiled: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
+    """
 
     file: RobotFile
-    torques: dict[str, Array]
     reading: Reading
-    recompiled: Callable[[Element], Robot | None]
+    engine: str
+    tolerances: dict[str, float]
+    recompiled: Callable[[Element], Robot | None] = lambda _: None
 
-    def __call__(self, step: _Step, hypothesis: RobotHypothesis, layer: str) -> _Step | None:
+    def causes(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
+        """The causes of all differences, and the first layer that they leave unexplained."""
+        step = _Step(truth, differences(truth, self.reading))
+        while (layer := first_failing(step.found, self.tolerances)) is not None:
+            closed = self._closed(step, layer)
+            if closed is None:
+                return step.causes, layer
+            step = closed
+        return step.causes, None
+
+    def _closed(self, step: _Step, layer: str) -> _Step | None:
+        """The step after the causes that close a layer: one alone if there is one, else several one after another."""
+        limit = self.tolerances[layer]
+        ranked = sorted(hypotheses(), key=lambda item: self.engine not in item.known)
+        best = [step]
+        while best and best[0].found[layer] > limit:
+            candidates: list[_Step] = []
+            for begun in best:
+                for hypothesis in ranked:
+                    if hypothesis.id in {cause.id for cause in begun.causes}:
+                        continue
+                    if self.engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
+                        break  # one that is known of this engine closes the layer
+                    tried = self._tried(begun, hypothesis, layer)
+                    if tried is not None and tried.found[layer] <= _HELPS * begun.found[layer]:
+                        candidates.append(tried)
+            best = sorted(candidates, key=lambda item: self._rank(item, layer))[:_BRANCHES]
+        return best[0] if best else None
+
+    def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str) -> _Step | None:
         robot = hypothesis.change(RobotEvidence(self.file, step.truth.robot, self.reading, self.recompiled))
         if robot is None or robot is step.truth.robot or not robot.moving:
             return None
         truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
-        found = differences(truth, self.torques, self.reading)
+        found = differences(truth, self.reading)
         if layer not in found:
             return None
         known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
@@ -95,35 +109,8 @@ class _Trial:
         cause = RobotCause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
         return _Step(truth, found, (*step.causes, cause))
 
-
-def _closed(
-    step: _Step,
-    layer: str,
-    ranked: list[RobotHypothesis],
-    engine: str,
-    tolerances: Mapping[str, float],
-    trial: Callable[[_Step, RobotHypothesis, str], _Step | None],
-) -> _Step | None:
-    """The step after the causes that close a layer: one alone if there is one, else several one after another."""
-    limit = tolerances[layer]
-    best = [step]
-    while best and best[0].found[layer] > limit:
-        candidates: list[_Step] = []
-        for begun in best:
-            for hypothesis in ranked:
-                if hypothesis.id in {cause.id for cause in begun.causes}:
-                    continue
-                if engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
-                    break  # one that is known of this engine closes the layer
-                tried = trial(begun, hypothesis, layer)
-                if tried is not None and tried.found[layer] <= _HELPS * begun.found[layer]:
-                    candidates.append(tried)
-        best = sorted(candidates, key=lambda item: _rank(item, layer, tolerances))[:_BRANCHES]
-    return best[0] if best else None
-
-
-def _rank(step: _Step, layer: str, tolerances: Mapping[str, float]) -> tuple[int, float]:
-    """Best first: one after which the most layers hold from the start, then the smallest difference."""
-    failing = first_failing(step.found, dict(tolerances))
-    order = list(LAYERS)
-    return (-(order.index(failing) if failing else len(order)), step.found[layer])
+    def _rank(self, step: _Step, layer: str) -> tuple[int, float]:
+        """Best first: one after which the most layers hold from the start, then the smallest difference."""
+        failing = first_failing(step.found, self.tolerances)
+        order = list(LAYERS)
+        return (-(order.index(failing) if failing else len(order)), step.found[layer])

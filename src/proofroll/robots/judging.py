@@ -5,17 +5,19 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import tempfile
+from collections.abc import Callable
+from functools import cache, lru_cache
 from pathlib import Path
-from xml.etree.ElementTree import Element, tostring
+from xml.etree.ElementTree import Element, fromstring, tostring
 
 import numpy as np
 
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots import reading
-from proofroll.robots.explain import explain
+from proofroll.robots.explain import Search
 from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences
-from proofroll.robots.model import Array, Robot
+from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile
@@ -34,12 +36,8 @@ def judged(
     bar: float,
     spec: EngineSpec,
     answer: reading.ReaderAnswer,
-    torques: dict[str, Array],
 ) -> ImporterRow:
-    """The row of an engine that answered.
-
-    The two formulations of the truth differ by ``bar``; the forward dynamics were asked for the ``torques``, by joint.
-    """
+    """The row of an engine that answered; the two formulations of the truth differ by ``bar``."""
     row = ImporterRow(
         engine=str(spec), status="refused", version=answer.version, refused=answer.refused, says=answer.says
     )
@@ -47,12 +45,12 @@ def judged(
         return row
     tolerances = {layer: max(answer.tolerances.get(layer, TOLERANCE), _MARGIN * bar) for layer in LAYERS}
     tolerances["joints"] = 0.0
-    found = differences(truth, torques, answer.reading)
+    found = differences(truth, answer.reading)
     layers = {
         layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in found.items()
     }
-    recompiled = _Recompiler(file)
-    causes, unexplained = explain(file, truth, torques, answer.reading, plain_name(spec.name), tolerances, recompiled)
+    search = Search(file, answer.reading, plain_name(spec.name), tolerances, _recompiler(file))
+    causes, unexplained = search.causes(truth)
     holds = all(layer.holds for layer in layers.values())
     return dataclasses.replace(
         row,
@@ -66,24 +64,16 @@ def judged(
     )
 
 
-class _Recompiler:
+def _recompiler(file: RobotFile) -> Callable[[Element], Robot | None]:
     """What a changed file would mean; None: nothing, or the format is read by us. Each is compiled once."""
 
-    def __init__(self, file: RobotFile) -> None:
-        self._file = file
-        self._known: dict[bytes, Robot | None] = {}
-
-    def __call__(self, root: Element) -> Robot | None:
-        text = tostring(root)
-        if text not in self._known:
-            self._known[text] = None if self._file.kind == "urdf" else self._compiled(root)
-        return self._known[text]
-
-    def _compiled(self, root: Element) -> Robot | None:
-        changed = dataclasses.replace(self._file, root=root)
-        with tempfile.TemporaryDirectory() as name, contextlib.suppress(InputError):
-            return meaning(changed, reading.write(changed, Path(name)), TIME_LIMIT)[0]
+    @cache
+    def compiled(content: bytes) -> Robot | None:
+        with contextlib.suppress(InputError):
+            return meant(file.path, file.kind, file.base, content)
         return None
+
+    return lambda root: None if file.kind == "urdf" else compiled(tostring(root))
 
 
 def _offending(truth: RobotTruth, held: Reading) -> list[str]:
@@ -116,3 +106,15 @@ def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, s
         except WorkerDied as error:
             raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
     return robot.change(name=file.root.get("model", "robot")), by
+
+
+@lru_cache(maxsize=8)
+def meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
+    """What a file of this content means; MJCF is compiled in a process, which is worth remembering.
+
+    Raises:
+        InputError: it has no meaning.
+    """
+    file = RobotFile(path, kind, fromstring(content), base)
+    with tempfile.TemporaryDirectory() as folder:
+        return meaning(file, reading.write(file, Path(folder)), TIME_LIMIT)[0]

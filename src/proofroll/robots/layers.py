@@ -86,17 +86,20 @@ class RobotTruth:
         d = self.dynamics
         return np.asarray(np.einsum("sij,sj->si", d.M, acceleration)) + d.h + self.passive
 
+    @cached_property
     def torques(self) -> dict[str, Array]:
-        """What gives the accelerations of the states, by joint."""
+        """Those that engines are asked the forward dynamics for: what gives the accelerations of the states, by joint.
+
+        Of a robot as an engine would hold it they are those of ``like``, which engines were asked for.
+        """
+        if self.like is not None:
+            return self.like.torques
         found = self.inverse + self.passive
         return {name: found[:, columns] for name, columns in self.robot.columns.items()}
 
 
-def differences(truth: RobotTruth, torques: dict[str, Array], reading: Reading) -> dict[str, float]:
-    """How far an engine is off, by layer; a layer that the engine does not offer is left out.
-
-    ``torques`` by joint are those that the engine was asked the forward dynamics for.
-    """
+def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:
+    """How far an engine is off, by layer; a layer that the engine does not offer is left out."""
     robot, d = truth.robot, truth.dynamics
     dofs = dict(zip(reading.joints, reading.dofs, strict=True))
     followers = {mimic.joint for mimic in robot.mimics}
@@ -127,7 +130,7 @@ def differences(truth: RobotTruth, torques: dict[str, Array], reading: Reading) 
     if reading.inverse is not None:
         found["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
     if reading.forward is not None and not truth.singular:
-        given = np.concatenate([torques[joint.name] for joint in robot.moving], axis=1)
+        given = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
         reached = reading.forward[:, theirs] @ G.T
         found["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
     return found

@@ -6,9 +6,7 @@ nothing by itself (actuators, contacts, looks) is left out.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element, tostring
@@ -19,9 +17,8 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
-from proofroll.robots.judging import TIME_LIMIT, meaning
+from proofroll.robots.judging import meant
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
-from proofroll.robots.reading import write
 from proofroll.robots.robot_file import BASES, RobotFile, open_robot
 from proofroll.robots.states import RobotStates, random_states
 
@@ -116,17 +113,7 @@ class RobotScenes:
 
 def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
     file = open_robot(path, base)
-    return file, _meant(file.path, file.kind, base, tostring(file.root))
-
-
-@lru_cache(maxsize=8)
-def _meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
-    """What a file means; MJCF is compiled in a process, which is worth remembering."""
-    from xml.etree.ElementTree import fromstring
-
-    file = RobotFile(path, kind, fromstring(content), base)
-    with tempfile.TemporaryDirectory() as folder:
-        return meaning(file, write(file, Path(folder)), TIME_LIMIT)[0]
+    return file, meant(file.path, file.kind, base, tostring(file.root))
 
 
 def _names(robot: Robot) -> dict[str, str]:
