@@ -14,6 +14,7 @@ import typer
 from robot_templates import urdf
 
 from proofroll.cli import app
+from proofroll.elements.ball_on_surface.onset_study import EngineOnset, OnsetStudy
 from proofroll.files.json_data import MERGED
 from proofroll.report.ladder import Absence, KnownTruth, LadderContent, Ran, RungFound, SideFound, TermFound
 from proofroll.robots.explain import RobotCause
@@ -149,7 +150,7 @@ TRADEOFF = (
         ("json.md", "`stability --json`", MAP),
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
         ("json.md", "`ladder --json`", LADDER),
-        ("json.md", "`onset --json`", (Onset,)),
+        ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
         ("json.md", "The other commands", (Drilled, Mutated, GalleryRow)),
     ],
     ids=["robots", "stability", "tradeoff", "ladder", "onset", "others"],

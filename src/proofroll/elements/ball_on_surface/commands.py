@@ -14,6 +14,8 @@ from proofroll.cli import options
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from proofroll.elements.ball_on_surface.onset_study import OnsetStudy
+
 
 def onset(
     scene: options.SceneName,
@@ -33,7 +35,7 @@ def onset(
 
     time_grid(until, 0.01)
     with options.progress_bar("runs") as advance:
-        study = onset_study(
+        found = onset_study(
             scene,
             options.assignments(settings),
             options.new_runner(out, fresh, jobs, scheduler),
@@ -42,16 +44,15 @@ def onset(
             uncertainty=uncertainty,
             progress=lambda case, _: advance(case.engine.name),
         )
-    content = study.content()
-    options.show(content, as_json, lambda: [summary(content), _onset_table(content)])
-    verdicts = {item["verdict"] for item in content["engines"]}
+    options.show(found, as_json, lambda: [summary(found), _onset_table(found)])
+    verdicts = {item.verdict for item in found.engines}
     # A refusal is an answer where nobody asked for that engine in particular.
     if "failed" in verdicts or (engine and "refused" in verdicts):
         raise typer.Exit(options.ENGINE)
     raise typer.Exit(options.CONTRADICTED if "disagree" in verdicts else options.OK)
 
 
-def _onset_table(content: dict[str, Any]) -> Table:
+def _onset_table(study: OnsetStudy) -> Table:
     """One line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
     from rich.table import Column
     from rich.text import Text
@@ -66,20 +67,12 @@ def _onset_table(content: dict[str, Any]) -> Table:
         *numeric("difference [s]"),
         Column("verdict", overflow="fold"),
     )
-    for item in content["engines"]:
-        first = item["onset"]
-        bracket = f"{first['time_low']:.9g} … {first['time_high']:.9g}" if first else ""
-        verdict = item["verdict"]
-        if verdict in {"failed", "refused"}:
-            verdict += f": {item['message']}"
-        label = (item["name"], *(item["settings"].get(key, "") for key in ("formulation", "preset")))
-        table.add_row(
-            Text(" ".join(filter(None, label))),
-            f"{first['time']:.9g}" if first else "none",
-            bracket,
-            number(item["difference"]),
-            Text(verdict),
-        )
+    for item in study.engines:
+        first = item.onset
+        told = (f"{first.time:.9g}", f"{first.time_low:.9g} … {first.time_high:.9g}") if first else ("none", "")
+        verdict = item.verdict + (f": {item.message}" if item.verdict in {"failed", "refused"} else "")
+        label = (item.name, *(item.settings.get(key, "") for key in ("formulation", "preset")))
+        table.add_row(Text(" ".join(filter(None, label))), *told, number(item.difference), Text(verdict))
     return table
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -12,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.events import Event, events_of
 from proofroll.core.plugins import engine_names, parse_engine
-from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
@@ -36,53 +34,34 @@ class EngineOnset:
     """The first slip in one engine.
 
     Attributes:
-        engine: the engine with the settings that were asked for.
-        facts: complete settings, or None if it could not be asked.
-        result: how the run ended.
-        first: the first slip with its bracket, or None.
+        engine: with the settings that were asked for.
+        name: of the engine alone.
+        settings: complete; empty if it could not be asked.
+        status, message: how its run ended.
+        onset: the first slip with its bracket, or None.
+        difference: from the truth's first slip [s]; None where one of them is none.
         verdict: ``agree``, ``disagree``, ``ill-posed``, ``refused`` or ``failed``.
     """
 
     engine: str
-    facts: EngineFacts | None
-    result: Result
-    first: Event | None
+    name: str
+    settings: Mapping[str, Any]
+    status: Status
+    message: str
+    onset: Event | None
+    difference: float | None
     verdict: str
 
 
 @dataclass(frozen=True)
 class OnsetStudy:
-    """The truth's onset with its conditioning, and every engine's."""
+    """The truth's onset with its conditioning, and every engine's, in a scene with these parameters."""
 
-    scene: Scene
+    scene: str
+    parameters: Mapping[str, Any]
     until: float
     truth: Onset
     engines: list[EngineOnset]
-
-    def content(self) -> dict[str, Any]:
-        """As plain data."""
-        return {
-            "scene": self.scene.name,
-            "parameters": dict(self.scene.parameters),
-            "until": self.until,
-            "truth": dataclasses.asdict(self.truth),
-            "engines": [
-                {
-                    "engine": item.engine,
-                    "name": parse_engine(item.engine).name,
-                    "settings": item.facts.settings if item.facts else {},
-                    "status": item.result.status,
-                    "message": item.result.message,
-                    "onset": None if item.first is None else dataclasses.asdict(item.first),
-                    "difference": self._difference(item),
-                    "verdict": item.verdict,
-                }
-                for item in self.engines
-            ],
-        }
-
-    def _difference(self, item: EngineOnset) -> float | None:
-        return None if item.first is None or self.truth.time is None else item.first.time - self.truth.time
 
 
 def default_engines(workers: Workers | None = None) -> list[str]:
@@ -152,14 +131,16 @@ def onset_study(
         for index, answer in zip(late, run([asked[index] for index in late], until), strict=True):
             answers[index] = answer
     rows, answered = [], iter(answers)
-    for name, found in zip(names, facts, strict=True):
+    for name, spec, found in zip(names, specs, facts, strict=True):
         if not isinstance(found, EngineFacts):
             status = found.status if isinstance(found, WorkerDied) else Status.MISSING
-            rows.append(EngineOnset(name, None, Result(status, str(found)), None, "failed"))
+            rows.append(EngineOnset(name, spec.name, {}, status, str(found), None, None, "failed"))
             continue
         result, first = next(answered)
-        rows.append(EngineOnset(name, found, result, first, onset_verdict(truth, result, first)))
-    return OnsetStudy(loaded, until, truth, rows)
+        apart = None if first is None or truth.time is None else first.time - truth.time
+        ended = (result.status, result.message, first, apart, onset_verdict(truth, result, first))
+        rows.append(EngineOnset(name, spec.name, found.settings, *ended))
+    return OnsetStudy(loaded.name, loaded.parameters, until, truth, rows)
 
 
 def _soon(truth: Onset, until: float) -> float:
@@ -191,17 +172,17 @@ def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
     return "agree" if first.time_low <= max(times) and first.time_high >= min(times) else "disagree"
 
 
-def summary(content: dict[str, Any]) -> str:
+def summary(study: OnsetStudy) -> str:
     """The conditioning of the truth in one paragraph."""
-    truth = content["truth"]
-    if truth["time"] is None:
-        return f"In the truth the ball does not slip within {content['until']:g} s."
-    said = f"In the truth the ball first slips at {truth['time']:.9g} s; "
-    said += f"d ln t / d ln mu = {_number(truth['by_mu'])}, d ln t / d ln f = {_number(truth['by_f'])}. "
-    edges = [f"{truth[key]:.6g}" for key in ("edge_below", "edge_above") if truth[key] is not None]
+    truth = study.truth
+    if truth.time is None:
+        return f"In the truth the ball does not slip within {study.until:g} s."
+    said = f"In the truth the ball first slips at {truth.time:.9g} s; "
+    said += f"d ln t / d ln mu = {_number(truth.by_mu)}, d ln t / d ln f = {_number(truth.by_f)}. "
+    edges = [f"{edge:.6g}" for edge in (truth.edge_below, truth.edge_above) if edge is not None]
     if edges:
-        said += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth['distance']:.3g} % away; "
-    said += f"for mu and f known to {100 * truth['uncertainty']:g} % the question is {truth['verdict']}."
+        said += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth.distance:.3g} % away; "
+    said += f"for mu and f known to {100 * truth.uncertainty:g} % the question is {truth.verdict}."
     return said
 
 
