@@ -17,6 +17,16 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return found
 
 
+def on_turns(time: FloatArray, u: FloatArray, rate: FloatArray, start: float, period: float) -> FloatArray:
+    """A periodic coordinate on the branches that its rates predict, from that of the start on, shape (time,).
+
+    Prediction by the rates, rather than a plain unwrapping, stays right when samples are a turn or more apart.
+    """
+    predicted = np.diff(time) * (rate[1:] + rate[:-1]) / 2
+    turns = np.concatenate([[0.0], np.cumsum(np.round((predicted - np.diff(u)) / period))])
+    return np.asarray(u + period * (turns + np.round((start - u[0]) / period)))
+
+
 def largest_difference(one: FloatArray, other: FloatArray) -> float:
     """Largest difference of two curves; inf where one has what the other has not, or something is not finite."""
     if one.shape != other.shape:

@@ -166,11 +166,8 @@ def evaluate(
 
 
 def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int, ...]) -> Array:
-    """Rates of an engine's joints in its order; of a joint that the file does not have, zero."""
+    """Rates of an engine's joints in its order; of one that the file does not have, or has otherwise, zero."""
     count = len(next(iter(rates.values())))
-    parts = [rates.get(name, np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True)]
-    if any(part.shape[1] != dof for part, dof in zip(parts, dofs, strict=True)):
-        parts = [
-            part if part.shape[1] == dof else np.zeros((count, dof)) for part, dof in zip(parts, dofs, strict=True)
-        ]
+    found = ((rates.get(name), np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True))
+    parts = [zero if rate is None or rate.shape[1] != zero.shape[1] else rate for rate, zero in found]
     return np.concatenate(parts, axis=1)

@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, on_turns
 from proofroll.core.columns import SMALLEST, Columns, Variable, axes
 from proofroll.core.engine import Sample
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.surfaces import Surface
 
 
 def from_samples(
@@ -73,8 +72,11 @@ def columns(
     |F|/N [-]; ``gap`` [m]; ``energy`` [J]. What the engine cannot say is absent.
     """
     surface = body.surface
-    rates = _coordinate_rates(surface, p_WB, v_WB)
-    u = _unwrapped(body, times, surface.locate(p_WB), rates)
+    u = np.array(surface.locate(p_WB))
+    rates = np.einsum("tij,tj->ti", np.linalg.pinv(surface.tangents(u)), v_WB)
+    for column, period in enumerate(surface.periods):
+        if period is not None:
+            u[:, column] = on_turns(times, u[:, column], rates[:, column], body.u0[column], period)
     frame = surface.frame(u)
     e1 = surface.normal(p_WB)
     spin = np.einsum("tij,ti->tj", frame, w_WB)
@@ -115,25 +117,3 @@ def _smallest(variables: Mapping[str, Variable]) -> dict[str, float]:
     """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
     found = variables["N"][1] if "N" in variables else np.zeros(0)
     return {f"{SMALLEST}N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}
-
-
-def _coordinate_rates(surface: Surface, p_WB: FloatArray, v_WB: FloatArray) -> FloatArray:
-    tangents = surface.tangents(surface.locate(p_WB))
-    return np.asarray(np.einsum("tij,tj->ti", np.linalg.pinv(tangents), v_WB))
-
-
-def _unwrapped(body: RollingBall, times: FloatArray, located: FloatArray, rates: FloatArray) -> FloatArray:
-    """Continuous coordinates: each point takes the branch nearest to what the rates predict.
-
-    Prediction by the rates, rather than a plain unwrapping, stays right when samples are a turn or more apart.
-    """
-    u = located.copy()
-    predicted = np.diff(times)[:, None] * (rates[1:] + rates[:-1]) / 2
-    for column, period in enumerate(body.surface.periods):
-        if period is None:
-            continue
-        step = predicted[:, column] - np.diff(located[:, column])
-        turns = np.concatenate([[0.0], np.cumsum(np.round(step / period))])
-        start = np.round((body.u0[column] - located[0, column]) / period)
-        u[:, column] = located[:, column] + period * (turns + start)
-    return u

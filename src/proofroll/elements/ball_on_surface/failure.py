@@ -9,6 +9,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Sign
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.observables import creep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,11 +82,4 @@ def heading(v: FloatArray) -> FloatArray:
 
 def cause(body: RollingBall, dataset: xr.Dataset, error: float) -> str | None:
     """Creep, where the way slipped while rolling is a large part of the ``error`` of the last coordinate."""
-    times = dataset["time"].to_numpy()
-    slip = np.hypot(dataset["slip2"].to_numpy(), dataset["slip3"].to_numpy())
-    rolls = np.ones(len(times), dtype=bool)
-    if "sticking" in dataset:
-        rolls = dataset["sticking"].to_numpy().astype(bool)
-    both = rolls[1:] & rolls[:-1]
-    slipped = float(np.sum(both * np.diff(times) * (slip[1:] + slip[:-1]) / 2))
-    return CREEP if slipped >= SLIPPED * error * body.surface.length_scales[-1] else None
+    return CREEP if creep(dataset) >= SLIPPED * error * body.surface.length_scales[-1] else None

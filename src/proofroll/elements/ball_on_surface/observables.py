@@ -116,13 +116,14 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
         curves["event_times"] = np.array([event.time for event in events_of(dataset)])
     if "sticking" in dataset:
         curves["first_slip"] = np.array([event.time for event in events_of(dataset) if event.kind == "slip"][:1])
-        curves["creep"] = np.array([_creep(curves["slip"], dataset)])
+        curves["creep"] = np.array([creep(dataset)])
     return curves
 
 
-def _creep(slip: FloatArray, dataset: xr.Dataset) -> float:
-    """Way slipped while sticking [m]; an interval counts if the ball sticks at both of its ends."""
-    sticking, t = dataset["sticking"].to_numpy().astype(bool), dataset["time"].to_numpy()
+def creep(dataset: xr.Dataset) -> float:
+    """Way slipped while sticking [m]; an interval counts if the ball sticks at both of its ends, or nobody says."""
+    slip, t = dataset["slip"].to_numpy(), dataset["time"].to_numpy()
+    sticking = dataset["sticking"].to_numpy().astype(bool) if "sticking" in dataset else np.ones(len(t), dtype=bool)
     both = sticking[1:] & sticking[:-1]
     return float(np.sum(both * np.diff(t) * (slip[1:] + slip[:-1]) / 2))
 

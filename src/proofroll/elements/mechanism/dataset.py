@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,11 +30,9 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
         given = [getattr(sample, name) for sample in samples]
         return np.array([empty if value is None else np.reshape(value, (rows, width)) for value in given])
 
-    force, torque = (
-        np.array([reactions(element, sample, name) for sample in samples]) for name in ("joint_force", "joint_torque")
-    )
     p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
-    return columns(element, times, p, v, w, stacked("q_WB", 4, count), force, torque)
+    wrench = np.array([[reactions(element, s, name) for name in ("joint_force", "joint_torque")] for s in samples])
+    return columns(element, Placed(element.mechanism, times, p, v, w, stacked("q_WB", 4, count)), wrench)
 
 
 def reactions(element: MechanismElement, sample: Sample, name: str) -> FloatArray:
@@ -54,17 +53,8 @@ def reactions(element: MechanismElement, sample: Sample, name: str) -> FloatArra
     return values.reshape(shape)
 
 
-def columns(
-    element: MechanismElement,
-    times: FloatArray,
-    p_WB: FloatArray,
-    v_WB: FloatArray,
-    w_WB: FloatArray,
-    q_WB: FloatArray,
-    force: FloatArray,
-    torque: FloatArray,
-) -> Columns:
-    """Everything that follows from the motion of the bodies and the wrenches.
+def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Columns:
+    """Everything that follows from the motion of the bodies and the forces and moments, (time, 2, joints + loops, 3).
 
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
@@ -73,16 +63,16 @@ def columns(
     determinate components of all; ``energy`` [J], ``energy_error`` [J], ``drift`` [m].
     """
     mechanism, determinate = element.mechanism, element.analysis.determinate
-    placed = Placed(mechanism, times, p_WB, v_WB, w_WB, _continuous(q_WB, element.start.q_WB[0]))
+    placed = replace(placed, q_WB=_continuous(placed.q_WB, element.start.q_WB[0]))
     found: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, absent: str = "") -> None:
         attributes = {"units": unit, "long_name": meaning} | ({"absent": absent} if absent else {})
         found[name] = Variable(("time", *dims), values, attributes)
 
-    put("p_WB", p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
-    put("v_WB", v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
-    put("w_WB", w_WB, "rad/s", "angular velocity in the world", "body", "xyz")
+    put("p_WB", placed.p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
+    put("v_WB", placed.v_WB, "m/s", "velocity of that origin in the world", "body", "xyz")
+    put("w_WB", placed.w_WB, "rad/s", "angular velocity in the world", "body", "xyz")
     put("q_WB", placed.q_WB, "1", "orientation, quaternion scalar first", "body", "wxyz")
     put("attitudes", placed.q_WB, "1", "quaternions of the bodies", "body", "wxyz")
     put("positions", placed.points, "m", "tracked points, or origins of the bodies", "point", "xyz")
@@ -93,10 +83,8 @@ def columns(
     for index, point in enumerate(mechanism.points):
         for axis, letter in enumerate("xyz"):
             put(f"{point.name}.{letter}", placed.points[:, index, axis], "m", f"{letter} of the point {point.name}")
-    for kind, unit, values, known in (
-        ("force", "N", force, determinate[:, :3]),
-        ("torque", "N m", torque, determinate[:, 3:]),
-    ):
+    for part, (kind, unit) in enumerate((("force", "N"), ("torque", "N m"))):
+        values, known = wrench[:, part], determinate[:, 3 * part : 3 * part + 3]
         masked = np.where(known, values, np.nan)
         for index, connection in enumerate(mechanism.connections):
             for axis, letter in enumerate("xyz"):
@@ -112,7 +100,7 @@ def columns(
     put("energy", energy, "J", "kinetic and potential energy")
     put("energy_error", energy - energy[0], "J", "energy now minus energy at the start")
     put("drift", placed.drift(), "m", "how far joints and loops are open")
-    return Columns(found | axes(times) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
+    return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 
 
 def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.arrays import FloatArray, cross, on_turns
 from proofroll.elements.mechanism.joint import FACTS, Joint
 from proofroll.elements.mechanism.model import Mechanism
 
@@ -88,7 +88,8 @@ class Placed:
         if joint.kind == "universal":
             cosine, sine = np.sum(axis * B[..., 2], -1), np.sum(axis * B[..., 1], -1)
             found.append((np.arctan2(sine, cosine), np.sum(turning * B[..., 0], -1)))
-        return [(_counted(self.time, *turn, start), turn[1]) for turn, start in zip(found, joint.q0, strict=True)]
+        turns = zip(found, joint.q0, strict=True)
+        return [(on_turns(self.time, angle, rate, start, _TURN), rate) for (angle, rate), start in turns]
 
     def energy(self) -> FloatArray:
         """Kinetic energy, and potential energy of gravity and of all springs [J], shape (time,)."""
@@ -120,10 +121,3 @@ class Placed:
             for first, second in FACTS[kind].rotations:
                 worst = np.maximum(worst, np.abs(np.sum(A[..., first] * B[..., second], -1)))
         return worst
-
-
-def _counted(time: FloatArray, angle: FloatArray, rate: FloatArray, start: float) -> FloatArray:
-    """Angles on the turns that their rates predict, from that of the start on [rad]."""
-    predicted = np.diff(time) * (rate[1:] + rate[:-1]) / 2
-    turns = np.concatenate([[0.0], np.cumsum(np.round((predicted - np.diff(angle)) / _TURN))])
-    return np.asarray(angle + _TURN * (turns + np.round((start - angle[0]) / _TURN)))

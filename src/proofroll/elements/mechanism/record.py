@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import Array
 
 # So many steps in a row, so small against the largest: no smooth motion needs them. A slide of a million times the
@@ -41,6 +43,10 @@ class Record:
     v: Array
     wrench: Array
     residual: Array
+
+    def placed(self, mechanism: Mechanism) -> Placed:
+        """Where everything of the mechanism is."""
+        return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB)
 
 
 def gathered(time: Array, samples: list[dict[str, Any]]) -> Record:

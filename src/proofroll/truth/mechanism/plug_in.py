@@ -39,17 +39,8 @@ class MechanismTruth:
         assert isinstance(element, MechanismElement)  # it covers it
         found = find_truth(element.mechanism, times)
         record = found.record
-        force, torque = record.wrench[..., :3], record.wrench[..., 3:]
-        dataset = columns(
-            element,
-            np.asarray(times, dtype=np.float64),
-            record.p_WB,
-            record.v_WB,
-            record.w_WB,
-            record.q_WB,
-            force,
-            torque,
-        ).dataset()
+        wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
+        dataset = columns(element, record.placed(element.mechanism), wrench).dataset()
         points = [point.name for point in element.mechanism.points]
         for name, variable in dataset.data_vars.items():
             field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)

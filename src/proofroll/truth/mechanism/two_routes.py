@@ -16,7 +16,6 @@ from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
@@ -107,7 +106,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
 
 def _judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
     """What gets an error bar: fields of the record, and tracked points and energy, which follow from the poses."""
-    placed = Placed(mechanism, record.time, record.p_WB, record.v_WB, record.w_WB, record.q_WB)
+    placed = record.placed(mechanism)
     found = {name: getattr(record, name) for name in JUDGED}
     return found | {"points": placed.points, "energy": placed.energy()}
 

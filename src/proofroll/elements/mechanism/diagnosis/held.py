@@ -17,14 +17,7 @@ from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismSt
 _TELLS = 1e-4
 COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
 # Quantities of the certificate that follow from how the mechanism moves.
-_FOLLOWS = frozenset(
-    {
-        "acceleration",
-        "angular acceleration",
-        "acceleration of the first steps",
-        "angular acceleration of the first steps",
-    }
-)
+_FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", " of the first steps")}
 
 
 def held_against(evidence: Evidence) -> Iterator[Residuals[Change]]:
