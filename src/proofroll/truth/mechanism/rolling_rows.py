@@ -21,8 +21,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
-from proofroll.elements.ball_on_surface.surfaces.formula import sqrt
-from proofroll.elements.ball_on_surface.surfaces.jet import Jet, variables
+from proofroll.elements.ball_on_surface.surfaces.formula import Jet, sqrt, variables
 from proofroll.elements.mechanism.checks import WORLD, Vector
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint

@@ -14,8 +14,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import OutOfBounds, bounded
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
-from proofroll.elements.ball_on_surface.surfaces.formula import cos, sin, sqrt
-from proofroll.elements.ball_on_surface.surfaces.jet import Jet, variables
+from proofroll.elements.ball_on_surface.surfaces.formula import Jet, cos, sin, sqrt, variables
 
 # Places along a curve from which the nearest point is looked for, and steps to it.
 _PLACES, _NEWTON, _ROUND_OFF = 65, 30, 1e-15
@@ -64,8 +63,6 @@ class Revolved(Declared):
 
     def offset(self, ball_radius: float) -> Revolved:
         """See :class:`Surface`."""
-        from proofroll.elements.ball_on_surface.surfaces.parallel import Parallel  # which is such a surface, too
-
         return Parallel(self, ball_radius)
 
     @property
@@ -96,6 +93,61 @@ class Revolved(Declared):
 def _derivatives(part: Any) -> tuple[Any, Any, Any]:
     """Value, first and second derivative of a function of one variable."""
     return (part.value, part.first[0], part.second[0]) if isinstance(part, Jet) else (part, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Parallel(Revolved):
+    """All places at one distance from a surface of revolution; coordinates are those of the nearest point of it.
+
+    Attributes:
+        of: the surface.
+        apart: the distance [m], on the side where balls are.
+    """
+
+    of: Revolved
+    apart: float
+
+    def __post_init__(self) -> None:
+        """Takes over what the surface says of itself.
+
+        Raises:
+            InputError: somewhere the surface is curved more than a ball of this radius.
+        """
+        for said in ("name", "kind", "coordinates", "units", "periods"):
+            object.__setattr__(self, said, getattr(self.of, said))
+        bends = float(np.linalg.eigvalsh(self.of.normal_gradient(self.of.position(self.of.places()))).max())
+        if not bends * self.apart < 1:
+            raise InputError(
+                "radius", self.apart, f"the ball must be smaller than {self.name}'s curve, {1 / bends:g} m"
+            )
+
+    @property
+    def extent(self) -> tuple[float, float]:
+        """See :class:`Revolved`."""
+        return self.of.extent
+
+    @property
+    def knows_distance(self) -> bool:
+        """See :class:`Declared`."""
+        return self.of.knows_distance
+
+    def offset(self, ball_radius: float) -> Parallel:
+        """See :class:`Surface`."""
+        return Parallel(self.of, self.apart + ball_radius)
+
+    def profile(self, s: Any) -> tuple[Any, Any]:
+        """See :class:`Revolved`: along the normal of the curve, by its derivatives."""
+        (r, r_slope, _), (z, z_slope, _) = (_derivatives(part) for part in self.of.profile(variables(s)[0]))
+        by = self.apart / sqrt(r_slope * r_slope + z_slope * z_slope)
+        return r - z_slope * by, z + r_slope * by
+
+    def away(self, r: Any, z: Any) -> Any:
+        """See :class:`Revolved`."""
+        return self.of.away(r, z) - self.apart
+
+    def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
+        """See :class:`Revolved`."""
+        return self.of.along(r, z)
 
 
 @dataclass(frozen=True)
