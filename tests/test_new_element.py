@@ -139,6 +139,19 @@ def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
     assert json.loads(out)["choice"]["engine"].startswith("sprung")
 
 
+def test_tradeoff_of_two_elements(command_line: Proofroll, springs: Path) -> None:
+    """In a scene of two elements a column is headed by the element whose quantity it has."""
+    two = springs.parent / "two"
+    two.mkdir()
+    mass = '[[masses]]\nname = "n"\nmass = 1.0\nstiffness = 80.0\nx0 = 0.1\n'
+    (two / "scene.toml").write_text(SCENE + mass)
+    given = ("--engine", "sprung", "--until", "0.5", "--quantity", "x.m", "--quantity", "x.n")
+    code, out, err = command_line("tradeoff", str(two), *given)
+    assert code == 0, err
+    assert "x.m [m]" in out
+    assert "x.n [m]" in out
+
+
 @pytest.mark.usefixtures("springs")
 def test_stability(command_line: Proofroll) -> None:
     """Stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""

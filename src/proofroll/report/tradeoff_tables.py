@@ -26,8 +26,9 @@ _MOST_COLUMNS = 4  # of quantities, where nobody names them
 
 def default_quantities(study: TradeoffStudy) -> list[str]:
     """What decides, and what the elements of the scene say is shown beside it; no more than a terminal has room for."""
+    decides = [study.quantity] if study.quantity in study.quantities else []  # of the order of events no curve is kept
     beside = (name for name, item in study.quantities.items() if item.column)
-    return list(dict.fromkeys([study.quantity, *beside]))[:_MOST_COLUMNS]
+    return list(dict.fromkeys([*decides, *beside]))[:_MOST_COLUMNS]
 
 
 def cost_of(point: MeasuredPoint) -> str:

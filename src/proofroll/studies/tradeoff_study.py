@@ -93,7 +93,7 @@ def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
                 known[name].unit,
                 reference.scale(name),
                 reference.true(name, curve)[1],
-                known[name].shown,
+                known[name].shown + name.removeprefix(known[name].name),  # with the element, where there are several
                 known[name].column,
             )
             for name, curve in reference.curves.items()

@@ -11,7 +11,7 @@ from invented import invented_budget, invented_study, measured_point, timed
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
-from proofroll.report.tradeoff_tables import answer_lines, corner_table, front_tables
+from proofroll.report.tradeoff_tables import answer_lines, corner_table, default_quantities, front_tables
 from proofroll.studies.recommend import covers
 from proofroll.studies.recommend import recommend as recommended
 from proofroll.studies.tradeoff_records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
@@ -230,3 +230,8 @@ def test_ties_are_marked_on_the_front() -> None:
         names, costs = (list(table.columns[index].cells) for index in (0, 2))
         assert [str(name).split()[0] for name, cost in zip(names, costs, strict=True) if "≈" in str(cost)] == marked
         assert ("≈" in str(table.caption)) == bool(marked)
+
+
+def test_what_has_no_curve_is_no_column() -> None:
+    """A study by the order of events, of which the truth has no curve, shows what else it has."""
+    assert default_quantities(study(FAST, quantity="event_order")) == ["z"]

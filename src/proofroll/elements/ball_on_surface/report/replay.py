@@ -36,7 +36,7 @@ def seen(scene: Scene) -> float:
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
-    """What the replay draws of a ball: see :data:`proofroll.report.replay.Drawer`."""
+    """What the replay draws of a ball: see :data:`proofroll.report.replay_records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
     sampled = read_some(replayed.file, [*NEEDED, *coordinates])

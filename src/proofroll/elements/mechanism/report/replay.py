@@ -44,7 +44,7 @@ def seen(scene: Scene) -> float:
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
-    """What the replay draws of a mechanism: see :data:`proofroll.report.replay.Drawer`."""
+    """What the replay draws of a mechanism: see :data:`proofroll.report.replay_records.Drawer`."""
     element = covered(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
