@@ -25,6 +25,8 @@ NOISE = 1e-13
 class ContactRows(NamedTuple):
     """What the rows are at a state; mass matrix and bias forces are in the ``data`` then.
 
+    The arrays may be those of the next evaluation, too: whoever needs them longer copies them.
+
     Attributes:
         frame: e1, e2, e3 as columns, in the world, shape (3, 3).
         rows: on the joint velocities, shape (n, nv); the last two are those of rolling, the slip along e2 and e3.

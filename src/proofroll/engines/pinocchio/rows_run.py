@@ -72,7 +72,7 @@ class RowsRun:
         inertia = model.inertias[ball]
         # In both formulations the spin is last, in orthonormal axes: the row of slip has the length a there, and
         # rolling resistance the length f. At rest that has no direction, so it is looked at in a motion along that row.
-        row = mechanism.rows(data, q, v).rows[-2]
+        row = mechanism.rows(data, q, v).rows[-2].copy()
         torque = mechanism.rows(data, q, row).resistance
         mu_kinetic = None  # without a bound nothing stands for it
         if self.motion.mu_static is not None:
