@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -82,7 +83,7 @@ def _walked(first: FloatArray, last: FloatArray) -> float:
 
     By more than a factor of four, what halving does to h^-2, no law grows: that is a jump of one of the runs.
     """
-    growth = size(last) / max(size(first), np.finfo(float).tiny)
+    growth = size(last) / max(size(first), sys.float_info.min)
     if not 1 < growth <= 4.5 or size(last - growth * first) > size(last) / 2:
         return 0.0
     return size(last) * (growth + growth**2 + growth**3) / 3

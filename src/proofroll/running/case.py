@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.engine_abilities import lowest
@@ -130,7 +131,7 @@ class Case:
     time_limit: float = 120.0
     asks: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Hash of all that decides the result; where an interpreter lies does not, what it has does."""
         left_out = {"time_limit"} | (set() if self.asks else {"asks"})

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -41,6 +41,7 @@ class Evidence:
         lines: of the certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
         run, truth: the element's variables, at the same times; None: the engine was not run.
         step: of the engine [s], or None.
+        found: what hypotheses have found in it, see :func:`proofroll.core.diagnosis.fitting.once`.
     """
 
     element: Any
@@ -48,6 +49,7 @@ class Evidence:
     run: xr.Dataset | None = None
     truth: xr.Dataset | None = None
     step: float | None = None
+    found: dict[Any, Sequence[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import wraps
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -113,8 +114,20 @@ class Residuals(Generic[M]):
         return Cause(name, says, self.quantity, self.unit, self.before, after, remedy, number, self.covers, self.closes)
 
 
+def once(residuals: Callable[[Evidence], Iterator[Residuals[M]]]) -> Callable[[Evidence], Sequence[Residuals[M]]]:
+    """The same, found only once for each evidence: nearly every hypothesis asks for it."""
+
+    @wraps(residuals)
+    def found(evidence: Evidence) -> Sequence[Residuals[M]]:
+        if residuals not in evidence.found:
+            evidence.found[residuals] = tuple(residuals(evidence))
+        return evidence.found[residuals]
+
+    return found
+
+
 def any_gravity(
-    residuals: Callable[[Evidence], Iterator[Residuals[Any]]],
+    residuals: Callable[[Evidence], Sequence[Residuals[Any]]],
     gravity_of: Callable[[Any], FloatArray],
     falling: Callable[[Any, FloatArray], Any],
 ) -> Hypothesis:

@@ -26,7 +26,10 @@ def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
     """The samples between events, where they are enough for the splines."""
     t = dataset["time"].to_numpy()
     cuts = [0, *np.searchsorted(t, [event.time for event in events_of(dataset)]).tolist(), len(t)]
-    parts = [dataset.isel(time=slice(start, end)) for start, end in itertools.pairwise(cuts)]
+    if len(cuts) == 2:  # to cut each of the many variables would take longer than what follows
+        parts = [dataset]
+    else:
+        parts = [dataset.isel(time=slice(start, end)) for start, end in itertools.pairwise(cuts)]
     return [part for part in parts if part.sizes["time"] > DEGREE + 2 * ENDS]
 
 

@@ -16,7 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.fitting import ABOVE, Residuals
+from proofroll.core.diagnosis.fitting import ABOVE, Residuals, once
 from proofroll.core.diagnosis.lines import differing, left
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -148,6 +148,7 @@ def response(
     return found[:3], found[3:6], found[6:]
 
 
+@once
 def held_against(evidence: Evidence) -> Iterator[Residuals[Law]]:
     """The certificate, if something in it differs; the run, unless the equations hold there as for the truth."""
     body = evidence.element.rolling

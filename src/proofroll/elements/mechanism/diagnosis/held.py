@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
-from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals
+from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, once
 from proofroll.core.diagnosis.lines import differing
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start
 
@@ -20,6 +20,7 @@ COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
 _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", " of the first steps")}
 
 
+@once
 def held_against(evidence: Evidence) -> Iterator[Residuals[Change]]:
     """The start by the certificate, if its accelerations differ; the run, if it does not balance as the truth."""
     mechanism = evidence.element.mechanism
