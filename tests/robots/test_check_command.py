@@ -7,12 +7,13 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
-from robot_templates import inertial, urdf
+from robot_templates import inertial, mjcf, urdf
 
 from proofroll.report.terminal import console
 from proofroll.robots.layers import LAYERS
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.terminal import SHORT, WIDTH, lines, table
+from proofroll.running import worker_pool
 
 Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
@@ -156,3 +157,22 @@ def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "nothing in it moves; try --base free" in err
     code, _, _ = proofroll("check", str(path), "--base", "free", "--engine", "mujoco")
     assert code == 0
+
+
+@pytest.mark.own_workers
+def test_who_compiles_a_file_also_reads_it(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The engine that defines the format is started once: for what the file means, and for what the engine holds."""
+    started: list[str] = []
+    begin = worker_pool.start
+
+    def start(engine: str, memory: float | None) -> worker_pool.Worker:
+        started.append(engine)
+        return begin(engine, memory)
+
+    monkeypatch.setattr(worker_pool, "start", start)
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf())
+    assert proofroll("check", str(path), "--engine", "mujoco", "--states", "2")[0] == 0
+    assert len(started) == 1

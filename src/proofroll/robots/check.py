@@ -24,8 +24,9 @@ from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
-from proofroll.running.interpreters import start
+from proofroll.running.asking import lent_workers
 from proofroll.running.process import WorkerDied
+from proofroll.running.worker_pool import Workers
 
 
 def check(
@@ -37,6 +38,7 @@ def check(
     seed: int = 0,
     time_limit: float = TIME_LIMIT,
     progress: Callable[[str], None] | None = None,
+    workers: Workers | None = None,
 ) -> RobotCheck:
     """What every engine makes of a file, held against what the file says.
 
@@ -48,6 +50,7 @@ def check(
         seed: of the states.
         time_limit: for each engine [s].
         progress: called with the name of an engine that has been asked.
+        workers: processes in which engines read; by default some that end with this.
 
     Raises:
         InputError: the file, an engine or an option is wrong.
@@ -60,10 +63,10 @@ def check(
             )
         asked.append((spec, reading.options_of(spec.options, spec.name)))
     file = open_robot(path, base)
-    with tempfile.TemporaryDirectory() as name:
+    with lent_workers(workers) as lent, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         written = reading.write(file, folder)
-        robot, compiler = meaning(file, written, time_limit)
+        robot, compiler = meaning(file, written, time_limit, lent)
         by = f"the model that {compiler} compiles" if compiler else "our own reading of the file"
         if not robot.moving:
             raise InputError("file", str(path), "nothing in it moves" + _fixed_hint(file))
@@ -78,7 +81,7 @@ def check(
         def row(spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
             own = dataclasses.replace(request, options=options)
             try:
-                with start(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
+                with lent.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
                     answer = reading.ask(worker, spec.name, own, Path(place), time_limit)
             except Missing as error:
                 if engines:
@@ -86,7 +89,7 @@ def check(
                 return ImporterRow(engine=str(spec), status="missing", refused=str(error))
             except WorkerDied as error:
                 return ImporterRow(engine=str(spec), status=str(error.status), refused=str(error))
-            found = judged(file, truth, bar, spec, answer)
+            found = judged(file, truth, bar, spec, answer, lent)
             if _is_another_version(spec, answer.version, compiler):
                 found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))
             return found

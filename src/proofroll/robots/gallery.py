@@ -17,9 +17,11 @@ from proofroll.robots import reading
 from proofroll.robots.check import check
 from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.records import GalleryContent, GalleryReading, GalleryRow, ImporterRow
+from proofroll.running.asking import lent_workers
 
 if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
+    from proofroll.running.worker_pool import Workers
 
 # What an engine may be expected to do besides the causes by which it differs.
 REFUSES, CRASHED, OPEN = "refuses", "crashed", "open"
@@ -96,14 +98,15 @@ def gallery(
         reading.load_reader(parse_engine(name).name)
     rows = []
     wanted, row = [entry for entry in entries if not names or entry.name in names], partial(_row, tuple(engines))
-    for host, found in cluster.map(row, wanted) if cluster else (("", row(entry)) for entry in wanted):
-        rows.append(dataclasses.replace(found, ran_on=host))
-        if progress is not None:
-            progress(found.name)
+    with lent_workers(None) as workers:  # each engine is started once for all robots
+        for host, found in cluster.map(row, wanted) if cluster else (("", row(entry, workers)) for entry in wanted):
+            rows.append(dataclasses.replace(found, ran_on=host))
+            if progress is not None:
+                progress(found.name)
     return GalleryContent(rows)
 
 
-def _row(engines: Sequence[str], entry: Entry) -> GalleryRow:
+def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -> GalleryRow:
     path = locate(entry)
     wanted = [name for name in entry.engines if parse_engine(name).name in reading.reader_names()]
     if engines:
@@ -111,7 +114,7 @@ def _row(engines: Sequence[str], entry: Entry) -> GalleryRow:
     if path is None or not wanted:
         return GalleryRow(entry.name, entry.package, None if path is None else str(path))
     readings, unexpected = [], []
-    for item in check(path, wanted, base=entry.base).engines:
+    for item in check(path, wanted, base=entry.base, workers=workers).engines:
         does = outcome(item)
         readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.refused, does))
         if item.status != "missing" and set(does) != set(entry.engines[item.engine]):

@@ -22,12 +22,16 @@ from proofroll.robots.protocol import Reading
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.urdf import read_urdf
-from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.asking import lent_workers
+from proofroll.running.process import WorkerDied
+from proofroll.running.worker_pool import Workers
 
 # For each engine [s].
 TIME_LIMIT = 120.0
 # The two formulations must agree to a tenth of any tolerance; else their difference raises it.
 _MARGIN = 10.0
+# The engine that was last found to define a format: whose process is asked first.
+_defines: dict[str, str] = {}
 
 
 def judged(
@@ -36,8 +40,12 @@ def judged(
     bar: float,
     spec: EngineSpec,
     answer: reading.ReaderAnswer,
+    workers: Workers | None = None,
 ) -> ImporterRow:
-    """The row of an engine that answered; the two formulations of the truth differ by ``bar``."""
+    """The row of an engine that answered; the two formulations of the truth differ by ``bar``.
+
+    Changed files are compiled by one of the ``workers``.
+    """
     row = ImporterRow(
         engine=str(spec), status="refused", version=answer.version, refused=answer.refused, says=answer.says
     )
@@ -49,7 +57,7 @@ def judged(
     layers = {
         layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in found.items()
     }
-    search = Search(file, answer.reading, plain_name(spec.name), tolerances, _recompiler(file))
+    search = Search(file, answer.reading, plain_name(spec.name), tolerances, _recompiler(file, workers))
     causes, unexplained = search.causes(truth)
     holds = all(layer.holds for layer in layers.values())
     return dataclasses.replace(
@@ -64,13 +72,14 @@ def judged(
     )
 
 
-def _recompiler(file: RobotFile) -> Callable[[Element], Robot | None]:
+def _recompiler(file: RobotFile, workers: Workers | None) -> Callable[[Element], Robot | None]:
     """What a changed file would mean; None: nothing, or the format is read by us. Each is compiled once."""
 
     @cache
     def compiled(content: bytes) -> Robot | None:
-        with contextlib.suppress(InputError):
-            return meant(file.path, file.kind, file.base, content)
+        changed = dataclasses.replace(file, root=fromstring(content))
+        with tempfile.TemporaryDirectory() as folder, contextlib.suppress(InputError):
+            return meaning(changed, reading.write(changed, Path(folder)), TIME_LIMIT, workers)[0]
         return None
 
     return lambda root: None if file.kind == "urdf" else compiled(tostring(root))
@@ -90,7 +99,7 @@ def _offending(truth: RobotTruth, held: Reading) -> list[str]:
     return found
 
 
-def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
+def meaning(file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None) -> tuple[Robot, str]:
     """The robot that a file means, and the engine here that defines the format, with its version; empty: we read it.
 
     An engine that defines the format is asked for no longer than ``time_limit`` [s], of the file as engines get it.
@@ -100,11 +109,15 @@ def meaning(file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, s
     """
     if file.kind == "urdf":
         return read_urdf(file), ""
-    with Worker() as worker:
+    asked = _defines.get(file.kind, file.kind)
+    with lent_workers(workers) as lent:
         try:
-            robot, by = reading.compiled(worker, file, written, time_limit)
+            with lent.lend(asked) as worker:
+                robot, by = reading.compiled(worker, file, written, time_limit)
         except WorkerDied as error:
             raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
+        _defines[file.kind] = by.partition(" ")[0]
+        lent.rename(asked, _defines[file.kind])  # which it has loaded, and is asked next what it holds
     return robot.change(name=file.root.get("model", "robot")), by
 
 

@@ -53,6 +53,11 @@ class Workers:
         for old in surplus:
             old.close()
 
+    def rename(self, asked: str, engine: str) -> None:
+        """An idle worker that was taken as ``asked``, before its engine was known, is that of ``engine``."""
+        with self._lock:
+            self._idle[:] = [(engine if name == asked else name, worker) for name, worker in self._idle]
+
     @contextmanager
     def lend(self, engine: str) -> Iterator[Worker]:
         """A worker for this engine; it is kept if it has answered, be it with what is wrong or missing."""
