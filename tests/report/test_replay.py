@@ -202,38 +202,31 @@ def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) ->
     assert held == {"p"}, "neither forces nor an orientation are invented"
 
 
-def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) -> None:
-    """A setting that is not the default but off by more than a hundredth of the ball's radius is a ghost, not shown."""
+def replay_with(made: Any, engine: str, change: Callable[[Any], Any]) -> dict[str, Any]:
+    """The first case of the replay with the ball of an engine's first run elsewhere."""
     outcome, store = made
-    run = next(run for run in outcome.runs if run.row.engine == "alpha[formulation=fine]")
+    run = next(run for run in outcome.runs if run.row.engine == engine)
     assert run.case is not None
     file = store.trajectory(run.case)
     kept = file.read_bytes()
     try:
         dataset = read(file)
-        dataset["p_WB"] = dataset["p_WB"] + 1e-3
-        write(dataset, file)
-        balls = plain(replay_content([outcome], store, BallReport.replay()))["cases"][0]["runs"]
+        write(dataset.assign(p_WB=dataset["p_WB"].copy(data=change(dataset["p_WB"].to_numpy()))), file)
+        return dict(plain(replay_content([outcome], store, BallReport.replay()))["cases"][0])
     finally:
         file.write_bytes(kept)
+
+
+def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) -> None:
+    """A setting that is not the default but off by more than a hundredth of the ball's radius is a ghost, not shown."""
+    balls = replay_with(made, "alpha[formulation=fine]", lambda p: p + 1e-3)["runs"]
     assert {ball["name"]: ball["shown"] for ball in balls}["alpha fine matched (dt 1e-3 s)"] is False
 
 
 def test_a_ball_that_flies_off_is_dropped_where_it_leaves(made: Any) -> None:
     """A ghost beyond all bounds has frames until it leaves the picture, and the page says when that is."""
-    outcome, store = made
-    run = next(run for run in outcome.runs if run.row.engine == "beta")
-    assert run.case is not None
-    file = store.trajectory(run.case)
-    kept = file.read_bytes()
-    try:
-        dataset = read(file)
-        dataset["p_WB"][25:] = dataset["p_WB"][25:] * 1e9
-        write(dataset, file)
-        whole = plain(replay_content([outcome], store, BallReport.replay()))["cases"][0]
-        ball = next(run for run in whole["runs"] if run["name"].startswith("beta"))
-    finally:
-        file.write_bytes(kept)
+    whole = replay_with(made, "beta", lambda p: np.concatenate([p[:25], 1e9 * p[25:]]))
+    ball = next(run for run in whole["runs"] if run["name"].startswith("beta"))
     assert 0 < ball["frames"] < whole["frames"]
     assert "leaves the picture" in ball["message"]
 

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from proofroll.report import stability_map
-from proofroll.report.study_parts import Part, PartEntry, held
+from proofroll.report.labels import number
+from proofroll.report.stability_tables import silent_lines
+from proofroll.report.study_parts import Part, PartEntry, Tell, held
+from proofroll.running.runner import Runner
+from proofroll.studies.axes import QUICK, Axis, Effort
+from proofroll.studies.stability import stability_path
 from proofroll.studies.stability_claims import STUDY, Claim, StabilityFile, file_for
-
-if TYPE_CHECKING:
-    from proofroll.report.study_parts import Tell
-    from proofroll.running.runner import Runner
-    from proofroll.studies.axes import Axis
-    from proofroll.studies.stability_records import StabilityStudy
+from proofroll.studies.stability_records import StabilityStudy
+from proofroll.studies.stability_study import make_stability
+from proofroll.studies.study_store import kept
 
 
 @dataclass(frozen=True)
@@ -67,11 +69,6 @@ class StabilityPart(Part):
 
     def keeps(self, out: Path) -> bool:
         """The whole map, or else a quick one, of all axes if there is."""
-        from proofroll.studies.axes import QUICK, Effort
-        from proofroll.studies.stability import stability_path
-        from proofroll.studies.stability_records import StabilityStudy
-        from proofroll.studies.study_store import kept
-
         for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
             path = stability_path(out, self.asked.scene, axes, self.engines, effort)
             self.study, _ = kept(path, StabilityStudy)
@@ -82,9 +79,6 @@ class StabilityPart(Part):
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A quick map."""
-        from proofroll.studies.axes import QUICK
-        from proofroll.studies.stability_study import make_stability
-
         self.study, path = make_stability(
             self.asked, self._quick_axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
         )
@@ -97,8 +91,6 @@ class StabilityPart(Part):
 
     def entry(self) -> StabilityEntry:
         """See the protocol."""
-        from proofroll.report.stability_tables import silent_lines
-
         study = self.study
         assert study is not None  # it was made
         mapped = {axis.name for axis in study.axes}
@@ -131,8 +123,6 @@ def _programs(path: Path) -> str:
 
 def _says(claim: Claim, symbols: Mapping[str, str]) -> str:
     """A claim in one sentence."""
-    from proofroll.report.labels import number
-
     said = f"{claim.engine} is {claim.boundary}"
     if claim.never:
         said += " at no step or tolerance"

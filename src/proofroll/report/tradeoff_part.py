@@ -5,22 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.files.json_data import MERGED
 from proofroll.report import tradeoff_tables
-from proofroll.report.study_parts import Part, PartEntry, held
+from proofroll.report.pages import element
+from proofroll.report.study_parts import Part, PartEntry, Tell, held
 from proofroll.report.tradeoff_tables import default_quantities
+from proofroll.report.work_precision import svg
+from proofroll.running.runner import Runner
 from proofroll.studies.claimed import ClaimJudgement
 from proofroll.studies.claims import STUDY, TradeoffClaims, load_claims
 from proofroll.studies.recommend import Answer, recommend
+from proofroll.studies.study_store import kept
+from proofroll.studies.tradeoff import stored
+from proofroll.studies.tradeoff_records import TradeoffStudy
+from proofroll.studies.tradeoff_study import make_tradeoff
 from proofroll.studies.wish import Wish
-
-if TYPE_CHECKING:
-    from proofroll.report.study_parts import Tell
-    from proofroll.running.runner import Runner
-    from proofroll.studies.tradeoff_records import TradeoffStudy
 
 # Parts of its scale to which a quantity is wanted where nobody says otherwise: what an eye sees, an engineer needs, a
 # reference is made from, and what tells the orders of methods apart.
@@ -74,18 +76,12 @@ class TradeoffPart(Part):
 
     def keeps(self, out: Path) -> bool:
         """The whole study, or else a brief one."""
-        from proofroll.studies.study_store import kept
-        from proofroll.studies.tradeoff import stored
-        from proofroll.studies.tradeoff_records import TradeoffStudy
-
         paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
         self.study = next((study for path in paths if (study := kept(path, TradeoffStudy)[0]) is not None), None)
         return self.study is not None
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """A brief study, without the runs over ranges of parameters."""
-        from proofroll.studies.tradeoff_study import make_tradeoff
-
         self.study, _ = make_tradeoff(
             self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,
             progress=lambda text: tell(text, 1),
@@ -106,9 +102,6 @@ class TradeoffPart(Part):
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """The work-precision diagram."""
-        from proofroll.report.pages import element
-        from proofroll.report.work_precision import svg
-
         assert self.study is not None  # it was made
         return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
 

@@ -100,7 +100,7 @@ def tradeoff_parts(
         yield from ("", corner_table(study, shown[0]))
     yield from ("", budget_table(study, shown[0]), "")
     if every_point:
-        yield from budget_lines(study, shown[0])
+        yield from (f"{item.curve}: {item.sentence}" for item in study.budgets if item.quantity == shown[0])
     yield from study.findings
     yield from (f"{name}: {reason}" for name, reason in study.absent.items())
     yield from (f"?? {line}" for line in study.claims.undecided)
@@ -224,13 +224,6 @@ def _steps(item: CurveBudget) -> str:
     if item.order_from is None:
         return ""
     return f"{number(item.order_from)} → {number(item.order_to)}"
-
-
-def budget_lines(study: TradeoffStudy, quantity: str) -> Iterator[str]:
-    """The same as sentences."""
-    for item in study.budgets:
-        if item.quantity == quantity:
-            yield f"{item.curve}: {item.sentence}"
 
 
 def answer_lines(found: Recommendation) -> Iterator[str]:
