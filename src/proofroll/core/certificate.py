@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.core.several import sample_of, shaped
@@ -79,6 +80,24 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
         for line in element.certify(own, sample_of(scene, element, sample)):
             lines.append(replace(line, quantity=scene.label(element, line.quantity)))
     return lines
+
+
+def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: float, because: str) -> tuple[float, str]:
+    """Tolerance of a quantity and its reason.
+
+    Args:
+        soft: what the engine says that its model softens, or None.
+        cap: how far that can be softened at all; None: not.
+        tolerance: of what is not softened.
+        because: its reason.
+    """
+    if soft is None:
+        return tolerance, because
+    if cap is None:
+        return tolerance, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
+    if soft.tolerance <= cap.tolerance:
+        return soft.tolerance, soft.because
+    return cap.tolerance, f"{soft.because}; of the {soft.tolerance:.2g} asked for this much is allowed: {cap.because}"
 
 
 def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:

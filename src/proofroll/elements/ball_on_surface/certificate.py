@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import EXACT, Line, require_shapes
+from proofroll.core.certificate import EXACT, Line, require_shapes, tolerated
 from proofroll.core.engine import Built, Regularised, Sample
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
@@ -72,8 +72,8 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
         difference = float(np.max(np.abs(got - want))) / scale if got.shape == want.shape else np.inf
         difference = difference if np.isfinite(difference) else float("inf")
         cap = _LIFTED if quantity in _DYNAMICS and np.any(body.slip0) else CAPS.get(quantity)
-        shown = tuple(want.tolist()), tuple(got.tolist())
-        lines.append(Line(quantity, unit, *shown, difference, *_allowed(quantity, built.regularised, cap)))
+        allowed = tolerated(built.regularised.get(quantity), cap, EXACT, "")
+        lines.append(Line(quantity, unit, tuple(want.tolist()), tuple(got.tolist()), difference, *allowed))
 
     compare("mass", "kg", body.ball.mass, built.mass, body.ball.mass)
     compare("inertia", "kg m^2", np.full(3, body.ball.inertia), built.inertia, body.ball.inertia)
@@ -107,18 +107,6 @@ def certify(body: RollingBall, built: Built, sample: Sample) -> list[Line]:
         pressed = None if sample.force is None else sign * sample.force @ frame[:, index]
         compare(name, "N", sign * force @ frame[:, index], pressed, body.ball.mass * natural)
     return lines
-
-
-def _allowed(quantity: str, regularised: Mapping[str, Regularised], cap: Regularised | None) -> tuple[float, str]:
-    """Tolerance of a quantity and its reason: what the engine softens, as far as that can be softened at all."""
-    soft = regularised.get(quantity)
-    if soft is None:
-        return EXACT, ""
-    if cap is None:
-        return EXACT, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
-    if soft.tolerance <= cap.tolerance:
-        return soft.tolerance, soft.because
-    return cap.tolerance, f"{soft.because}; of the {soft.tolerance:.2g} asked for this much is allowed: {cap.because}"
 
 
 def _expected(body: RollingBall, built: Built) -> tuple[FloatArray, FloatArray, FloatArray]:

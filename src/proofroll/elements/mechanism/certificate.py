@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import Line, require_shapes
+from proofroll.core.certificate import Line, require_shapes, tolerated
 from proofroll.core.engine import Regularised, Sample
 from proofroll.elements.mechanism.dataset import reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
@@ -58,7 +58,10 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) ->
             got = got.reshape(want.shape)  # of one body the index may be left out
         known = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
         difference = float(np.max(np.abs(got - want)[known], initial=0.0)) / scale if known.size else float("inf")
-        tolerance, because = _allowed(quantity, built.regularised)
+        soft = built.regularised.get(quantity.replace(" ", "_"))
+        if soft is None and quantity in {"forces", "torques"}:  # as soft as what they accelerate
+            soft = max(built.regularised.values(), key=lambda one: one.tolerance, default=None)
+        tolerance, because = tolerated(soft, CAPS.get(quantity), COMPOSED, _COMPOSED)
         if quantity in _FROM_ACCELERATIONS:
             noise = _MARGIN * element.noise / (scale if "acceleration" in quantity else found.scale)
             tolerance, because = max((tolerance, because), (noise, _NOISY))
@@ -123,15 +126,3 @@ def _axis(element: MechanismElement, joint: Joint) -> FloatArray:
         return np.full(3, np.nan)
     parent = element.mechanism.body_index[joint.parent]
     return np.asarray(element.start.R_WB[0, parent] @ joint.parent_frame[:, 2])
-
-
-def _allowed(quantity: str, regularised: Mapping[str, Regularised]) -> tuple[float, str]:
-    """Tolerance of a quantity and its reason."""
-    soft, cap = regularised.get(quantity.replace(" ", "_")), CAPS.get(quantity)
-    if soft is None and quantity in {"forces", "torques"}:  # as soft as what they accelerate
-        soft = max(regularised.values(), key=lambda one: one.tolerance, default=None)
-    if soft is None:
-        return COMPOSED, _COMPOSED
-    if cap is None:
-        return COMPOSED, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
-    return min(soft.tolerance, cap.tolerance), soft.because

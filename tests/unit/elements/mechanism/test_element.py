@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.element import FirstMotion
-from proofroll.core.engine import Sample
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
+from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
 from proofroll.elements.mechanism.sampling import MechanismBuilt
@@ -111,6 +112,17 @@ def test_a_wrong_model_is_noticed(changed, quantity: str) -> None:
     element = element_of("slider_crank")
     built = right(element)
     assert noticed(element, dataclasses.replace(built, **changed(built))) == {quantity}
+
+
+def test_how_far_a_model_may_soften_says_why() -> None:
+    """What an engine asks for is allowed up to a cap, whose reason stands beside the engine's own."""
+    element = element_of("slider_crank")
+    asked = {"acceleration": Regularised(0.8, "a stiff spring")}
+    lines = element.certify(dataclasses.replace(right(element), regularised=asked), at_start(element))
+    (line,) = (line for line in lines if line.quantity == "acceleration")
+    assert line.tolerance == CAPS["acceleration"].tolerance < 0.8
+    assert line.because.startswith("a stiff spring; of the 0.8 asked for")
+    assert line.because.endswith(CAPS["acceleration"].because)
 
 
 @pytest.mark.parametrize("wrong", [np.zeros((2, 5)), "heavy"], ids=["shape", "text"])
