@@ -14,8 +14,22 @@ import typer
 from robot_templates import urdf
 
 from proofroll.cli import app
+from proofroll.core.certificate import Line
+from proofroll.core.comparison import ExceptAt
+from proofroll.core.diagnosis import Cause
 from proofroll.elements.ball_on_surface.onset_study import EngineOnset, OnsetStudy
 from proofroll.files.json_data import MERGED
+from proofroll.report.comparison_records import (
+    CauseAt,
+    Claims,
+    Cost,
+    ReportedComparison,
+    ReportedRow,
+    ReportedRun,
+    ShownBand,
+    ShownObservable,
+    WorstJudgement,
+)
 from proofroll.report.ladder import Absence, KnownTruth, LadderContent, Ran, RungFound, SideFound, TermFound
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.records import (
@@ -135,6 +149,10 @@ def test_a_robot_file(proofroll: Proofroll, tmp_path: Path) -> None:
 
 
 ROBOT = (RobotCheck, LintFinding, UsedTruth, ImporterRow, HeldLayer, RobotCause, DrawnRobot, DrawnBody, DrawnJoint)
+COMPARISON = (
+    ReportedComparison, ReportedRow, ReportedRun, WorstJudgement, CauseAt, Cause, Claims, ExceptAt, Cost, Line,
+    ShownObservable, ShownBand,
+)  # fmt: skip
 LADDER = (LadderContent, RungFound, Ran, TermFound, SideFound, KnownTruth, Absence)
 MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedPlace, Effort, Measured, MapClaims)
 TRADEOFF = (
@@ -147,13 +165,14 @@ TRADEOFF = (
     ("page", "title", "records"),
     [
         ("json.md", "`check --json` of a robot file", (*ROBOT, GalleryRow, GalleryReading)),
+        ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
         ("json.md", "`ladder --json`", LADDER),
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
         ("json.md", "The other commands", (Drilled, Mutated, GalleryRow)),
     ],
-    ids=["robots", "stability", "tradeoff", "ladder", "onset", "others"],
+    ids=["robots", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )
 def test_fields_of_records(page: str, title: str, records: tuple[type, ...]) -> None:
     """Each field of what a command prints as records is named where its JSON is described."""

@@ -13,7 +13,7 @@ from proofroll.cli import options
 def ladder(
     scene: options.SceneName,
     settings: options.Set = None,
-    quantity: Annotated[str | None, typer.Option(help="What is asked, e.g. z, gamma, N. By default z.")] = None,
+    quantity: Annotated[str | None, typer.Option(help="Observable; by default what decides the scene.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Error of it that is allowed, in its unit.")] = None,
     until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
     engine: options.Engines = None,

@@ -25,7 +25,11 @@ _UNTIL, _EVERY = 1.0, 0.02
 @new.command()
 def scene(name: Name) -> None:
     """Write a folder NAME with a scene.toml: a rod that swings, to be changed into your scene."""
+    from proofroll.files.scene_file import scene_names
+
     folder = _fresh(name, name)
+    if name in scene_names():
+        raise InputError("name", name, "a scene of the package is called so, and commands would take that one")
     _write(folder / "scene.toml", _filled(_TEMPLATES / "scene.toml", {"name": name}))
     _say(folder, f"proofroll check {folder}", f"proofroll run {folder} --engine truth")
 
@@ -43,9 +47,14 @@ def comparison(name: Name, scene: Annotated[str, typer.Option(help="The scene, o
 @new.command()
 def engine(name: Name) -> None:
     """Write a package NAME with a working engine, its entry point and its conformance test."""
+    from importlib.util import find_spec
+
+    from proofroll.core.plugins import engine_names
     from proofroll.files.data_folders import data_folder
 
     folder = _fresh(name, name)
+    if name in engine_names() or find_spec(name):
+        raise InputError("name", name, "an engine or a package that is installed is called so; choose another name")
     names = {"name": name, "Class": "".join(part.capitalize() for part in name.split("_")) or name}
     for template in sorted((_TEMPLATES / "engine").rglob("*")):
         if template.is_file():  # those end in .txt of which tools would think that they are files of this project

@@ -1,7 +1,7 @@
 """The protocol between proofroll and an engine. Implement it in under 60 lines; see CONTRIBUTING.md.
 
 An adapter contains no clock, no file and no plot: the runner owns the time grid, the stopwatch, the detection of
-NaN, timeouts and files. An adapter knows surfaces and contact laws, never a scene by name.
+NaN, timeouts and files. An adapter knows surfaces, contact laws, joints, never a scene by name.
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from proofroll.core.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """State and reactions of one ball now, in the world frame W. None: the engine cannot say.
+    """State and reactions of one element now, in the world frame W. None: the engine cannot say.
+
+    Of an element of several bodies, as a mechanism is, each array of a body has one axis more in front: (bodies, 3).
 
     Attributes:
-        p_WB: centre [m], shape (3,).
-        v_WB: velocity of the centre [m/s], shape (3,).
+        p_WB: origin of the body's frame, of a ball its centre [m], shape (3,).
+        v_WB: velocity of that point [m/s], shape (3,).
         w_WB: angular velocity [rad/s], shape (3,).
-        q_WB: orientation as a unit quaternion, scalar first, shape (4,); identity at time 0.
-        force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None at time 0
+        q_WB: orientation as a unit quaternion, scalar first, shape (4,); of a ball the identity at time 0.
+        force: of a ball: of the wall on it at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None at time 0
             alone: the engine defines reactions only after a first step.
-        sticking: whether the contact holds by static friction; only where friction is bounded.
+        sticking: of a ball: whether the contact holds by static friction; only where friction is bounded.
         joint_force, joint_torque: of a mechanism: on the child of each joint, then on body_b of each loop, at the joint
             [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
     """
@@ -57,7 +59,7 @@ class Regularised:
 
 @dataclass(frozen=True)
 class Built:
-    """What the engine really built, read back from the engine (never from the scene). None: it cannot say.
+    """What the engine really built of a ball, read back from the engine (never from the scene). None: it cannot say.
 
     Attributes:
         mass: of the ball [kg].

@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.core.engine import Sample, fixed_step
 from proofroll.core.engine_abilities import LocatesEvents, TellsRemarks, require_provided
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
@@ -37,6 +37,8 @@ class EachAlone:
             self.parts[element.name] = kind.build(alone, own)
             if own.formulation != settings.formulation:
                 self._others.append(f"{element.name} is in formulation {own.formulation}, preset {own.preset}")
+        if len(self._others) == len(self.parts):
+            raise Refused(f"formulation {settings.formulation} represents no element of this scene")
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""

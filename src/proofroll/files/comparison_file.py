@@ -66,7 +66,8 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
     bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in tolerances.items()}
     given = content.get("rows")
     if not isinstance(given, list) or not given:
-        raise InputError(f"{where}: rows", given, "give at least one engine; write [[rows]] before each")
+        shown = "nothing" if given is None else given
+        raise InputError(f"{where}: rows", shown, "give at least one engine; write [[rows]] before each")
     content["rows"] = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
     comparison = validated(Comparison, content, where, name=path.stem, bands=bands, left_out=0)
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:

@@ -71,6 +71,15 @@ def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
     assert " passed" in done.stdout
 
 
+@pytest.mark.usefixtures("folder")
+@pytest.mark.parametrize(("what", "name"), [("scene", "pendulum"), ("engine", "mujoco"), ("engine", "numpy")])
+def test_a_name_that_stands_for_something_else(proofroll: Proofroll, what: str, name: str) -> None:
+    """A scene is not called as one of the package, which commands would take, nor an engine as what is installed."""
+    code, out, err = proofroll("new", what, name)
+    assert (code, out, Path(name).exists()) == (2, "", False)
+    assert f"name = '{name}': a" in err
+
+
 @pytest.mark.parametrize("what", [["scene"], ["engine"], ["comparison", "--scene", "pendulum"]])
 def test_nothing_is_overwritten(proofroll: Proofroll, folder: Path, what: list[str]) -> None:
     """What is there already stays, and so does a place that a name would lead out of the folder."""

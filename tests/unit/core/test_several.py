@@ -55,6 +55,12 @@ def test_elements_of_two_kinds_take_the_formulation_that_each_needs(mixed: Scene
     assert "mechanism is in formulation" in str(both.attrs)
 
 
+def test_a_formulation_that_is_for_none_of_the_elements_is_refused(balls: Scene) -> None:
+    """Who asks for joints of balls gets no other model in their place."""
+    with pytest.raises(Refused, match="formulation tree represents no element of this scene"):
+        simulate(balls, "exudyn[formulation=tree]", until=0.1, every=0.05)
+
+
 def test_what_no_formulation_of_an_engine_has_is_still_refused(mixed: Scene) -> None:
     """Equations of a ball alone do not become those of a pendulum."""
     with pytest.raises(Refused, match="needs revolute joints"):
