@@ -9,7 +9,7 @@ from pathlib import Path
 
 from proofroll.cli import options
 from proofroll.core.announced import announced
-from proofroll.core.errors import InputError, choices
+from proofroll.core.errors import InputError, choices, require_known
 
 # What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
 READERS = "proofroll.study_readers"
@@ -51,10 +51,7 @@ class SoundFile:
 
 
 def checked(name: str) -> SoundFile:
-    """What a scene or file holds.
-
-    Args:
-        name: of a scene, or path of its folder or ``scene.toml``; else name or path of a file of a study.
+    """What a scene, by its name or the path of its folder or ``scene.toml``, or else the file of a study holds.
 
     Raises:
         InputError: there is no such thing, or the first thing that is wrong with it.
@@ -101,8 +98,7 @@ def _comparison(path: Path) -> SoundFile:
 
 def _study(path: Path, study: str) -> SoundFile:
     readers = {point.name: point for point in announced(READERS)}
-    if study not in readers:
-        raise InputError(f"{path.name}: study", study, f"nothing reads such a file; choose from {choices(readers)}")
+    require_known(f"{path.name}: study", study, readers, "nothing reads such a file; choose from")
     found = readers[study].load()(str(path))
     parts = {"entries": found} if isinstance(found, list) else vars(found) if dataclasses.is_dataclass(found) else {}
     counts = {

@@ -101,11 +101,9 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
 
 
 def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:
-    """Looks at the numbers that an engine built, before they are compared.
+    """Looks at the numbers that an engine says it built, before they are compared; fields that are None are no matter.
 
-    Args:
-        built: what the engine says; fields that are None are no matter.
-        shapes: by name of a field, those that it may have; -1 is any length.
+    ``shapes`` are those that a field may have, by its name; -1 is any length.
 
     Raises:
         Diverged: one is lacking, is not of numbers, or has another shape.

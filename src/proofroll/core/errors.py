@@ -50,13 +50,21 @@ def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
     return InputError(field, value, f"there is no such key here; the keys are {choices(known)}")
 
 
-def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
-    """Refuses settings for the first rule that they break.
+def require_known(field: str, name: object, known: Iterable[str], advice: str = "choose one of") -> None:
+    """Refuses a name that is not among those that there are, which are told after the advice.
 
-    Args:
-        engine: its name.
-        settings: of the engine.
-        rules: of each whether it is broken, the name of the setting, and what is wrong and what to do instead.
+    Raises:
+        InputError: there is no such name.
+    """
+    names = list(known)
+    if name not in names:
+        raise InputError(field, name, f"{advice} {choices(names)}")
+
+
+def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
+    """Refuses settings of an engine for the first rule that they break.
+
+    A rule is whether it is broken, the name of the setting, and what is wrong and what to do instead.
 
     Raises:
         InputError: a rule is broken.

@@ -14,7 +14,7 @@ from typing import Any
 from proofroll.core.announced import announced
 from proofroll.core.element import ElementKind
 from proofroll.core.engine_abilities import SupportsFrom
-from proofroll.core.errors import InputError, Missing, ProofrollError, place
+from proofroll.core.errors import InputError, Missing, ProofrollError, place, require_known
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
@@ -183,12 +183,10 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
             )
     able = (name for name in engine.presets if set(requires) <= engine.provides[name])
     formulation = options.get("formulation") or next(able, next(iter(engine.presets)))
-    if formulation not in engine.presets:
-        raise InputError(f"{engine.name}: formulation", formulation, f"choose one of {', '.join(engine.presets)}")
+    require_known(f"{engine.name}: formulation", formulation, engine.presets)
     presets = engine.presets[formulation]
     preset = options.get("preset", "matched" if "matched" in presets else next(iter(presets)))
-    if preset not in presets:
-        raise InputError(f"{engine.name}: preset", preset, f"{formulation} has {', '.join(presets)}")
+    require_known(f"{engine.name}: preset", preset, presets, f"{formulation} has")
     values = {**dataclasses.asdict(presets[preset]), **options}
     strict(engine.settings, finite=True)
     return validated(engine.settings, values, engine.name)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Self
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError, choices
+from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.source_code import code_of
 
@@ -92,8 +92,7 @@ class Scene:
         Raises:
             InputError: no element has it, or no run of these numbers; ``field`` says where it was named.
         """
-        if name not in self.observables:
-            raise InputError(field, name, f"there is no such observable; choose from {', '.join(self.observables)}")
+        require_known(field, name, self.observables, "there is no such observable; choose from")
         found = self.observables[name]
         if found.absent:
             raise InputError(field, name, found.absent)

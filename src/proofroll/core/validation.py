@@ -23,13 +23,9 @@ def strict(*types: type, finite: bool = False) -> None:
 
 
 def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: object) -> _T:
-    """The content as this type.
+    """The content of a file, called ``where`` in messages, or of a table in it as this dataclass.
 
-    Args:
-        kind: a dataclass.
-        content: of a file, or of a table in it.
-        where: what the file is called in messages.
-        **own: fields that no file has, for they are known otherwise.
+    ``own`` are fields that no file has, for they are known otherwise.
 
     Raises:
         InputError: the first problem, with its place in ``where``.

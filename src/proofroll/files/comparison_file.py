@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
@@ -40,10 +40,7 @@ def _order(path: Path) -> float:
 
 
 def load_comparison(name: str) -> Comparison:
-    """Reads a comparison.
-
-    Args:
-        name: path of a file, or name of one in a folder of studies, with or without ``.toml``.
+    """Reads the comparison at a path, or the one of this name, with or without ``.toml``, in a folder of studies.
 
     Raises:
         InputError: no such file, or it is broken.
@@ -85,8 +82,7 @@ def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
 def _check_brief(where: str, comparison: Comparison) -> None:
     known = {name for point in comparison.combinations() for name in point}
     for name in comparison.brief:
-        if name not in known:
-            raise InputError(f"{where}: brief", name, f"nothing varies it; choose from {', '.join(sorted(known))}")
+        require_known(f"{where}: brief", name, sorted(known), "nothing varies it; choose from")
     if comparison.brief and not comparison.briefly().combinations():
         raise InputError(f"{where}: brief", comparison.brief, "no combination has these values; keep at least one")
 
@@ -133,8 +129,7 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
 def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Observable]) -> None:
     """What types cannot say."""
     _check_engine(where, row)
-    if row.tolerance not in comparison.bands:
-        raise InputError(f"{where}.tolerance", row.tolerance, f"choose one of {', '.join(comparison.bands)}")
+    require_known(f"{where}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:
         _check_ladder(where, row.ladder)
     _check_expectations(where, row)
@@ -196,10 +191,7 @@ def _check_ladder(where: str, ladder: list[float]) -> None:
 def _check_bounds(where: str, known: Mapping[str, Observable], bounds: Mapping[str, Tolerance | None]) -> None:
     """Every name is an observable of the scene, and every tolerance is in its unit."""
     for name, bound in bounds.items():
-        if name not in known:
-            raise InputError(
-                f"{where}: observable", name, f"there is no such observable; choose from {', '.join(known)}"
-            )
+        require_known(f"{where}: observable", name, known, "there is no such observable; choose from")
         if bound is not None and bound.relative and known[name].floor is None:
             raise InputError(f"{where}: {name}", "%", f"it has no size of its own; give a number in {known[name].unit}")
         if bound is not None and not bound.relative and bound.unit != known[name].unit:

@@ -59,11 +59,23 @@ def study_of(path: Path) -> str | None:
 
 
 def study_files(study: str) -> Iterator[tuple[Path, dict[str, Any]]]:
-    """The files for a study with their content, each folder's sorted by name."""
+    """The files for a study with the rest of their content, each folder's sorted by name."""
     for folder in study_folders():
         for path in sorted(folder.glob("*.toml")):
             if study_of(path) == study:
-                yield path, read_toml(path)
+                yield path, study_content(path, study)
+
+
+def study_content(path: Path, study: str, use: str = "can be used here") -> dict[str, Any]:
+    """What a file for a study says besides that it is for it; ``use`` is the end of the message where it is not.
+
+    Raises:
+        InputError: it is broken, or for something else.
+    """
+    content = read_toml(path)
+    if content.pop("study", None) != study:
+        raise InputError(str(path), "study", f'only a file with study = "{study}" {use}')
+    return content
 
 
 def named_file(name: str) -> Path | None:
@@ -85,7 +97,4 @@ def study_file(name: str, study: str) -> tuple[Path, dict[str, Any]]:
         if path is None:
             advice = f"there is no such file; choose one of {', '.join(item.stem for item in ours)}, or give a path"
             raise InputError(study, name, advice)
-    content = read_toml(path)
-    if content.pop("study", None) != study:
-        raise InputError(str(path), "study", f'only a file with study = "{study}" can be used here')
-    return path, content
+    return path, study_content(path, study)

@@ -72,10 +72,7 @@ def resolve(
 ) -> list[EngineFacts | ProofrollError]:
     """Complete settings for engines with options, each or the reason why not, in the order given.
 
-    Args:
-        engines: names and options.
-        workers: processes in which they are asked.
-        requires: by the scene, which decides the formulation where none is given.
+    What the scene ``requires`` decides the formulation where none is given.
     """
     common = {"do": "resolve", "requires": sorted(requires)}
     requests = [(name, {**common, "engine": name, "options": dict(options)}) for name, options in engines]

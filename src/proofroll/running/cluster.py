@@ -109,9 +109,7 @@ class Cluster:
     def map(self, function: Callable[[Item], Found], items: Sequence[Item]) -> Iterator[tuple[str, Found]]:
         """The machine's name and what a function gives for each item, in order, each computed in a watched process.
 
-        Args:
-            function: can be pickled, and its results too.
-            items: its arguments.
+        The function and its results can be pickled.
 
         Raises:
             ProofrollError: a process or the scheduler ended, or the function said so.

@@ -51,14 +51,10 @@ def add(
     python: str = "",
     tell: Callable[[str], None] | None = None,
 ) -> Environment:
-    """Makes an environment and remembers it once its engine has been imported there.
+    """Makes an environment and remembers it as ``NAME@LABEL`` once its engine has been imported there.
 
-    Args:
-        name: of the engine.
-        requirements: as pip reads them, e.g. ``mujoco==3.8.1``.
-        label: by which it is remembered, ``NAME@LABEL``; by default the version that the first requirement pins.
-        python: command or path of its Python; by default this one.
-        tell: called with what is being done.
+    Requirements are as pip reads them, e.g. ``mujoco==3.8.1``; the label is by default the version that the first one
+    pins. ``python`` is a command or path, by default this one; ``tell`` is called with what is being done.
 
     Raises:
         InputError: something given makes no sense, or the label is taken.

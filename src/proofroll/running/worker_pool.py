@@ -16,11 +16,9 @@ MOST = 8
 
 
 class Workers:
-    """Idle workers by engine. They end with this object, and at the latest with this process.
+    """At most so many idle workers by engine. They end with this object, and at the latest with this process.
 
-    Args:
-        memory: how much each may have [GB]; by default :func:`proofroll.running.memory.memory_limit`.
-        most: how many are kept while they are idle.
+    Each may have so much ``memory`` [GB], by default :func:`proofroll.running.memory.memory_limit`.
     """
 
     def __init__(self, memory: float | None = None, most: int = MOST) -> None:

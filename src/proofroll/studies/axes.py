@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import ProofrollError, require_known
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -68,9 +68,8 @@ class Axis:
         found = {}
         for name, term in self.parameters.items():
             for known in (name, *([term.times] if isinstance(term.times, str) else ())):
-                if known not in scene.parameters:
-                    advice = f"{scene.name} has no such parameter; choose from {', '.join(scene.parameters)}"
-                    raise InputError(f"axes: {self.name}", known, advice)
+                advice = f"{scene.name} has no such parameter; choose from"
+                require_known(f"axes: {self.name}", known, scene.parameters, advice)
             factor = scene.parameters[term.times] if isinstance(term.times, str) else term.times
             found[name] = factor * value**term.power
         return found
@@ -84,8 +83,7 @@ def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
     """
     known = {axis.name: axis for axis in axes}
     for name in names:
-        if name not in known:
-            raise InputError("axis", name, f"there is no such axis; choose from {', '.join(known)}")
+        require_known("axis", name, known, "there is no such axis; choose from")
     return [known[name] for name in dict.fromkeys(names)] if names else list(axes)
 
 

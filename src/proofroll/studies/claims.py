@@ -10,7 +10,7 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
-from proofroll.files.toml import read_toml, study_files
+from proofroll.files.toml import study_content, study_files
 from proofroll.studies.claimed import Cheapest, ClaimJudgement, Converges, Holds
 from proofroll.studies.curve import Question
 
@@ -79,16 +79,11 @@ def load_claims(path: str | Path) -> TradeoffClaims:
     Raises:
         InputError: it is broken, or is about something else.
     """
-    path = Path(path)
-    content = read_toml(path)
-    if content.get("study") != STUDY:
-        raise InputError(str(path), "study", f'only a file with study = "{STUDY}" is about a trade-off')
-    return _claims(path, content)
+    return _claims(Path(path), study_content(Path(path), STUDY, "is about a trade-off"))
 
 
-def _claims(path: Path, content: dict[str, Any]) -> TradeoffClaims:
+def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
     where = path.name
-    given = {key: value for key, value in content.items() if key != "study"}
     for kind in ("cheapest", "holds"):
         raw = given.get(kind, [])
         for index, claim in enumerate(raw if isinstance(raw, list) else []):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from proofroll.core.errors import InputError, Missing, choices
+from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.files.data_folders import data_folder
 
 # Exit code of a program whose finding still shows; 0 says that it is gone, everything else that it could not tell.
@@ -91,8 +91,7 @@ def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
     wanted = list(engines)
     known = sorted({item.engine for item in found})
     for name in wanted:
-        if name not in known:
-            raise InputError("engine", name, f"there is no finding about it; choose {choices(known)}")
+        require_known("engine", name, known, "there is no finding about it; choose")
     return [item for item in found if not wanted or item.engine in wanted]
 
 

@@ -28,10 +28,7 @@ _PARTS = (0.1, 1.0, 10.0)
 def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None = None) -> Comparison:
     """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
 
-    Args:
-        name: of the scene.
-        parameters: those that differ from the defaults.
-        workers: processes in which engines are asked, for whoever runs the comparison; None: others.
+    ``parameters`` are those that differ from the defaults; engines are asked in one of ``workers``, if they are given.
 
     Raises:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.

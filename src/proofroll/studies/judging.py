@@ -13,7 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import from_samples
 from proofroll.core.engine import Sample
-from proofroll.core.errors import Diverged, InputError
+from proofroll.core.errors import Diverged, InputError, require_known
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -226,8 +226,7 @@ def _bounds(
     if not given:
         raise InputError("tolerance", "{}", "say how far what may be off")
     for name in given:
-        if name not in able:
-            raise InputError("tolerance", name, f"this trajectory has {', '.join(able)}")
+        require_known("tolerance", name, able, "this trajectory has")
     return {name: _tolerance(name, text, _unit(reference, name)) for name, text in given.items()}
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.dataset import observe
-from proofroll.core.errors import InputError, ProofrollError, Refused
+from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
@@ -58,16 +58,9 @@ class Ladder:
         truths: by the parameters that a switch puts over the given ones, as text.
         engines: what every engine tells of itself, or why it cannot.
 
-    Args:
-        scene: name of the scene.
-        parameters: of it.
-        runner: where cases are run and kept.
-        quantity: what is asked; what decides the scene if None.
-        until: last time [s].
-        tolerance: error of the quantity that is allowed, in its unit; None: a term counts if it moves the quantity by
-            more than the smaller of the errors with and without it.
-        engines: names; all if empty.
-        rounds: of the timing that count; as many as a timing has by default if None.
+    Without a ``quantity`` it is what decides the scene, until the time ``until`` [s], of all engines if none are named.
+    Without a ``tolerance`` of it, in its unit, a term counts if it moves the quantity by more than the smaller of the
+    errors with and without it. So many ``rounds`` of the timing count.
 
     Raises:
         InputError: something that was given does not exist or makes no sense.
@@ -97,8 +90,7 @@ class Ladder:
         self._given = {name: self.scene.parameters[name] for name in parameters}
         curves = [name for name, item in self.scene.observables.items() if item.role != Role.EVENT]
         self.quantity = quantity or self.scene.deciding
-        if self.quantity not in curves:
-            raise InputError("quantity", self.quantity, f"choose one of {', '.join(curves)}")
+        require_known("quantity", self.quantity, curves)
         self.unit = self.scene.observables[self.quantity].unit
         self.engines = described(engines or engine_names(), runner.workers)
         for error in self.engines.values():

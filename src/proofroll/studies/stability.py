@@ -111,13 +111,8 @@ def stability(
 ) -> StabilityMap:
     """Maps the boundaries.
 
-    Args:
-        scene: name of the scene; what an axis does not change keeps its default.
-        axes: along which.
-        runner: where the cases run.
-        engines: names or ``name[key=value,…]``; all that are installed if empty.
-        effort: how much it may cost.
-        progress: called with a short text and the number of points finished since the last call.
+    What an axis does not change keeps the scene's default. Engines are names or ``name[key=value,…]``; all that are
+    installed if there are none. ``progress`` is called with a text and how many points have been finished since.
 
     Raises:
         InputError: something that does not exist.

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene, read_scene_file
-from proofroll.files.toml import read_toml, study_files
+from proofroll.files.toml import study_content, study_files
 from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
 from proofroll.studies.first_look import axes_of
@@ -165,9 +165,7 @@ def file_for(scene: str) -> StabilityFile:
 
 def _load(path: Path) -> StabilityFile:
     where = path.name
-    content = read_toml(path)
-    if content.pop("study", None) != STUDY:
-        raise InputError(str(path), "study", f'only a file with study = "{STUDY}" asks for a stability map')
+    content = study_content(path, STUDY, "asks for a stability map")
     found = validated(StabilityFile, content, where, name=path.stem)
     _check(where, found)
     return found
@@ -186,13 +184,11 @@ def _check(where: str, found: StabilityFile) -> None:
         if not claim.because:
             raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
         for name in claim.axes:
-            if name not in known:
-                raise InputError(f"{at}.axes", name, f"there is no such axis; choose from {', '.join(known)}")
+            require_known(f"{at}.axes", name, known, "there is no such axis; choose from")
         for failure in claim.failure:
-            if failure not in meanings(scene):
-                raise InputError(f"{at}.failure", failure, f"choose one of {', '.join(meanings(scene))}")
-        if claim.number is not None and claim.number not in numbers:
-            raise InputError(f"{at}.number", claim.number, f"choose one of {', '.join(numbers)}")
+            require_known(f"{at}.failure", failure, meanings(scene))
+        if claim.number is not None:
+            require_known(f"{at}.number", claim.number, numbers)
         if (claim.number is None) != (not claim.between):
             raise InputError(f"{at}.between", claim.between, "number and between = [low, high] go together")
         for name in ("between", "values"):

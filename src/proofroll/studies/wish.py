@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff_records import MeasuredPoint, SparseRun, TradeoffStudy
@@ -37,8 +37,7 @@ class Wish:
 def absolute_tolerance(study: TradeoffStudy, wish: Wish) -> float:
     """The tolerance in the quantity's unit."""
     known = study.quantities
-    if wish.quantity not in known:
-        raise InputError("quantity", wish.quantity, f"measured are {', '.join(known)}")
+    require_known("quantity", wish.quantity, known, "measured are")
     scale = known[wish.quantity].scale
     if wish.tolerance.relative and scale is None:
         advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity].unit}"

@@ -57,14 +57,9 @@ def diagnosed(
 ) -> list[Diagnosis]:
     """The proven causes of all elements of a scene.
 
-    Args:
-        scene: what was to be simulated.
-        lines: of the stored certificate; empty if there is none.
-        run: the engine's trajectory, or None.
-        truth: at the same times, or None.
-        step: of the engine [s], or None.
-        judgements: of the run's observables, for what is right in it; where there are any, an element of which all is
-            right is not looked at: what is left of it are round-off and truncation, which any fault may seem to close.
+    ``lines`` are those of the stored certificate, ``run`` and ``truth`` trajectories at the same times, ``step`` is the
+    engine's [s]. Where there are judgements of observables, an element of which all is right is not looked at: what is
+    left of it are round-off and truncation, which any fault may seem to close.
     """
     if run is None and all(line["holds"] for line in lines):
         return []
