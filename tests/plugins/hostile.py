@@ -247,23 +247,8 @@ class Commands(Oracle):
 # needs a module that nobody has.
 ENTRY_POINTS = {
     kind.name: f"hostile:{kind.__name__}"
-    for kind in (
-        Oracle,
-        Garbage,
-        Exits,
-        Segfaults,
-        Hangs,
-        HangsAloud,
-        Raises,
-        SaysExit,
-        NotANumber,
-        GivesUp,
-        Refuses,
-        BlamesMemory,
-        BlamesFile,
-        Interrupted,
-        Commands,
-    )
+    for kind in [*vars().values()]
+    if isinstance(kind, type) and issubclass(kind, Oracle)
 } | {
     "broken": "broken:Broken",
     "laddered": "laddered:Laddered",

@@ -63,7 +63,7 @@ class Report:
         self.parts = sorted(parts, key=lambda part: part.order)
         missing = []
         for part in self.parts:
-            said = attempt(part, partial(_kept, part, out)) if not fresh else None
+            said = attempt(part, partial(part.keeps, out)) if not fresh else None
             if said is None:
                 missing.append(part)
                 said = absent(part, "It has not been made yet")
@@ -72,12 +72,7 @@ class Report:
 
     def make(self, part: Part, how: Callable[[], None]) -> PartEntry:
         """Makes a further study; whatever happens to it, its entry says."""
-
-        def made() -> PartEntry:
-            how()
-            return part.entry()
-
-        said = attempt(part, made)
+        said = attempt(part, how)
         assert said is not None  # it was made, or the entry says why not
         self._put(part, said)
         return said
@@ -132,10 +127,6 @@ def _replay(outcomes: list[Outcome], store: Store) -> Replay | None:
     return joined(
         [replay_content([item for item in outcomes if kinds[id(item)] is kind], store, kind.replay()) for kind in found]
     )
-
-
-def _kept(part: Part, out: Path) -> PartEntry | None:
-    return part.entry() if part.keeps(out) else None
 
 
 def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:

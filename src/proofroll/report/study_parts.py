@@ -156,10 +156,13 @@ def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
     return [part for part in found if not part.on_request or part.keeps(out)]
 
 
-def attempt(part: Part, action: Callable[[], PartEntry | None]) -> PartEntry | None:
-    """What an action on a part gives; whatever happens in it, a report goes on: the entry then says what."""
+def attempt(part: Part, action: Callable[[], bool | None]) -> PartEntry | None:
+    """The entry of a part on which something was done; None where that was False: there is nothing.
+
+    Whatever happens in it, a report goes on: the entry then says what.
+    """
     try:
-        return action()
+        return None if action() is False else part.entry()
     except ProofrollError as error:
         return absent(part, str(error))
     except Exception as error:
