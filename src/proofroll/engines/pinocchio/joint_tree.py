@@ -38,6 +38,8 @@ class JointTree:
         joint: Pinocchio's joint of each of the mechanism's joints; that of the carrying joint where it is fixed.
         body, at_joint: Pinocchio's frames of the bodies, and of the joints on their children.
         loops, springs: the frames at their two ends, after each spring itself.
+        drive, damping: of each velocity, shape (nv,).
+        sprung: stiffness, rest, and slices of configuration and velocity, of each joint that has a spring.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -94,18 +96,18 @@ class JointTree:
         joints = self.mechanism.joints
         by_velocity = [joint for joint in joints for _ in range(joint.nv)]
         self.model.armature = np.array([joint.armature for joint in by_velocity])
-        self._drive = np.array([joint.torque for joint in by_velocity])
-        self._damping = np.array([joint.damping for joint in by_velocity])
+        self.drive = np.array([joint.torque for joint in by_velocity])
+        self.damping = np.array([joint.damping for joint in by_velocity])
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
-        self._sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
-        self._constant = not self._sprung and not self._damping.any()
+        self.sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
+        self._constant = not self.sprung and not self.damping.any()
 
     def drives(self, q: Array, v: Array) -> Array:
         """Generalised forces of joints' own springs, dampers and drives, shape (nv,); not to be written to."""
         if self._constant:
-            return self._drive
-        tau = self._drive - self._damping * v
-        for stiffness, rest, at_q, at_v in self._sprung:
+            return self.drive
+        tau = self.drive - self.damping * v
+        for stiffness, rest, at_q, at_v in self.sprung:
             tau[at_v] -= stiffness * (q[at_q] - rest)
         return tau
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from proofroll.elements.ball_on_surface.reproducer_source import assigned
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
@@ -192,12 +193,7 @@ def states(times):
 
 
 def source(run: MechanismRun, settings: PinocchioSettings) -> str:
-    """The program's part that runs the model.
-
-    Args:
-        run: the model, at time 0.
-        settings: of the adapter.
-    """
+    """The program's part that runs a model, given at time 0."""
     tree, mechanism = run.tree, run.tree.mechanism
     model = tree.model
     attached: dict[tuple[int, str], int] = {}
@@ -225,18 +221,16 @@ def source(run: MechanismRun, settings: PinocchioSettings) -> str:
         for k, item in enumerate(model.inertias)
         if k
     ]
-    by_velocity = [joint for joint in mechanism.joints for _ in range(joint.nv)]
-    slices = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
     values = {
         "GRAVITY": list(mechanism.gravity),
-        "ARMATURE": model.armature.tolist(),
+        "ARMATURE": model.armature,
         "LOOPS": loops,
         "SPRINGS": springs,
         "PLACES": places,
-        "DRIVES": [joint.torque for joint in by_velocity],
-        "DAMPING": [joint.damping for joint in by_velocity],
-        "SPRUNG": [(joint.stiffness, joint.rest, q.start, v.start) for joint, q, v in slices if joint.stiffness],
-        "START": np.concatenate([tree.q0, tree.v0]).tolist(),
+        "DRIVES": tree.drive,
+        "DAMPING": tree.damping,
+        "SPRUNG": [(stiffness, rest, q.start, v.start) for stiffness, rest, q, v in tree.sprung],
+        "START": np.concatenate([tree.q0, tree.v0]),
         "RANK": run.rank,
         "ELIMINATES": settings.projection and run.rank > 0,
         "RTOL" if settings.integrator == "dop853" else "STEP_SIZE": getattr(settings, settings.resolution),
@@ -254,7 +248,7 @@ def source(run: MechanismRun, settings: PinocchioSettings) -> str:
             "\n# Parent, kind, pose on it; mass, centre and inertia that the joint carries. Depth-first.\n",
             f"JOINTS = [\n{''.join(joints)}]\n",
             f"# Places that something is attached to: joint, and pose on it.\nATTACHED = [\n{poses}]\n",
-            *(f"{name} = {value!r}\n" for name, value in values.items()),
+            assigned(**values),
             _MODEL,
             _CONSTRAINT_DYNAMICS if by_constraints else _NULL_SPACE,
             _MOTION,
