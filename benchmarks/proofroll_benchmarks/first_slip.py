@@ -55,12 +55,7 @@ class FirstSlip:
     """
 
     def __init__(self, body: RollingBall, model: Model = "reduced", tolerance: float = TIGHTEST) -> None:
-        """Builds the model.
-
-        Args:
-            body: the scene's ball.
-            model: see :func:`first_slip`.
-            tolerance: of each step, relative to the state [-].
+        """Builds the model; ``tolerance`` is that of each step, relative to the state [-].
 
         Raises:
             Refused: heyoka is missing, or the scene is another.

@@ -32,7 +32,6 @@ class ContactRun(ContactSteps):
         super().__init__(body, settings)
         self._body = body
         self._looked_at = self.contact.model.createData()  # for sampling, which leaves the running data alone
-        self._unbounded = UNBOUNDED_FRICTION[self.solver]
 
     def sample(self) -> Sample:
         """See :class:`proofroll.core.engine.Engine`; the force is that of the step beginning or centred here."""
@@ -71,16 +70,10 @@ class ContactRun(ContactSteps):
             gap=float(contact.point_data.c1Mc2.translation[2] + self._body.surface.gap(pose.translation)),
             acceleration=acceleration[:3],
             angular_acceleration=pose.rotation @ acceleration[3:],
-            regularised=_softened(
-                self._body,
-                bends=self.leapfrog,
-                dt=self.dt,
-                impulse=0.0 if self.solver == "pgs" else self.tolerance,
-                unbounded=None if self.bounded else self._unbounded,
-            ),
+            regularised=_softened(self._body, self),
             terms=terms_held(
                 resists=lever,
-                slips=contact.friction(self.mu_static) != self._unbounded,
+                slips=contact.friction(self.mu_static) != UNBOUNDED_FRICTION[self.solver],
                 turns=contact.model.joints[contact.ball].nq == _QUATERNION,
             ),
         )
@@ -90,18 +83,10 @@ class ContactRun(ContactSteps):
         return tuple(self.happened) if self.bounded else ()
 
 
-def _softened(
-    body: RollingBall, *, bends: bool, dt: float, impulse: float, unbounded: float | None
-) -> dict[str, Regularised]:
-    """What :attr:`proofroll.core.engine.Built.regularised` holds.
-
-    Args:
-        body: as the scene has it.
-        bends: whether the solver is told how the wall bends during a step.
-        dt: step [s].
-        impulse: error of the velocity of the contact point that the solver leaves [m/s]; 0 if it is round-off.
-        unbounded: the number that stands for unbounded friction [-]; None if friction is bounded.
-    """
+def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
+    """What :attr:`proofroll.core.engine.Built.regularised` holds."""
+    dt = steps.dt
+    impulse = 0.0 if steps.solver == "pgs" else steps.tolerance  # what the solver leaves of a velocity, but round-off
     natural = natural_acceleration(body)
     # Velocities are wrong by what the solver leaves and by the round-off of the position over a step.
     size = body.ball.radius + float(np.linalg.norm(body.p0))
@@ -111,7 +96,7 @@ def _softened(
     if impulse:
         reasons.append("impulses are found to solver_tolerance")
     missing = dict.fromkeys(("acceleration", "angular acceleration", "N", "F2", "F3"), 0.0)
-    if not bends:
+    if not steps.leapfrog:  # which tells the solver how the wall bends during a step
         missing = {name: value / natural for name, value in _missing_bend(body).items()}
         if max(missing.values()) > rough:
             reasons.append("for the length of a step the wall is a plane, and at time 0 it does not yet bend the path")
@@ -123,9 +108,9 @@ def _softened(
         reasons.append("an impulse opposes the slip at its end, which turns")
     because = "; ".join(reasons)
     result = {name: Regularised(value + rough, because) for name, value in missing.items()}
-    if unbounded is not None:
-        because = f"the friction cone of Pinocchio's solver needs a number, here {unbounded:g}"
-        result |= {f"1 / {kind} friction": Regularised(1 / unbounded, because) for kind in ("static", "kinetic")}
+    if not steps.bounded:
+        because = f"the friction cone of Pinocchio's solver needs a number, here {steps.mu_static:g}"
+        result |= {f"1 / {kind} friction": Regularised(1 / steps.mu_static, because) for kind in ("static", "kinetic")}
     return result
 
 

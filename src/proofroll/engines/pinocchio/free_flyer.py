@@ -36,10 +36,6 @@ class FreeFlyer(BallWithRows):
         self.q_scale = np.concatenate([np.full(3, self._radius), np.ones(4)])
         self.v_scale = np.concatenate([np.full(3, self._speed), np.full(3, self._speed / self._radius)])
 
-    def _carrying(self, W: FloatArray, v: Sequence[float], e1_rate: Sequence[float]) -> FloatArray:
-        """Rate of the wall's velocity W × (p + a e1) at the contact, which goes along with the ball [m/s²]."""
-        return cross(W, np.asarray(v) + self._radius * np.asarray(e1_rate))
-
     def project(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`.
 
@@ -53,13 +49,7 @@ class FreeFlyer(BallWithRows):
         return q, rest + carried
 
     def _aimed(self, moving: Sequence[float]) -> FloatArray:
-        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6).
-
-        The next call overwrites it.
-
-        Args:
-            moving: of :meth:`proofroll.elements.ball_on_surface.surfaces.Surface.moving_triad`.
-        """
+        """Velocity along e1, and of slip along e2 and e3, from (v, ω) in the world, shape (3, 6); overwritten."""
         entries = self._entries
         for index, source, factor in self._sources:
             entries[index] = factor * moving[source]
@@ -92,8 +82,8 @@ class FreeFlyer(BallWithRows):
         drift[0] = along1 + (x * vx + y * vy + z * vz)
         drift[1] = along2 + (x2 * tx + y2 * ty + z2 * tz)
         drift[2] = along3 + (x3 * tx + y3 * ty + z3 * tz)
-        if self._wall_rate is not None:
-            gain = self._carrying(self._wall_rate, (vx, vy, vz), (x, y, z))
+        if self._wall_rate is not None:  # at the contact it goes by W × (p + a e1), and that point along with the ball
+            gain = cross(self._wall_rate, np.array((vx, vy, vz)) + a * np.array((x, y, z)))
             drift[1] -= gain @ (x2, y2, z2)
             drift[2] -= gain @ (x3, y3, z3)
         resistance = self._rest

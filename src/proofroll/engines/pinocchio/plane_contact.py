@@ -65,13 +65,10 @@ class PlaneContact:
         self._solver, self.options, self._result = _solver(kind, tolerance)
 
     def pose(self, place: Sequence[float], triad: Sequence[float]) -> FloatArray:
-        """Poses the plane at the contact point, and returns the velocity of that per joint velocity, shape (3, 6).
+        """Poses the plane where a ball at ``place`` [m] touches, with the components of e1, e2, e3.
 
-        Expects the joints' placements and Jacobians in ``data``; the rows are components along :attr:`axes`.
-
-        Args:
-            place: centre of the ball [m].
-            triad: components of e1, e2, e3.
+        Returns the velocity of the contact point per joint velocity, along :attr:`axes`, shape (3, 6). Expects the
+        joints' placements and Jacobians in ``data``.
         """
         x, y, z = place
         x1, y1, z1, x2, y2, z2, x3, y3, z3 = triad
@@ -90,10 +87,8 @@ class PlaneContact:
     def impulse(self, delassus: Any, free: FloatArray, mu: float) -> FloatArray | None:
         """Impulse along the axes [N s], shape (3,), which the next call may overwrite; None if it is not found.
 
-        Args:
-            delassus: pin.DelassusOperatorDense of the contact.
-            free: velocity of the contact point without an impulse [m/s], along the axes, shape (3,).
-            mu: coefficient of friction [-].
+        ``delassus`` is the contact's pin.DelassusOperatorDense, ``free`` the velocity of the contact point without an
+        impulse [m/s], along the axes, shape (3,).
         """
         self.point.setFriction(mu)
         # No guess from the last step: the answer must not depend on what was looked at in between.

@@ -154,10 +154,8 @@ class ProjectedBall:
     def response(self, kin: Kinematics, drag: FloatArray | None = None) -> Response:
         """Accelerations and reactions: the tangential projection together with the non-holonomic constraints.
 
-        Args:
-            kin: the state.
-            drag: applied force per newton of normal force, besides the rolling resistance, along v's components and
-                without one along e1, shape (6,).
+        ``drag`` is an applied force per newton of normal force, besides the rolling resistance, along v's components
+        and without one along e1, shape (6,).
         """
         force = self.weight(kin)
         N = self.normal_force(kin, force)
@@ -215,14 +213,10 @@ class ProjectedBall:
         return np.asarray(self.rows @ kin.v - self.rows[:, :3] @ kin.carried[0])
 
     def eliminated(self, x: FloatArray, slip: FloatArray | None = None) -> FloatArray:
-        """The state with the violation of C v = 0 removed from s (Blajer 2002).
+        """The state x with the violation of C v = 0, or of C v = ``slip`` [m/s], removed from s (Blajer 2002).
 
         s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄. The correction solves
         a system with the same matrix as the equations of motion.
-
-        Args:
-            x: the state.
-            slip: what C v shall be instead of zero [m/s], one per active row.
         """
         if self._closed is not None and slip is None:
             return self._closed.eliminated(x)

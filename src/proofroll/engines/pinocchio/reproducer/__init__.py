@@ -17,11 +17,7 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
 def source(body: RollingBall, settings: PinocchioSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`.
-
-    Args:
-        body: the scene's.
-        settings: of the adapter; they say whether the orientation is integrated, no longer the scene.
+    """See :class:`proofroll.core.engine_abilities.Reproduces`; the settings say whether the orientation is integrated.
 
     Raises:
         Refused: the scene or the settings have something that the program has not.
