@@ -82,7 +82,7 @@ def measure_adapter(
     """
     from proofroll.core.plugins import load_engine, resolve_settings
     from proofroll.files.scene_file import load_scene
-    from proofroll_benchmarks.loops import load_bare_loop
+    from proofroll_benchmarks.bare import load_bare_loop
 
     prepare = load_bare_loop(engine)
     kind = load_engine(engine)
@@ -146,7 +146,7 @@ def bench_adapters(
     """All formulations of some engines, each with every variant, one worker process per engine."""
     from proofroll.files.scene_file import load_scene
     from proofroll.running.process import Worker, WorkerDied
-    from proofroll_benchmarks.loops import announced
+    from proofroll_benchmarks.bare import bare_loop
 
     rows: list[AdapterRow] = []
     asked = {name: load_scene(name).requires for name in (SCENE, *MECHANISMS)}
@@ -168,7 +168,7 @@ def bench_adapters(
                 rows.append(AdapterRow(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
                 continue
             try:
-                announced(engine)
+                bare_loop(engine)
             except Refused as error:
                 rows.append(AdapterRow(engine, "", preset, "", None, str(error)))  # once, not for every variant
                 continue

@@ -11,7 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib.metadata import EntryPoint
+from typing import Any
 
+from proofroll.core.announced import announced
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
@@ -37,6 +40,23 @@ class Bare:
     run: Callable[[FloatArray], FloatArray]
     tolerance: float
     because: str
+
+
+def load_bare_loop(engine: str) -> Any:
+    """The function that prepares bare loops of an engine.
+
+    Raises:
+        Refused: no installed package announces one.
+    """
+    return bare_loop(engine).load()
+
+
+def bare_loop(engine: str) -> EntryPoint:
+    """The entry point of an engine's bare loop, which is not loaded yet; raises as :func:`load_bare_loop`."""
+    for point in announced(GROUP):
+        if point.name == engine:
+            return point
+    raise Refused(f"no bare loop is announced for {engine} (entry-point group {GROUP})")
 
 
 def is_mechanism(scene: Scene) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from proofroll.running.timing import Interval
-from proofroll_benchmarks import loops
+from proofroll_benchmarks import bare
 from proofroll_benchmarks.adapters import GOAL, AdapterRow, bench_adapters, content, measure_adapter
 from proofroll_benchmarks.bare import Bare
 
@@ -47,7 +47,7 @@ def test_a_preset_that_no_formulation_has(install_engines: Callable[[Mapping[str
 def measured(monkeypatch: pytest.MonkeyPatch, centre: Callable[[np.ndarray[Any, Any]], Any]) -> dict[str, Any]:
     """What is measured of the projection method with a bare loop that gives this centre."""
     monkeypatch.setattr(
-        loops,
+        bare,
         "load_bare_loop",
         lambda engine: lambda scene, settings: Bare(centre, 1e-9, "none"),  # noqa: ARG005 -- the same for all
     )

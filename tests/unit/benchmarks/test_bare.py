@@ -12,7 +12,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.plugins import load_engine, resolve_settings
 from proofroll.files.scene_file import load_scene
 from proofroll_benchmarks.adapters import MECHANISMS, VARIANTS
-from proofroll_benchmarks.loops import load_bare_loop
+from proofroll_benchmarks.bare import load_bare_loop
 
 FORMULATIONS = [
     (engine, formulation)
