@@ -148,12 +148,10 @@ class Mujoco(SteppedModel):
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.mujoco.reproducer import source
+        from proofroll.engines.mujoco.reproducer import mechanism_source, source
 
         if settings.formulation == "joints":
-            from proofroll.engines.mujoco.reproducer import mechanism
-
-            return mechanism.source(MujocoMechanism(scene, settings).model_file(), mechanism_of(scene))
+            return mechanism_source(MujocoMechanism(scene, settings).model_file(), mechanism_of(scene))
         built, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         compiled(spec)
         return source(spec.to_xml(), built._model, built._data, built._body, settings)

@@ -1,4 +1,4 @@
-"""Writes the program that shows what MuJoCo does with a ball on a wall, without proofroll."""
+"""Writes the program that shows what MuJoCo does without proofroll: with a ball on a wall, or with a mechanism."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
+from proofroll.elements.mechanism import Mechanism
 from proofroll.engines.mujoco.contact import Resistance
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
 from proofroll.engines.mujoco.reproducer import text
@@ -75,6 +76,13 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
             text.RUN,
         ]
     )
+
+
+def mechanism_source(xml: str, mechanism: Mechanism) -> str:
+    """The program's part that runs a mechanism, given as MJCF whose first keyframe is the start."""
+    places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
+    places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
+    return text.MECHANISM.format(model=xml, places=places)
 
 
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
