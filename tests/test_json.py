@@ -30,7 +30,7 @@ from proofroll.report.comparison_records import (
     ShownObservable,
     WorstJudgement,
 )
-from proofroll.report.ladder import Absence, KnownTruth, LadderContent, Ran, RungFound, SideFound, TermFound
+from proofroll.report.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.records import (
     DrawnBody,
@@ -45,6 +45,7 @@ from proofroll.robots.records import (
 )
 from proofroll.robots.robot_file import LintFinding
 from proofroll.studies.axes import Axis, Effort
+from proofroll.studies.ladder_models import Ran
 from proofroll.studies.recommend import Answer, CheckedOver, Recommendation
 from proofroll.studies.stability_records import (
     Boundary,

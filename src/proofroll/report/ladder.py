@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from proofroll.core.arrays import largest_difference
 from proofroll.core.errors import ProofrollError
@@ -13,22 +12,8 @@ from proofroll.files.json_data import MERGED
 from proofroll.running.case import EngineDescription, Status
 from proofroll.running.timing import Interval, machine, ratio
 from proofroll.studies.ladder import Ladder, absence, key_of
-from proofroll.studies.ladder_models import Answered, LadderModel, Need, Rung, Switch, need_of_term
+from proofroll.studies.ladder_models import LadderModel, Need, Ran, Rung, Switch, need_of_term
 from proofroll.studies.pareto import front
-
-
-@dataclass(frozen=True)
-class Ran:
-    """A model that was run: the error of the quantity and wall seconds per simulated second, None where there is none.
-
-    Its settings are None where the engine could not be asked.
-    """
-
-    settings: dict[str, Any] | None
-    status: str
-    message: str
-    error: float | None
-    seconds_per_second: Interval | None
 
 
 @dataclass(frozen=True)
@@ -187,10 +172,9 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
         change = largest_difference(with_it.values, without.values)
     if on.ran.error is not None and off.ran.error is not None:
         error_change = off.ran.error - on.ran.error
-    endings = [f"{answer.result.status.value}, {answer.result.message}" for answer in (with_it, without)]
     verdict, reason = need_of_term(
-        Answered(on.ran.error, endings[0]),
-        Answered(off.ran.error, endings[1]),
+        on.ran,
+        off.ran,
         change,
         cost,
         tolerance=study.tolerance,

@@ -159,21 +159,27 @@ class Need(StrEnum):
 
 
 @dataclass(frozen=True)
-class Answered:
-    """The quantity with a term, or without it.
+class Ran:
+    """A model that was run: the error of the quantity and wall seconds per simulated second, None where there is none.
 
-    Attributes:
-        error: distance from the truth, which has the term; None: there is no answer.
-        said: how the run ended.
+    Its settings are None where the engine could not be asked.
     """
 
+    settings: dict[str, Any] | None
+    status: str
+    message: str
     error: float | None
-    said: str
+    seconds_per_second: Interval | None
+
+    @property
+    def ending(self) -> str:
+        """How it ended."""
+        return f"{self.status}, {self.message}"
 
 
 def need_of_term(
-    on: Answered,
-    off: Answered,
+    on: Ran,
+    off: Ran,
     change: float | None,
     cost: Interval | None,
     *,
@@ -188,7 +194,7 @@ def need_of_term(
     bar.
 
     Args:
-        on: with the term.
+        on: the model with the term, held against the truth that has it.
         off: without it.
         change: of the quantity between the two; None if one of them has no answer.
         cost: how many times longer it takes with the term; None if that is not known.
@@ -197,10 +203,10 @@ def need_of_term(
         scale: size of the quantity.
     """
     if on.error is None or on.error > scale:
-        said = on.said if on.error is None else f"the answer is off by {on.error:.2g}, more than its whole size"
+        said = on.ending if on.error is None else f"the answer is off by {on.error:.2g}, more than its whole size"
         return Need.NO_ANSWER, f"with it: {said}"
     if off.error is None or change is None:
-        return Need.NEEDED, f"without it: {off.said}"
+        return Need.NEEDED, f"without it: {off.ending}"
     limit = max(bar, max(min(on.error, off.error), _ROUND_OFF * scale) if tolerance is None else tolerance)
     allowed = f"the tolerance, {limit:.2g}" if tolerance is not None else f"the error that is left anyway, {limit:.2g}"
     if change > limit:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from proofroll.running.timing import Interval
-from proofroll.studies.ladder_models import Answered, Need, need_of_term
+from proofroll.studies.ladder_models import Need, Ran, need_of_term
 
 CLEAR, NOISE = Interval(1.5, 1.4, 1.6, 0.97), Interval(1.5, 0.9, 2.0, 0.97)
 
@@ -36,9 +36,8 @@ def test_verdict(
     verdict: Need,
 ) -> None:
     """A term is needed, harmful, paid for or free by what leaving it out does, and saves."""
-    found, reason = need_of_term(
-        Answered(on, "ended so"), Answered(off, "ended so"), change, cost, tolerance=tolerance, bar=1e-13, scale=0.1
-    )
+    sides = (Ran({}, "failed", "ended so", error, None) for error in (on, off))
+    found, reason = need_of_term(*sides, change, cost, tolerance=tolerance, bar=1e-13, scale=0.1)
     assert found is verdict
     assert "\n" not in reason
     if on is None or off is None:
