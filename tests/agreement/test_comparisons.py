@@ -100,12 +100,12 @@ LAST_SPECIAL = 2.25
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "engine",
-    ["projection[formulation=rotating_frame]", "exudyn[formulation=generic]", "mujoco[formulation=chart,preset=tuned]"],
-)
+@pytest.mark.parametrize("engine", ["projection[formulation=rotating_frame]", "mujoco[formulation=chart,preset=tuned]"])
 def test_row_at_the_special_points(engine: str, store: Store) -> None:
-    """Claims hold with kinetic friction below static, and at a stair edge, where the time of slip is not judged."""
+    """Claims hold with kinetic friction below static, and at a stair edge, where the time of slip is not judged.
+
+    By one engine with an adaptive step and one with a ladder; ``test_bounded_friction`` has the events of others.
+    """
     comparison = loaded("stick_slip")
     (row,) = (row for row in comparison.rows if row.engine == engine)
     special = [point for point in comparison.points if "mu_kinetic" in point or isinstance(point["mu_static"], Edge)]
