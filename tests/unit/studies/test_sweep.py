@@ -24,7 +24,6 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Curve], f
         [
             "projection[formulation=rotating_frame,preset=default]",
             "projection[formulation=rotating_frame,preset=matched]",
-            "pinocchio[formulation=composite,preset=matched]",
         ]
     )
     assert absent == {}
@@ -57,7 +56,7 @@ def test_a_curve_over_tolerances(swept: tuple[dict[str, Curve], float]) -> None:
 def test_a_curve_over_tolerances_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
     """Tolerances are loosened until the run is broken, or until something else limits its steps; no clock has a say."""
     curves, scale = swept
-    curve = curves["pinocchio[formulation=composite,preset=matched]"]
+    curve = curves["projection[formulation=rotating_frame,preset=matched]"]
     first = curve.points[0]
     broken = first.result.status != Status.DONE or first.errors["z"] >= BROKEN * scale
     assert broken or curve.saturated("z")
@@ -82,16 +81,13 @@ def test_a_tolerance_that_holds_only_between_many_samples_does_not_hold(
     swept: tuple[dict[str, Curve], float],
 ) -> None:
     """Where a step ends at each of many samples, a loose tolerance looks as good as a tight one; with few it is not."""
-    for name in (
-        "pinocchio[formulation=composite,preset=matched]",
-        "projection[formulation=rotating_frame,preset=matched]",
-    ):
-        loose = next(point for point in swept[0][name].points if point.step == 1e-2)
-        assert loose.dense["z"] < 1e-12
-        assert loose.errors["z"] > 1e4 * loose.dense["z"]
-        assert loose.sparse is not None
-        assert loose.errors["z"] == loose.sparse.errors["z"]
-        assert loose.sparse.case.every == QUESTION.until / 2
+    points = swept[0]["projection[formulation=rotating_frame,preset=matched]"].points
+    loose = next(point for point in points if point.step == 1e-2)
+    assert loose.dense["z"] < 1e-12
+    assert loose.errors["z"] > 1e4 * loose.dense["z"]
+    assert loose.sparse is not None
+    assert loose.errors["z"] == loose.sparse.errors["z"]
+    assert loose.sparse.case.every == QUESTION.until / 2
     fixed = swept[0]["projection[formulation=rotating_frame,preset=default]"].points
     assert all(point.sparse is None for point in fixed)
 
