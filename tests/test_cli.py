@@ -75,7 +75,7 @@ BAD = {
     "endless time limit": (with_option("--time-limit", "inf"), 2, ["time_limit = inf", "finite"]),
     "NaN for the time limit": (with_option("--time-limit", "nan"), 2, ["time_limit = nan", "finite"]),
     "output in a file": (with_option("--out", "/dev/null/run.nc"), 2, ["/dev/null", "cannot be written"]),
-    "output is a folder": (with_option("--out", "/tmp"), 2, ["--out = '/tmp'", "folder"]),
+    "output is a folder": (with_option("--out", "/tmp"), 2, ["file = '/tmp'", "folder"]),
     "unknown option": ([*RUN, "--colour", "red"], 2, ["--colour"]),
     "unknown command": (["simulate"], 2, ["simulate"]),
     "no engine": (["run", "sphere_in_cylinder"], 2, ["--engine"]),

@@ -124,7 +124,7 @@ def require_writable(path: Path) -> None:
     from proofroll.running.store import Store
 
     if path.is_dir():
-        raise InputError("--out", str(path), "this is a folder; name a file")
+        raise InputError("file", str(path), "this is a folder; name a file in it")
     Store(path.parent)
 
 

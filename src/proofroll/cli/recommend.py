@@ -71,7 +71,7 @@ def _tolerance(text: str, unit: str) -> Any:
     from proofroll.core.comparison import Tolerance
 
     if not text:
-        raise InputError("tolerance", text, "give the largest error that you can bear, e.g. --tolerance 1e-3")
+        raise InputError("tolerance", "nothing", "give the largest error that you can bear, e.g. --tolerance 1e-3")
     advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
     found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
     if found is None:
@@ -132,6 +132,6 @@ def _stored_study(
         measure_first = typer.confirm(f"{why}. Measure now (some minutes)?", err=True)
     if not measure_first:
         advice = f"{why}; add --measure, which takes some minutes, or run proofroll tradeoff first"
-        raise InputError("stored curves", "none that hold here", advice)
+        raise InputError("stored curves", "none", advice)
     over = ranges if ranges is not None else (claims.over if claims else {})
     return measure(question, engines, over, claims, options.new_runner(out, False, jobs), out)[0]
