@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import multiprocessing
 import os
 import signal
 import threading
@@ -55,16 +54,6 @@ def end_with_pipe(pipe: int) -> None:
             fcntl.fcntl(pipe, fcntl.F_SETOWN, -os.getpid() if leads else os.getpid())
             fcntl.fcntl(pipe, fcntl.F_SETSIG, signal.SIGKILL)
             fcntl.fcntl(pipe, fcntl.F_SETFL, fcntl.fcntl(pipe, fcntl.F_GETFL) | os.O_ASYNC)
-
-
-def end_with_pool() -> None:
-    """As :func:`end_with`, for a process of a :class:`concurrent.futures.ProcessPoolExecutor`.
-
-    Such a process waits on a pipe that all of them hold open, and so for ever when their parent is killed.
-    """
-    owner = multiprocessing.parent_process()
-    if owner is not None and owner.pid is not None:
-        end_with(owner.pid)
 
 
 def _watch(parent: int) -> None:

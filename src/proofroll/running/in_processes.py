@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import active_children, get_context
+from multiprocessing import active_children, get_context, parent_process
 from typing import TypeVar
 
-from proofroll.running.ending import end_with_pool, interrupt_held
+from proofroll.running.ending import end_with, interrupt_held
 
 Item = TypeVar("Item")
 Found = TypeVar("Found")
@@ -33,3 +33,13 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
             for process in active_children():
                 process.kill()
             raise
+
+
+def end_with_pool() -> None:
+    """As :func:`proofroll.running.ending.end_with`, for a process of a :class:`concurrent.futures.ProcessPoolExecutor`.
+
+    Such a process waits on a pipe that all of them hold open, and so for ever when their parent is killed.
+    """
+    owner = parent_process()
+    if owner is not None and owner.pid is not None:
+        end_with(owner.pid)

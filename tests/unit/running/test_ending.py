@@ -22,7 +22,7 @@ import sys, time
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
-from proofroll.running.ending import end_with_pool
+from proofroll.running.in_processes import end_with_pool
 
 if __name__ == "__main__":
     with ProcessPoolExecutor(2, get_context("spawn"), initializer=end_with_pool) as pool:
