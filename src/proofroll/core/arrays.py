@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable
+
 import numpy as np
 import numpy.typing as npt
 
@@ -15,6 +18,12 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross products of two vectors or lists of vectors, (3,) or (n, 3); several times faster than numpy's."""
     found: FloatArray = a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1)
     return found
+
+
+def slices(counts: Iterable[int]) -> tuple[slice, ...]:
+    """Where parts of so many numbers each lie, one after another."""
+    ends = itertools.accumulate(counts, initial=0)
+    return tuple(slice(start, end) for start, end in itertools.pairwise(ends))
 
 
 def on_turns(time: FloatArray, u: FloatArray, rate: FloatArray, start: float, period: float) -> FloatArray:

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from proofroll.core.arrays import slices
 from proofroll.robots.model import Array, Robot, RobotBody
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import RobotStates
@@ -157,9 +158,8 @@ def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
 
 
 def _columns(reading: Reading, joints: list[str]) -> list[int]:
-    starts = dict(zip(reading.joints, np.cumsum([0, *reading.dofs[:-1]]), strict=True))
-    dofs = dict(zip(reading.joints, reading.dofs, strict=True))
-    return [int(starts[name]) + index for name in joints for index in range(dofs[name])]
+    own = dict(zip(reading.joints, slices(reading.dofs), strict=True))
+    return [index for name in joints for index in range(own[name].start, own[name].stop)]
 
 
 def _kinematics(truth: RobotTruth, reading: Reading, joints: list[str]) -> float:

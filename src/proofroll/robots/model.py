@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from proofroll.core.arrays import slices
+
 Array = npt.NDArray[np.float64]
 # The parent of what hangs in the world; no body or joint has this name, but many a root link is called world.
 WORLD = ""
@@ -130,11 +132,8 @@ class Robot:
     @cached_property
     def columns(self) -> dict[str, slice]:
         """Which velocities belong to which joint."""
-        found, start = {}, 0
-        for joint in self.moving:
-            found[joint.name] = slice(start, start + joint.dofs)
-            start += joint.dofs
-        return found
+        places = slices(joint.dofs for joint in self.moving)
+        return {joint.name: place for joint, place in zip(self.moving, places, strict=True)}
 
     @property
     def dofs(self) -> int:

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from proofroll.core.arrays import slices
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.checks import WORLD, Vector
@@ -123,12 +123,12 @@ class Mechanism:
     @cached_property
     def q_slices(self) -> tuple[slice, ...]:
         """Where each joint's coordinates lie in q."""
-        return _slices(joint.nq for joint in self.joints)
+        return slices(joint.nq for joint in self.joints)
 
     @cached_property
     def v_slices(self) -> tuple[slice, ...]:
         """Where each joint's velocities lie in v."""
-        return _slices(joint.nv for joint in self.joints)
+        return slices(joint.nv for joint in self.joints)
 
     def start(self) -> tuple[Array, Array]:
         """Coordinates (nq) and velocities (nv) of the tree at the start."""
@@ -136,11 +136,6 @@ class Mechanism:
             np.array([value for joint in self.joints for value in joint.q0]),
             np.array([value for joint in self.joints for value in joint.v0]),
         )
-
-
-def _slices(counts: Iterable[int]) -> tuple[slice, ...]:
-    ends = np.cumsum([0, *counts]).tolist()
-    return tuple(slice(a, b) for a, b in pairwise(ends))
 
 
 def _check_unique(kind: str, items: Iterable[Any]) -> None:

@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
 
+from proofroll.core.arrays import slices
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.model import Mechanism
@@ -83,8 +83,8 @@ class MaximalEquations:
             if joint.friction:
                 raise Refused(f"joint {joint.name} has dry friction; no route of the truth follows its switching")
         self.mechanism, self.bodies = mechanism, made_bodies(mechanism, allow_planar)
-        self.x_slices = _slices([body.nx for body in self.bodies])
-        self.u_slices = _slices([body.nu for body in self.bodies])
+        self.x_slices = slices(body.nx for body in self.bodies)
+        self.u_slices = slices(body.nu for body in self.bodies)
         self.nx, self.nu = self.x_slices[-1].stop, self.u_slices[-1].stop
         self.mass_matrix = block_diag(*(body.mass_matrix for body in self.bodies))
         self._light = {number for number, body in enumerate(self.bodies) if not body.heavy}
@@ -236,8 +236,3 @@ def _along(joint: Any, q: Scalar, speed: Scalar) -> Scalar:
     """A joint's own force along its coordinate."""
     spring = mul(-joint.stiffness, sub(q, float(joint.rest))) if joint.stiffness else 0.0
     return add(float(joint.torque), spring, mul(-joint.damping, speed) if joint.damping else 0.0)
-
-
-def _slices(counts: Sequence[int]) -> list[slice]:
-    ends = np.cumsum([0, *counts]).tolist()
-    return [slice(a, b) for a, b in pairwise(ends)]
