@@ -95,7 +95,7 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
-    assert found[2].startswith("For z to 1e-4 m use good only tuned at dt 1e-3 s")
+    assert found[2].startswith("For z to 1e-4 m in sphere_in_cylinder use good only tuned at dt 1e-3 s")
     assert "use alpha fine default" in three_sentences(report.content.comparisons, {})[2]
     nothing = three_sentences([], {})
     assert len(nothing) == 3

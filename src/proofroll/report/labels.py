@@ -101,8 +101,9 @@ def symbol(name: str) -> str:
 
 
 def off_by(judgement: Judgement) -> str:
-    """An error in its unit: ``its γ is off by 0.1 rad``."""
-    return f"its {symbol(judgement.observable)} is off by {number(judgement.error)} {unit(judgement.unit)}".rstrip()
+    """An error in its unit: ``off by 0.1 rad in γ``."""
+    size = f"{number(judgement.error)} {unit(judgement.unit)}".rstrip()
+    return f"off by {size} in {symbol(judgement.observable)}"
 
 
 def step(resolution: str | None, value: float | None) -> str:

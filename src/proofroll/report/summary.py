@@ -92,6 +92,7 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
         if answer is not None:
             choice, least = answer.choice.point, answer.least_model
             wanted = f"{symbol(answer.quantity)} to {number(answer.tolerance)} {unit(answer.unit)}".strip()
+            wanted += f" in {entry.study.scene}"
             size = step(choice.resolution, choice.step)
             said = f"For {wanted} use {with_caveat(name_of(choice), choice.caveat)}{f' at {size}' if size else ''}"
             said += f", at {number(choice.seconds_per_second)} s of computing per simulated second"
@@ -105,7 +106,7 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
         best = cheapest(scores(comparison), "worst", EVERYDAY)
         if best:
             return (
-                f"For motion and forces to {100 * EVERYDAY:g} % use {best.name}, at "
+                f"For motion and forces to {100 * EVERYDAY:g} % in {comparison.scene} use {best.name}, at "
                 f"{number(best.seconds_per_second)} s of computing per simulated second."
             )
     return f"Nothing that was timed holds motion and forces to {100 * EVERYDAY:g} %, so nothing can be recommended."
