@@ -7,13 +7,14 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import nullcontext
+from contextlib import ExitStack
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from forked_workers import Forks
 from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, settings
 from no_skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 -- hooks, which pytest finds here
@@ -111,18 +112,23 @@ def scene(request: pytest.FixtureRequest) -> Scene:
 
 
 _WARM_WORKERS = WarmWorkers()
+_FORKS = Forks()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     """Tests and the fixtures that they are the first to need share worker processes, unless they are about these."""
-    with nullcontext() if item.get_closest_marker("own_workers") else _WARM_WORKERS.lent():
+    with ExitStack() as stack:
+        if not item.get_closest_marker("own_workers"):
+            stack.enter_context(_WARM_WORKERS.lent())
+            stack.enter_context(_FORKS.lent())
         return (yield)
 
 
 def pytest_unconfigure() -> None:
     """Ends them."""
     _WARM_WORKERS.close()
+    _FORKS.close()
 
 
 @pytest.fixture(autouse=True)

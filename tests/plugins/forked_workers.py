@@ -1,0 +1,182 @@
+"""Worker processes of tests are forked from one that has imported what all of them import, half of their start.
+
+Linux alone; elsewhere, in other interpreters and in tests marked ``own_workers`` a worker starts as a person's does.
+What a worker does is the same from its first line on: its pipes, folder, environment, session and parent are those of
+a process that was started, and it has loaded no engine, scene or announcement.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import importlib
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+from proofroll.files.trajectory_file import import_xarray
+from proofroll.running import process, worker
+
+_MODULE = "proofroll.running.worker"
+# What runs, truths and certificates need of proofroll and of libraries; no engine, scene or kind of element.
+_IMPORTED = (
+    "proofroll.core.first_steps",
+    "proofroll.core.several",
+    "proofroll.core.truth",
+    "proofroll.files.scene_file",
+    "proofroll.running.loading",
+    "proofroll.running.recording",
+    "pydantic.dataclasses",
+    "pydantic.types",
+    "scipy.integrate",
+    "scipy.interpolate",
+    "scipy.spatial.transform",
+)
+# Python reads these when it starts: where one differs, a fork would not be what was asked for.
+_READ_AT_START = ("PYTHONHASHSEED", "PYTHONWARNINGS", "PYTHONSAFEPATH", "PYTHONHOME", "PYTHONDONTWRITEBYTECODE")
+_SET_CHILD_SUBREAPER = 36  # <linux/prctl.h>
+
+
+class Forked:
+    """What of :class:`subprocess.Popen` a worker's parent uses, of a process that was forked."""
+
+    def __init__(self, pid: int, stdin: Any) -> None:
+        self.pid, self.stdin = pid, stdin
+        self.returncode: int | None = None
+        self._lock = threading.Lock()
+
+    def _reap(self, options: int) -> int | None:
+        with self._lock:
+            if self.returncode is None:
+                pid, status = os.waitpid(self.pid, options)
+                if pid:
+                    self.returncode = os.waitstatus_to_exitcode(status)
+            return self.returncode
+
+    def poll(self) -> int | None:
+        """Its exit code, if it has ended."""
+        return self._reap(os.WNOHANG)
+
+    def wait(self) -> int | None:
+        """Its exit code, when it has ended."""
+        return self._reap(0)
+
+
+class Forks:
+    """The process from which workers are forked, begun when the first is wanted."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._template: subprocess.Popen[bytes] | None = None
+        self._began_with: dict[str, str | None] = {}
+
+    @contextlib.contextmanager
+    def lent(self) -> Iterator[None]:
+        """Meanwhile workers of this interpreter are forked."""
+        if sys.platform != "linux":
+            yield
+            return
+        before = process.subprocess
+        process.subprocess = SimpleNamespace(Popen=self._popen, PIPE=subprocess.PIPE)
+        try:
+            yield
+        finally:
+            process.subprocess = before
+
+    def _popen(self, words: Sequence[Any], *, env: Mapping[str, str], pass_fds: Sequence[int], **more: Any) -> Any:
+        at_start = {name: env.get(name) for name in _READ_AT_START}
+        with self._lock:
+            if self._template is None:
+                self._begin(env)
+                self._began_with = at_start
+            if list(map(str, words[:3])) != [sys.executable, "-m", _MODULE] or at_start != self._began_with:
+                return subprocess.Popen(words, env=env, pass_fds=pass_fds, **more)
+            theirs, ours = os.pipe()
+            request = {"cwd": os.getcwd(), "env": dict(env), "parent": os.getpid()}
+            _adopt(1)
+            try:
+                descriptors = [theirs, more["stdout"], *pass_fds]
+                socket.send_fds(self._line, [json.dumps(request).encode()], descriptors)
+                pid = int(self._line.recv(64))
+            finally:
+                _adopt(0)
+                os.close(theirs)
+        return Forked(pid, os.fdopen(ours, "w", encoding="utf-8"))
+
+    def _begin(self, env: Mapping[str, str]) -> None:
+        self._line, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)  # which keeps requests apart
+        own = {name: value for name, value in env.items() if name != "PYTHONPATH"}
+        with theirs:
+            self._template = subprocess.Popen(
+                [sys.executable, str(Path(__file__)), str(theirs.fileno())],
+                env=own,
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+
+    def close(self) -> None:
+        """Ends it."""
+        if self._template is not None:
+            self._line.close()
+            self._template.wait()
+            self._template = None
+
+
+def _adopt(yes: int) -> None:
+    """Whether a process whose parent has ended becomes a child of this one."""
+    ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, yes, 0, 0, 0)
+
+
+def _serve(line: socket.socket) -> None:
+    """Forks a worker for each request; its parent ends at once, so that who asked adopts it."""
+    for module in _IMPORTED:
+        importlib.import_module(module)
+    import_xarray()
+    gc.freeze()  # a collection would copy the pages that all share
+    while True:
+        message, descriptors, *_ = socket.recv_fds(line, 1 << 20, 4)
+        if not message:
+            return
+        if not (between := os.fork()):
+            if os.fork():
+                os._exit(0)
+            request = json.loads(message)
+            _as_if_started(line, request, *descriptors[:2])
+            worker.main(descriptors[2], request["parent"], descriptors[3])
+            return
+        for descriptor in descriptors:
+            os.close(descriptor)
+        os.waitpid(between, 0)
+
+
+def _as_if_started(line: socket.socket, request: dict[str, Any], stdin: int, log: int) -> None:
+    """What the system and Python do before the first line of a worker."""
+    os.setsid()
+    while os.getppid() != request["parent"]:
+        time.sleep(0.001)
+    line.sendall(b"%d" % os.getpid())
+    line.close()
+    os.chdir(request["cwd"])
+    os.environ.clear()
+    os.environ.update(request["env"])
+    for ours, standard in ((stdin, 0), (log, 1), (log, 2)):
+        os.dup2(ours, standard)
+    os.close(stdin)
+    os.close(log)
+    sys.path[0] = request["cwd"]
+    sys.path[1:1] = filter(None, request["env"].get("PYTHONPATH", "").split(os.pathsep))
+
+
+if __name__ == "__main__":
+    _serve(socket.socket(fileno=int(sys.argv[1])))
