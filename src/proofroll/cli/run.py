@@ -45,7 +45,7 @@ def run(
 
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
-    from proofroll.files.trajectory_file import STORED, read, write
+    from proofroll.files.trajectory_file import STORED, import_xarray, read, write
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
@@ -74,6 +74,8 @@ def run(
         with options.spinner(f"{scene} in {case.engine.name}"):
             result = run_one(case, target, workers)
         content = run_content(case, result, target)
+        if (plot or out) is not None and result.trajectory is not None:
+            import_xarray()
         if plot is not None and result.trajectory is not None:
             from proofroll.report.run_plot import draw_run
 

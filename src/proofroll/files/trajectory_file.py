@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 STORED = ".npz"
 # What is in such a file beside an array for each variable: their dimensions and all attributes.
 _ABOUT = "about.json"
+# Whether xarray was imported without dask, so that it may go on without: it asks for a scheduler when it writes.
+_without_dask = False
 # What numpy raises where a file is another, or damaged.
 _NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError, ValueError)
 
@@ -37,10 +39,13 @@ def import_xarray() -> None:
 
     At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
     """
+    global _without_dask  # noqa: PLW0603 -- of the process, as xarray's own memory of dask is
+    first = not {"xarray", "dask"} & set(sys.modules)
     with _dask_aside():
         import xarray as xr
 
         xr.Variable((), 0.0)
+    _without_dask |= first
 
 
 @contextlib.contextmanager
@@ -88,7 +93,8 @@ def _netcdf(trajectory: xr.Dataset | Columns) -> bytes:
     dataset = trajectory.dataset() if isinstance(trajectory, Columns) else trajectory
     # No number stands for an absent one.
     plain = {name: {"_FillValue": None} for name in dataset.variables}
-    return bytes(dataset.to_netcdf(None, engine="scipy", encoding=plain))
+    with _dask_aside() if _without_dask else contextlib.nullcontext():
+        return bytes(dataset.to_netcdf(None, engine="scipy", encoding=plain))
 
 
 def read(path: Path) -> xr.Dataset:

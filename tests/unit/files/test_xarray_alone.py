@@ -14,8 +14,9 @@ from proofroll.files.trajectory_file import import_xarray, read, write
 import_xarray()
 import xarray
 
-write(xarray.Dataset({"z": ("time", [1.0])}), Path("run.npz"))
-assert float(read(Path("run.npz")).z[0]) == 1.0
+for name in ("run.npz", "run.nc"):
+    write(xarray.Dataset({"z": ("time", [1.0])}), Path(name))
+    assert float(read(Path(name)).z[0]) == 1.0
 found = {"dask", "distributed"} & set(sys.modules)
 assert not found, found  # neither imported, nor hidden from whoever wants it
 """
