@@ -113,7 +113,9 @@ class JointTree:
 
     def pulls(self, data: Any) -> Any:
         """Forces of springs on Pinocchio's joints, in their axes; positions and velocities are in ``data``."""
-        forces = self.no_forces()
+        forces = pin.StdVec_Force()
+        for _ in range(self.model.njoints):
+            forces.append(pin.Force.Zero())
         for spring, a, b in self.springs:
             between = data.oMf[b].translation - data.oMf[a].translation
             length = float(np.sqrt(between @ between))
@@ -129,13 +131,6 @@ class JointTree:
     def velocity(self, data: Any, frame: int) -> Any:
         """Of a frame's origin, and angular, in the world's axes."""
         return pin.getFrameVelocity(self.model, data, frame, pin.LOCAL_WORLD_ALIGNED)
-
-    def no_forces(self) -> Any:
-        """External forces that are all zero."""
-        forces = pin.StdVec_Force()
-        for _ in range(self.model.njoints):
-            forces.append(pin.Force.Zero())
-        return forces
 
     def put(self, forces: Any, data: Any, frame: int, place: Array, force: Array, torque: Array | None = None) -> None:
         """Adds a force and a moment at a place, in the world's axes, to those on the joint that carries a frame."""

@@ -21,11 +21,9 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
 from proofroll.engines.projection import mechanism
-from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.method import ProjectedBall
-from proofroll.engines.projection.modes import Pace
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
 from proofroll.engines.projection.stepping import STEPPERS
@@ -112,19 +110,12 @@ class Projection:
         x, resolution = np.concatenate([body.u0, angles, body.udot0, r]), getattr(settings, settings.resolution)
         scales = _scales(body, self._orientation.size)
         self._motion: Integrator | Switching | TaylorSeries
-        self._friction: Friction | None = None
         if settings.integrator == "taylor":
             assert settings.formulation != "dependent"  # see the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
             stepper = STEPPERS[settings.integrator](resolution)
-            speed = natural_speed(body)
-            pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
-            self._friction = Friction(self._ball, body.contact)
-            slip = frame[:, 1:].T @ body.slip0 if np.any(body.slip0) else None
-            self._motion = Switching(
-                self._friction, stepper, x, scales, pace, self._check, self._renewed, self._eliminate, slip
-            )
+            self._motion = Switching(self._ball, body, stepper, x, scales, self._check, self._renewed, self._eliminate)
         else:
             self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
 
@@ -206,8 +197,8 @@ class Projection:
 
     def built(self) -> Built:
         """See :class:`proofroll.core.engine.Engine`."""
-        ball = self._ball
-        x = self._motion.x
+        ball, x = self._ball, self._motion.x
+        friction = self._motion.friction if isinstance(self._motion, Switching) else None
         kin = ball.kinematics(x)
         rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
         acceleration = kin.D @ rates[self._coordinates : self._coordinates + 5] + kin.drift
@@ -217,8 +208,8 @@ class Projection:
             gravity=kin.local.frame @ (ball.weight(kin)[:3] / ball.mass[:3]),
             ball_radius=float(ball.rows[0, 5]),
             rolling_resistance=ball.rolling_resistance,
-            mu_static=self._friction.mu_static if self._friction else None,
-            mu_kinetic=self._friction.mu_kinetic if self._friction else None,
+            mu_static=friction.mu_static if friction else None,
+            mu_kinetic=friction.mu_kinetic if friction else None,
             acceleration=kin.local.frame @ acceleration[:3],
             angular_acceleration=kin.local.frame @ acceleration[3:],
             terms=terms_held(resists=ball.rolling_resistance, slips=self._bounded, turns=len(x) > _WITHOUT_ORIENTATION),

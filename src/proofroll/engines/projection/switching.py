@@ -11,7 +11,10 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
+from proofroll.elements.ball_on_surface.mechanics import natural_speed
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.friction import Friction
+from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import ContactMode, Exit, Pace, Survey
 from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
 from proofroll.engines.projection.stepping import Stepper
@@ -27,6 +30,7 @@ class Switching:
     """A ball under bounded friction.
 
     Attributes:
+        friction: the law between ball and wall.
         mode: which holds now.
         stepper: where the motion is.
         events: so far.
@@ -34,33 +38,33 @@ class Switching:
 
     def __init__(
         self,
-        friction: Friction,
+        ball: ProjectedBall,
+        body: RollingBall,
         stepper: Stepper,
         x: FloatArray,
         scales: FloatArray,
-        pace: Pace,
         check: Callable[[float, FloatArray], None],
         renewed: Callable[[float, FloatArray], FloatArray | None],
         eliminate: bool,
-        slip: FloatArray | None = None,
     ) -> None:
         """Starts at time 0 in the mode that the state x asks for.
 
         Args:
-            friction: the ball and its law.
+            ball: its equations.
+            body: what they are of.
             stepper: new.
             x: coordinates and velocities.
             scales: natural size of each component of x.
-            pace: of the motion.
             check: called with the time [s] and x after each step; raises Diverged if x is not to be trusted.
             renewed: called with them where the motion goes on from there; the same state in other coordinates, or None.
             eliminate: remove the violation of what C v shall be after each step.
-            slip: velocity of the contact point along e2 and e3 [m/s], shape (2,); None: it stands still.
         """
         self.stepper = stepper
         self.events: list[Event] = []
-        self._friction, self._eliminate, self._pace = friction, eliminate, pace
-        self._check, self._renewed = check, renewed
+        speed = natural_speed(body)
+        self._pace = pace = Pace(speed, body.ball.radius / speed, stepper.stability, stepper.reach)
+        self.friction = friction = Friction(ball, body.contact)
+        self._check, self._renewed, self._eliminate = check, renewed, eliminate
         self._scales = np.append(scales, [pace.speed, 1.0])
         self._stick, self._rest = Stick(friction, pace), Rest(friction)
         self._slaved, self._free = SlavedSlip(friction, pace), FreeSlip(friction, pace)
@@ -68,10 +72,11 @@ class Switching:
         self._lost: str | None = None
         self.mode: ContactMode = self._stick
         self._survey = Survey(())
-        if slip is None:
+        if not np.any(body.slip0):
             self._settle(0.0, 0.0, x, was_sticking=True)
         else:
             self._event("slip", 0.0, 0.0)
+            slip = body.surface.frame(body.u0)[:, 1:].T @ body.slip0
             size, angle = math.hypot(*slip.tolist()), math.atan2(slip[1], slip[0])
             self._enter(self._free, 0.0, np.concatenate([x, [size, angle]]))
 
@@ -121,7 +126,7 @@ class Switching:
     def _look(self) -> Survey:
         """After a step."""
         stepper = self.stepper
-        if self.mode is self._stick and self._stick.halts and not self._friction.bounded:
+        if self.mode is self._stick and self._stick.halts and not self.friction.bounded:
             return self._stick.glance(stepper.y, self._survey, stepper.t - stepper.t_before)
         return self.mode.survey(stepper.y)
 
@@ -209,17 +214,17 @@ class Switching:
 
     def _settle(self, low: float, high: float, x: FloatArray, was_sticking: bool) -> None:
         """Goes on from where the contact point stands still, at the state x: sticking if the static cone allows it."""
-        ball = self._friction.rolling
+        ball = self.friction.rolling
         if high > 0:
             x = ball.eliminated(x)
-        speed = self._friction.rolling.speed(x) if self._stick.halts else np.inf
+        speed = self.friction.rolling.speed(x) if self._stick.halts else np.inf
         mode: ContactMode
         if speed <= self._pace.settled and self._rest.holds(x):
             mode, x = self._rest, self._rest.eliminated(x)
         else:
             if speed <= 2 * self._pace.still:
                 x = self._rest.released(x, 10 * self._pace.still)
-            holds = self._friction.reserve(ball.response(ball.kinematics(x))) >= 0
+            holds = self.friction.reserve(ball.response(ball.kinematics(x))) >= 0
             mode = self._stick if holds else self._slaved
         if mode.sticking != was_sticking:
             self._event("stick" if mode.sticking else "slip", low, high)
