@@ -57,8 +57,8 @@ def test_the_papers_case(model: Any) -> None:
 
 
 def test_random_balls_against_the_truth() -> None:
-    """A hundred balls slip when the truth says, within 1e-10 s, and never where it says never."""
-    balls = random_balls(100)
+    """Forty balls slip when the truth says, within 1e-10 s, and never where it says never."""
+    balls = random_balls(40)
     found = first_slips(PAPER, UNTIL, **balls)
     expected = np.array(
         [
@@ -67,14 +67,14 @@ def test_random_balls_against_the_truth() -> None:
         ]
     )
     assert np.array_equal(np.isnan(found), np.isnan(expected))
-    assert 5 < np.sum(np.isnan(found)) < 95
+    assert 2 < np.sum(np.isnan(found)) < 38
     assert np.sum(found == 0) > 1  # at once
     assert np.nanmax(np.abs(found - expected)) < 1e-10
 
 
 def test_random_balls_against_the_other_route(monkeypatch: pytest.MonkeyPatch) -> None:
     """A route that shares no equations with the compiled ones, nor heyoka, finds the same times."""
-    balls = random_balls(8)
+    balls = random_balls(4)
     found = first_slips(PAPER, 1.0, **balls)
     monkeypatch.setattr(taylor, "supports", lambda _: False)
     for index, time in enumerate(found):

@@ -24,9 +24,10 @@ TUNED = ["formulation=chart,preset=tuned", "formulation=free,preset=tuned"]
 @pytest.mark.parametrize("engine", TUNED)
 def test_contact_does_not_chatter_with_the_correction(engine: str) -> None:
     """The normal force in slip is the one that the path needs, m c γ̇², to half a per cent of the initial one."""
-    ds = run("paper", f"mujoco[{engine}]", 4.0, 0.01)
+    ds = run("paper", f"mujoco[{engine}]", 2.1, 0.01)
     needed = 0.517 * 0.2 * ds.gamma_rate**2
     slips = ds.sticking == 0
+    assert 20 < slips.sum() < 40
     assert float(abs(ds.N - needed).where(slips).max()) < 0.2
 
 
@@ -98,9 +99,9 @@ def test_flight_is_one_lift_off(engine: str) -> None:
 def test_hops_are_not_lift_offs() -> None:
     """A contact that chatters slips all the while it does, 25 steps at a time without a force: nothing else is told."""
     for engine in ("formulation=chart", "formulation=free"):
-        ds = run("paper", f"mujoco[{engine}]", 4.0, 0.01)
-        # After 3.7 s the free ball is thrown 40 mm off the wall, more than its radius: those are flights.
-        before = [event for event in events_of(ds) if event.time < 3.0]
+        # Longer, and the free ball is thrown 40 mm off the wall, more than its radius: those are flights.
+        ds = run("paper", f"mujoco[{engine}]", 3.0, 0.01)
+        before = events_of(ds)
         assert "lift_off" not in {event.kind for event in before}
         assert before[-1].kind == "slip"
         assert before[-1].time < 2.5

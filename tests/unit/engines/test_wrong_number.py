@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Mapping
+from functools import cache
 
 import pytest
 
@@ -40,7 +41,11 @@ DYNAMICS = {"acceleration", "angular acceleration", "N", "F2", "F3"}
 
 
 def models() -> list[object]:
-    """Engine, formulation and preset of each that builds balls; Pinocchio's contact with each of its solvers."""
+    """Engine, formulation and its first preset of each that builds balls; Pinocchio's contact with each of its solvers.
+
+    Presets differ in how a ball moves on, not in how it is built and read back; that their certificates hold is a check
+    of conformance.
+    """
     found: list[object] = []
     for name in ("exudyn", "pinocchio"):
         try:
@@ -50,7 +55,7 @@ def models() -> list[object]:
             continue
         for formulation, presets in engine.presets.items():
             if BallCapability.ROLLING in engine.provides[formulation]:
-                found += [f"{name}[formulation={formulation},preset={preset}]" for preset in presets]
+                found.append(f"{name}[formulation={formulation},preset={next(iter(presets))}]")
     admm = [
         f"{each},solver=admm]"
         for each in (str(item).removesuffix("]") for item in found)
@@ -72,6 +77,12 @@ def multiplied(scene: Scene, parameters: Mapping[str, float]) -> Scene:
     return changed(scene, ball=ball, contact=contact, gravity=gravity)
 
 
+@cache
+def failing_when_sound(engine: str, name: str) -> list[str]:
+    """Lines of the certificate that fail where nothing is wrong."""
+    return [line.quantity for line in certify(build(SCENES[name], engine), SCENES[name]) if not line.holds]
+
+
 @pytest.mark.parametrize(
     ("name", "change"),
     [(name, change) for name in SCENES for change in CHANGES if change != "mu halved" or "," in name],
@@ -88,7 +99,7 @@ def test_the_certificate_notices(engine: str, name: str, change: str) -> None:
         with pytest.raises(Refused, match="one coefficient"):
             build(scene, engine)
         return
-    assert [line.quantity for line in certify(build(scene, engine), scene) if not line.holds] == []
+    assert failing_when_sound(engine, name) == []
     failing = {line.quantity for line in certify(build(multiplied(scene, parameters), engine), scene) if not line.holds}
     assert quantity in failing
     if change == "mu halved":
