@@ -42,11 +42,11 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     """The true trajectory of one ball on one surface at rising times [s], and the events, with error bars.
 
     Returns:
-        Dataset as of :func:`trajectory.trajectory`, each variable with the attribute ``error_bar`` in its
-        own unit, and ``sticking`` (bool per sample; a sample at an event belongs to what follows); and the events up
-        to the last sample, each with a bracket that holds both routes. Where the routes disagree about what happens,
-        which they do where it hangs on the last digits of the parameters, the attribute ``ill_posed`` says from when
-        on; the events are those before, and the error bars as large as the difference.
+        Dataset as of :func:`proofroll.truth.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in
+        its own unit, and ``sticking`` (bool per sample; a sample at an event belongs to what follows); and the events
+        up to the last sample, each with a bracket that holds both routes. Where the routes disagree about what
+        happens, which they do where it hangs on the last digits of the parameters, the attribute ``ill_posed`` says
+        from when on; the events are those before, and the error bars as large as the difference.
 
     Raises:
         Diverged: a route could not be integrated.
