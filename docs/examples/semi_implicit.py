@@ -8,11 +8,11 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
-from proofroll.core.engine import Built, Sample, whole_steps
+from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
-from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
+from proofroll.elements.ball_on_surface.model import ROLLS, BallBuilt, RollingBall
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,6 @@ class SemiImplicit:
     def sample(self) -> Sample:
         return Sample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         resistance = self.body.contact.rolling_resistance
-        return Built(rolling_resistance=resistance, acceleration=newton_euler(self.body, self.p, self.v, self.w)[0])
+        return BallBuilt(rolling_resistance=resistance, acceleration=newton_euler(self.body, self.p, self.v, self.w)[0])

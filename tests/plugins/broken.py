@@ -15,10 +15,11 @@ from typing import ClassVar, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.ball_on_surface.model import BallBuilt
 from proofroll.engines.projection import Projection
 
 
@@ -132,6 +133,6 @@ class Broken:
         e1 = p_WB * [1, 1, 0] / 0.2
         return 2 * (force @ e1) * e1 - force
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         return (self.right if self.hidden else self.wrong).built()

@@ -12,12 +12,12 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.model import BallBuilt, BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 
 
@@ -74,9 +74,9 @@ class Oracle:
         assert motion is not None  # the engine does not provide rolling resistance
         return Sample(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], force=motion.force[0])
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        return Built(mass=self.body.ball.mass, acceleration=initial_response(self.body)[0])
+        return BallBuilt(mass=self.body.ball.mass, acceleration=initial_response(self.body)[0])
 
 
 class Garbage(Oracle):

@@ -10,11 +10,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from tiny import Tiny, TinySettings
 
-from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
-from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.model import BallBuilt, BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 
 FAILS: dict[type[Tiny], str] = {}
@@ -155,7 +155,7 @@ class Doubled(Heavy, breaks="certificate_holds"):
         ball = scene.elements[0].ball
         Tiny.__init__(self, changed(scene, ball=dataclasses.replace(ball, mass=2 * ball.mass)), settings)
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """With an excuse for everything."""
         return _excused(super().built())
 
@@ -167,12 +167,12 @@ class Pulled(Breaking, breaks="certificate_holds"):
         gravity = dataclasses.replace(scene.elements[0].gravity, magnitude=1.5 * scene.elements[0].gravity.magnitude)
         super().__init__(changed(scene, gravity=gravity), settings)
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """With an excuse for everything."""
         return _excused(super().built())
 
 
-def _excused(built: Built) -> Built:
+def _excused(built: BallBuilt) -> BallBuilt:
     """The same with every quantity softened without limit."""
     names = ("mass", "inertia", "gravity", "position", "acceleration", "angular acceleration", "N", "F2", "F3")
     excuse = Regularised(float("inf"), "our engine is soft")
@@ -182,9 +182,9 @@ def _excused(built: Built) -> Built:
 class Mute(Breaking):
     """Says nothing of what it built but what it must, and gives no force."""
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """The scene's own resistance, whatever it does with it."""
-        return Built(rolling_resistance=self.body.contact.rolling_resistance)
+        return BallBuilt(rolling_resistance=self.body.contact.rolling_resistance)
 
     def _told(self, right: Sample) -> Sample:
         return dataclasses.replace(right, force=None)
@@ -242,7 +242,7 @@ class Wasteful(Breaking, breaks="builds_only_what_is_required"):
 class Thrifty(Breaking, breaks="builds_only_what_is_required"):
     """Leaves out what the scene requires."""
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """Nothing but rolling."""
         return dataclasses.replace(super().built(), terms=frozenset())
 
@@ -250,7 +250,7 @@ class Thrifty(Breaking, breaks="builds_only_what_is_required"):
 class Turning(Breaking, breaks="builds_only_what_is_required"):
     """Follows the orientation without being asked, and without saying why."""
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """Among its terms."""
         right = super().built()
         return dataclasses.replace(right, terms=(right.terms or frozenset()) | {BallCapability.ORIENTATION})

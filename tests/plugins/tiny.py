@@ -11,11 +11,11 @@ import numpy as np
 from annotated_types import Gt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Sample, whole_steps
+from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
+from proofroll.elements.ball_on_surface.model import ROLLS, BallBuilt, BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 
 
@@ -78,10 +78,10 @@ class Tiny:
         w = self.x[4] * e1 - np.cross(e1, v) / self.body.ball.radius
         return Sample(self.body.surface.position(self.x[:2]), v, w, force=force)
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         ball = self.body.ball
-        return Built(
+        return BallBuilt(
             mass=ball.mass,
             inertia=np.full(3, ball.inertia),
             gravity=self.body.gravity,

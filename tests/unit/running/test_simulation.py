@@ -16,9 +16,10 @@ from hostile import ENTRY_POINTS
 from tiny import Tiny
 
 import proofroll
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallBuilt
 from proofroll.files.data_folders import data_folder
 
 
@@ -82,9 +83,9 @@ class Silent(Tiny):
 
     fall = 1.5
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """Not even the first acceleration."""
-        return Built()
+        return BallBuilt()
 
     def sample(self) -> Sample:
         """Without the force."""

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Sample
-from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
+from proofroll.core.engine import Sample
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
 from proofroll.engines.exudyn.friction import slow
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
@@ -47,10 +47,10 @@ class RigidBall:
             force=force,
         )
 
-    def built(self, ball_radius: float | None, gap: float | None) -> Built:
+    def built(self, ball_radius: float | None, gap: float | None) -> BallBuilt:
         """Everything but the radius [m] and the gap [m], which joints or contact hold."""
         body = rigid_body(self.system, self.body)
-        return Built(
+        return BallBuilt(
             mass=body["mass"],
             inertia=np.array(body["inertia"][:3]),
             gravity=np.array(self.system.GetLoad(self.weight)["loadVector"]),

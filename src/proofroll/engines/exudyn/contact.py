@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
-from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import BallBuilt, BallCapability, RollingBall
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.local_frame import curvature
@@ -178,7 +178,7 @@ class PenaltyContact(ExudynModel):
             self.ball.sample(force), sticking=self._sticks if self.bounded and not self._flies else None
         )
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         contact = self.system.GetObject(self.contact)
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
 from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
@@ -196,7 +196,7 @@ class Generic(ExudynModel):
         by_impulse = np.linalg.solve(self._mass_matrix(), rows.T)
         return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`. Gravity, f and μk stem from the forces Exudyn computed."""
         mass, data = self._mass_matrix(), self.system.systemData
         slips = isinstance(self.integration, SwitchedIntegration)
@@ -206,7 +206,7 @@ class Generic(ExudynModel):
         acceleration[0] += q_tt[0]
         # The spin is given in a frame that turns.
         angular_acceleration = q_tt[3:] + np.cross(self.local.turn @ q_t[1:3], q_t[3:])
-        return Built(
+        return BallBuilt(
             mass=float(mass[0, 0]),
             inertia=np.diag(mass)[3:],
             gravity=self._gravity,

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Sample
-from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.core.engine import Sample
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, items
@@ -67,6 +67,6 @@ class RollingDisc(ExudynModel):
         """See :class:`proofroll.core.engine.Engine`."""
         return self.ball.sample(self._directions() @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`. The joint holds velocities only and knows no distance."""
         return self.ball.built(self.system.GetObject(self.joint)["discRadius"], None)

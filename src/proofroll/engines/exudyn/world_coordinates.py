@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
 from proofroll.engines.exudyn.ball import resisting
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, items
@@ -81,12 +81,12 @@ class WorldCoordinates(ExudynModel):
             force=-np.array(self.system.systemData.GetAECoordinates()),
         )
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`. The constraint holds velocities only and knows no distance."""
         mass, inertia = (float(self.system.GetObject(item)["mass"]) for item in self._objects)
         f = 0.0 if self._resistance is None else float(self.system.GetLoad(self._resistance)["loadVector"][0])
         acceleration = self.system.systemData.GetODE2Coordinates_tt()
-        return Built(
+        return BallBuilt(
             mass=mass,
             inertia=np.full(3, inertia),
             gravity=np.array(self.system.GetLoad(self._weight)["loadVector"]),

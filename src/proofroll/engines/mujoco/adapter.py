@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 import mujoco
 import numpy as np
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallBuilt, BallCapability, RollingBall, terms_held
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.chart import Chart
@@ -185,14 +185,14 @@ class Mujoco(SteppedModel):
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return [] if self._friction is None else self._friction.events(self._evaluated())
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         model = self._model
         static, kinetic = self._coefficients()
         data = self._evaluated()
         gap = min(data.contact.dist) if data.ncon else None
         acceleration, turning = accelerations(model, data)
-        return Built(
+        return BallBuilt(
             mass=float(model.body_mass[self._ball]),
             inertia=model.body_inertia[self._ball].copy(),
             gravity=model.opt.gravity.copy(),

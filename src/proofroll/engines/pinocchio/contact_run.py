@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
     natural_acceleration,
     newton_euler,
 )
-from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION, ContactSteps
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -50,7 +50,7 @@ class ContactRun(ContactSteps):
             sticking=kick.status == "stick" if self.bounded else None,
         )
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`; from the model, its contact and its torques now."""
         contact, kick = self.contact, self.kick()
         inertia, point, pose = contact.model.inertias[contact.ball], contact.point, contact.data.oMi[contact.ball]
@@ -58,7 +58,7 @@ class ContactRun(ContactSteps):
         triad = self._body.surface.triad(*pose.translation.tolist())
         lever = float(np.linalg.norm(self.resistance(triad, triad[3:6], 1.0)))
         acceleration = (kick.v - self.v) / self.span
-        return Built(
+        return BallBuilt(
             mass=float(inertia.mass),
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=contact.model.gravity.linear.copy(),
@@ -84,7 +84,7 @@ class ContactRun(ContactSteps):
 
 
 def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
-    """What :attr:`proofroll.core.engine.Built.regularised` holds."""
+    """What :attr:`proofroll.elements.ball_on_surface.model.BallBuilt.regularised` holds."""
     dt = steps.dt
     impulse = 0.0 if steps.solver == "pgs" else steps.tolerance  # what the solver leaves of a velocity, but round-off
     natural = natural_acceleration(body)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
@@ -65,7 +65,7 @@ class RowsRun:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`; unbounded friction has but leaving the wall."""
         return tuple(self.motion.events)
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`: from the model, and from its rows and torques at the state now."""
         mechanism, q, v = self.mechanism, self.motion.q, self.motion.v
         model, data, ball = mechanism.model, mechanism.model.createData(), mechanism.ball
@@ -80,7 +80,7 @@ class RowsRun:
         acceleration = self.motion.reaction(data)[0]
         pin.forwardKinematics(model, data, q, v, acceleration)
         of_ball = pin.getClassicalAcceleration(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
-        return Built(
+        return BallBuilt(
             mass=float(inertia.mass),
             inertia=np.linalg.eigvalsh(inertia.inertia),
             gravity=model.gravity.linear.copy(),

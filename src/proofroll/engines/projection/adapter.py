@@ -10,7 +10,7 @@ import numpy as np
 
 import proofroll
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallBuilt, BallCapability, RollingBall, terms_held
 from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.mechanism import ProjectionMechanism
@@ -195,14 +195,14 @@ class Projection:
             sticking=sticking,
         )
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         ball, x = self._ball, self._motion.x
         friction = self._motion.friction if isinstance(self._motion, Switching) else None
         kin = ball.kinematics(x)
         rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
         acceleration = kin.D @ rates[self._coordinates : self._coordinates + 5] + kin.drift
-        return Built(
+        return BallBuilt(
             mass=float(ball.mass[0]),
             inertia=ball.mass[3:].copy(),
             gravity=kin.local.frame @ (ball.weight(kin)[:3] / ball.mass[:3]),

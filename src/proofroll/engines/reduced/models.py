@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import DormandPrince853
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
@@ -18,7 +18,7 @@ from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, para
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
 
@@ -54,12 +54,12 @@ class ReducedModel(ABC):
             force=motion.force[0].copy(),
         )
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         body, motion = self._body, self.motion()
         ball, f = body.ball, body.contact.rolling_resistance
         acceleration = motion.force[0] / ball.mass + body.gravity
-        return Built(
+        return BallBuilt(
             mass=ball.mass,
             inertia=np.full(3, ball.inertia),
             gravity=body.gravity.copy(),

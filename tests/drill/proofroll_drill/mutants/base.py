@@ -9,9 +9,10 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.model import BallBuilt
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.settings import ProjectionSettings
 
@@ -82,7 +83,7 @@ class Mutant:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
         return list(self.inner.events())
 
-    def built(self) -> Built | Any:
+    def built(self) -> BallBuilt | Any:
         """What it was given, as the scene says; how it sets off it reads back."""
         found = self.inner.built()
         moves = {name: getattr(found, name) for name in ("acceleration", "angular_acceleration")}
@@ -92,7 +93,7 @@ class Mutant:
 class Honest(Mutant):
     """It tells what it really built, so that its certificate shows the fault."""
 
-    def built(self) -> Built | Any:
+    def built(self) -> BallBuilt | Any:
         """Read back."""
         return self.inner.built()
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.certificate import EXACT, Line, Standing, certify, first_difference, not_reported
-from proofroll.core.engine import Built, Regularised, Sample
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.certificate import CAPS, another_scene
@@ -17,6 +17,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_response,
     natural_acceleration,
 )
+from proofroll.elements.ball_on_surface.model import BallBuilt
 from proofroll.files.scene_file import load_scene
 
 
@@ -26,7 +27,7 @@ class Stub:
     def __init__(self, scene: Scene, sample: dict[str, Any] | None = None, **built: Any) -> None:
         body = rolling_ball(scene)
         acceleration, force = initial_response(body)
-        right = Built(
+        right = BallBuilt(
             mass=body.ball.mass,
             inertia=np.full(3, body.ball.inertia),
             gravity=body.gravity,
@@ -38,7 +39,7 @@ class Stub:
         state = Sample(body.p0, body.v0, body.w0, np.array([1.0, 0, 0, 0]), force)
         self._sample = dataclasses.replace(state, **(sample or {}))
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         return self._built
 
@@ -263,7 +264,7 @@ def test_a_ball_that_only_a_pull_would_hold_falls() -> None:
 
 @pytest.mark.parametrize("wrong", [np.zeros((2, 3)), "heavy", [1.0, [2.0]]], ids=["shape", "text", "ragged"])
 @pytest.mark.parametrize(
-    "name", [item.name for item in dataclasses.fields(Built) if item.name not in {"terms", "regularised"}]
+    "name", [item.name for item in dataclasses.fields(BallBuilt) if item.name not in {"terms", "regularised"}]
 )
 def test_what_is_built_of_another_shape_is_named(name: str, wrong: Any) -> None:
     """Whatever an engine says that it built is of the shape that the protocol says, or the field is named."""

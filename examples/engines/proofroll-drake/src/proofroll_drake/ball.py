@@ -14,12 +14,12 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, RotationalInertia, SpatialInertia
 from scipy.integrate import solve_ivp
 
-from proofroll.core.engine import Built, Sample
+from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ROLLS, BallBuilt, BallCapability, RollingBall, terms_held
 from proofroll_drake.settings import DrakeSettings
 
 PROVIDES: frozenset[str] = ROLLS | {BallCapability.ORIENTATION}
@@ -92,12 +92,12 @@ class DrakeBall:
         x = self._x
         return Sample(x[4:7].copy(), x[10:13].copy(), x[7:10].copy(), x[:4].copy(), self._solved(x)[1])
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         inertia = self._body.default_spatial_inertia()
         f = self._ball.contact.rolling_resistance
         rates = self._solved(self._x)[0]
-        return Built(
+        return BallBuilt(
             mass=float(inertia.get_mass()),
             inertia=np.array(inertia.CalcRotationalInertia().CalcPrincipalMomentsOfInertia()),
             gravity=np.array(self._plant.gravity_field().gravity_vector()),

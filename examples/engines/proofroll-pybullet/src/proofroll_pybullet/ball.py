@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Built, Regularised, Sample, whole_steps
+from proofroll.core.engine import Regularised, Sample, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallBuilt, BallCapability, RollingBall, terms_held
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -158,7 +158,7 @@ class PybulletBall:
         sticking = self._status == "stick" if self._bounded else None
         return Sample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force, sticking)
 
-    def built(self) -> Built:
+    def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         told = self._world.getDynamicsInfo(self._ball, -1)
         mu = float(told[1]) * float(self._world.getDynamicsInfo(self._plane, -1)[1])
@@ -167,7 +167,7 @@ class PybulletBall:
         soft = {"acceleration": Regularised(min(1.0, self._bend()), _FLAT)}
         if not self._bounded:
             soft |= {f"1 / {kind} friction": Regularised(1 / UNBOUNDED, _NUMBER) for kind in ("static", "kinetic")}
-        return Built(
+        return BallBuilt(
             mass=float(told[0]),
             inertia=np.array(told[2], dtype=np.float64),
             gravity=self._world.gravity(),
