@@ -25,7 +25,7 @@ from xdist.scheduler import LoadScopeScheduling
 from proofroll import cli
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
-from proofroll.running import stopwatch
+from proofroll.running import stopwatch, worker_pool
 from proofroll.running.case import Case, EngineFacts
 from proofroll.studies import tradeoff
 
@@ -129,6 +129,20 @@ def pytest_unconfigure() -> None:
     """Ends them."""
     _WARM_WORKERS.close()
     _FORKS.close()
+
+
+@pytest.fixture
+def started_workers(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """For whom worker processes were started since: engines by name, the truth, or a format that one defines."""
+    names: list[str] = []
+    begin = worker_pool.start
+
+    def start(engine: str, memory: float | None) -> worker_pool.Worker:
+        names.append(engine)
+        return begin(engine, memory)
+
+    monkeypatch.setattr(worker_pool, "start", start)
+    return names
 
 
 @pytest.fixture(autouse=True)

@@ -164,6 +164,7 @@ def _as_if_started(line: socket.socket, request: dict[str, Any], stdin: int, log
     """What the system and Python do before the first line of a worker."""
     os.setsid()
     while os.getppid() != request["parent"]:
+        os.kill(request["parent"], 0)  # raises where who asked has ended, so that this ends as well
         time.sleep(0.001)
     line.sendall(b"%d" % os.getpid())
     line.close()

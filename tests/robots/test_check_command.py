@@ -13,7 +13,6 @@ from proofroll.report.terminal import console
 from proofroll.robots.layers import LAYERS
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.terminal import SHORT, WIDTH, lines, table
-from proofroll.running import worker_pool
 
 Proofroll = Callable[..., tuple[int, str, str]]
 Install = Callable[[Mapping[str, str]], None]
@@ -160,19 +159,9 @@ def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
 
 
 @pytest.mark.own_workers
-def test_who_compiles_a_file_also_reads_it(
-    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_who_compiles_a_file_also_reads_it(proofroll: Proofroll, tmp_path: Path, started_workers: list[str]) -> None:
     """The engine that defines the format is started once: for what the file means, and for what the engine holds."""
-    started: list[str] = []
-    begin = worker_pool.start
-
-    def start(engine: str, memory: float | None) -> worker_pool.Worker:
-        started.append(engine)
-        return begin(engine, memory)
-
-    monkeypatch.setattr(worker_pool, "start", start)
     path = tmp_path / "robot.xml"
     path.write_text(mjcf())
     assert proofroll("check", str(path), "--engine", "mujoco", "--states", "2")[0] == 0
-    assert len(started) == 1
+    assert len(started_workers) == 1
