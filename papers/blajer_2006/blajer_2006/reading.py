@@ -8,7 +8,7 @@ from decimal import Decimal, InvalidOperation
 from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
 from blajer_2006.measures import MEASURES
 from blajer_2006.quantities import known
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.time_grid import time_grid
 from proofroll.core.validation import validated
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -102,5 +102,4 @@ def _check_statement(where: str, item: Statement, found: Figures, quantities: se
 
 
 def _choose(where: str, name: str, among: set[str]) -> None:
-    if name not in among:
-        raise InputError(where, name, f"there is no such name; choose from {', '.join(sorted(among))}")
+    require_known(where, name or "nothing", sorted(among), "there is no such name; choose from")

@@ -50,7 +50,6 @@ SETTINGS: Any = {  # matplotlib types the names of its settings, which a diction
     "legend.handlelength": 2.0,
     "lines.linewidth": 1.1,
     "svg.fonttype": "path",  # the same picture wherever it is opened; each text is also there as a comment
-    "svg.hashsalt": "proofroll",
     "pdf.fonttype": 42,
 }
 

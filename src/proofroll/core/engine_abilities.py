@@ -145,10 +145,10 @@ class Reproduces(Protocol):
     def reproducer(cls, scene: Scene, settings: Any) -> str:
         """Source of a program with numpy and the engine's own interface alone.
 
-        It assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the start, and defines ``frame(p)``,
-        ``gap(p)`` (:func:`reproducer_source.wall_source`) and ``run(times)``, a generator of the ball's centre,
-        velocity and angular velocity in the world at each of the times [s]; where the engine says that it has failed,
-        ``run`` raises RuntimeError with its words.
+        Of a ball it assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the start, and defines
+        ``frame(p)``, ``gap(p)`` (:func:`proofroll.elements.ball_on_surface.reproducer_source.wall_source`) and
+        ``run(times)``, a generator of its centre, velocity and angular velocity in the world at each of the times [s];
+        where the engine says that it has failed, ``run`` raises RuntimeError with its words.
 
         Raises:
             Refused: there is no program for this; the text says why.

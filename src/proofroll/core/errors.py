@@ -51,7 +51,7 @@ def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
 
 
 def require_known(field: str, name: object, known: Iterable[str], advice: str = "choose one of") -> None:
-    """Refuses a name that is not among those that there are, which are told after the advice.
+    """Refuses a name that is not among those that there are, of which the advice is followed by the first twenty.
 
     Raises:
         InputError: there is no such name.

@@ -30,7 +30,7 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
     Raises:
         InputError: the first problem, with its place in ``where``.
     """
-    for name in own.keys() & content.keys():
+    for name in (name for name in content if name in own):
         raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
     try:
         found: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed

@@ -30,7 +30,8 @@ from proofroll.running.worker_pool import Workers
 TIME_LIMIT = 120.0
 # The two formulations must agree to a tenth of any tolerance; else their difference raises it.
 _MARGIN = 10.0
-# The engine that was last found to define a format: whose process is asked first.
+# Format -> the engine that was last found to define it: a guess at whose idle process to ask; until one is known a
+# process goes by the format, and is renamed when it has said whose it is.
 _defines: dict[str, str] = {}
 
 

@@ -15,7 +15,7 @@ from proofroll.core.plugins import place_of
 from proofroll.running.program import path_of
 
 # Of requests and answers; see docs/worker_protocol.md.
-PROTOCOL = 1
+PROTOCOL = 2
 
 
 def hello(place: str) -> dict[str, Any]:

@@ -86,7 +86,7 @@ def write(case: dict[str, Any], what: str) -> dict[str, Any]:
         return {"message": lacking}
     try:
         return {"text": getattr(kind, what)(scene_of(wanted), settings)}
-    except Refused as error:
+    except (Refused, Diverged) as error:
         return {"message": str(error)}
 
 

@@ -16,7 +16,7 @@ MOST = 8
 
 
 class Workers:
-    """At most so many idle workers by engine. They end with this object, and at the latest with this process.
+    """Idle workers by engine, at most ``most`` in all. They end with this object, and at the latest with this process.
 
     Each may have so much ``memory`` [GB], by default :func:`proofroll.running.memory.memory_limit`.
     """

@@ -1,4 +1,4 @@
-"""Axes of a stability map: how one number changes a scene, as data; and the scene at their values, with its truth."""
+"""Axes of a stability map: how one number changes a scene, as data; and its truth and runs at their values."""
 
 from __future__ import annotations
 
