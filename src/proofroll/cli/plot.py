@@ -21,8 +21,9 @@ def plot(
     """Draw all variables of a run over time, with their units."""
     from proofroll.report.run_plot import draw_run, read_run, require_ending
 
-    target = trajectory.with_suffix(".html") if out is None else out
-    require_ending(target)
+    target = trajectory.parent / f"{trajectory.stem}.html" if out is None else out
+    if out is not None:
+        require_ending(out)
     options.require_pages()
     options.require_writable(target)
     draw_run(read_run(trajectory), target)
@@ -41,7 +42,7 @@ def replay(
     from proofroll.report.run_replay import replay_page
     from proofroll.running.store import write_text
 
-    target = trajectory.with_name(f"{trajectory.stem}-replay.html") if out is None else out
+    target = trajectory.parent / f"{trajectory.stem}-replay.html" if out is None else out
     if target.suffix.lower() != ".html":
         raise InputError("--out", str(target), "a replay is a page: end the name of the file in .html")
     options.require_writable(target)

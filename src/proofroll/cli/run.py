@@ -43,9 +43,10 @@ def run(
     preparing = threading.Thread(target=prepare, args=(engine, workers), daemon=True)
     preparing.start()
 
+    from proofroll.core.errors import InputError
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
-    from proofroll.files.trajectory_file import STORED, import_xarray, read, write
+    from proofroll.files.trajectory_file import NETCDF, STORED, import_xarray, read, write
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
@@ -56,6 +57,8 @@ def run(
     for file in (out, plot):
         if file is not None:
             options.require_writable(file)
+    if out is not None and out.suffix not in (NETCDF, STORED):  # a scene.toml would be written over
+        raise InputError("--out", str(out), f"end the name of the file in {NETCDF} or {STORED}")
     if plot is not None:
         require_ending(plot)
     preparing.join()

@@ -24,8 +24,8 @@ from proofroll.files.atomic import ordinary_content, replacing
 if TYPE_CHECKING:
     import xarray as xr
 
-# Ending of the files in which trajectories are stored; every other is netCDF.
-STORED = ".npz"
+# Endings of the files in which trajectories are stored, and in which a person is given one.
+STORED, NETCDF = ".npz", ".nc"
 # What is in such a file beside an array for each variable: their dimensions and all attributes.
 _ABOUT = "about.json"
 # Whether xarray was imported without dask, so that it may go on without: it asks for a scheduler when it writes.
@@ -112,8 +112,8 @@ def read(path: Path) -> xr.Dataset:
         found = xr.load_dataset(
             io.BytesIO(ordinary_content(path)), engine="scipy", decode_times=False, mask_and_scale=False
         )
-    except TypeError:
-        raise ValueError(f"{path} is no netCDF-3") from None
+    except (TypeError, LookupError):
+        raise ValueError(f"{path} is cut off, or no netCDF-3") from None
     return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
 
 

@@ -45,6 +45,8 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     kind = kind_of(scene)
     if kind is None or not kind.replay_script:
         raise InputError("run", str(path), f"nothing that is installed draws the scene {scene.title}")
+    if "p_WB" not in run:
+        raise InputError("run", str(path), f"it has no poses of bodies (p_WB); {_WRITES}")
     usual = load_scene(name).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
     with tempfile.TemporaryDirectory() as folder:

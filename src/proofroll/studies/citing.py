@@ -21,7 +21,7 @@ from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import is_scene, read_scene_file, scene_folder
 from proofroll.files.toml import named_file
-from proofroll.files.trajectory_file import STORED, read
+from proofroll.files.trajectory_file import NETCDF, STORED, read
 
 FILE = "references.bib"
 TRUTHS = "proofroll.truths"
@@ -92,7 +92,7 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
 def _named(subject: str) -> list[_Named]:
     """The scenes and engines that a subject is about."""
     path = Path(subject)
-    if path.suffix in {".json", ".nc", STORED} and path.is_file():
+    if path.suffix in {".json", NETCDF, STORED} and path.is_file():
         found = list(_walk(_document(path)))
         if not found:
             raise InputError("result", path.name, "it names neither an engine nor a scene; name a file of proofroll's")

@@ -60,7 +60,12 @@ def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
     """No file, no run in it, or an ending that no picture has: one line, exit code 2, and nothing is written."""
     for name in ("text.nc", "text.npz"):
         (tmp_path / name).write_text("no run")
+    whole = tmp_path / "whole.nc"
+    assert proofroll("run", "pendulum", "--engine", "truth", *RUN, "--out", str(whole))[0] == 0
+    (tmp_path / "cut.nc").write_bytes(whole.read_bytes()[:100])
     for arguments, word in (
+        ([str(tmp_path / "cut.nc")], "no run in netCDF"),
+        (["."], "no run in netCDF"),
         ([str(tmp_path / "none.nc")], "no such file"),
         ([str(tmp_path / "text.nc")], "no run in netCDF"),
         ([str(tmp_path / "text.npz")], "no run in netCDF"),
@@ -70,6 +75,14 @@ def test_bad_files(proofroll: Proofroll, tmp_path: Path) -> None:
         assert (code, out, err.count("\n")) == (2, "", 1)
         assert word in err
     assert [path.name for path in tmp_path.iterdir() if path.suffix in {".html", ".gif"}] == []
+
+
+def test_no_other_file_is_written_over(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A run goes into no file whose ending is another's, as a scene's."""
+    (scene := tmp_path / "scene.toml").write_text("mine")
+    code, out, err = proofroll("run", "pendulum", "--engine", "truth", *RUN, "--out", str(scene))
+    assert (code, out, scene.read_text()) == (2, "", "mine")
+    assert "end the name of the file in .nc or .npz" in err
 
 
 @pytest.mark.parametrize(
@@ -97,12 +110,15 @@ def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
     assert proofroll("run", "pendulum", "--engine", "truth", *RUN, "--out", str(run))[0] == 0
     dataset = read(run)
     write(dataset.assign_attrs(scene_digest="another"), tmp_path / "old.nc")
+    write(dataset.drop_vars("p_WB"), tmp_path / "still.nc")
     del dataset.attrs["scene"]
     write(dataset, tmp_path / "none.nc")
     for arguments, word in (
         ([str(run), "--out", str(tmp_path / "run.svg")], ".html"),
         ([str(tmp_path / "old.nc")], "has changed since this run"),
         ([str(tmp_path / "none.nc")], "does not say which scene"),
+        ([str(tmp_path / "still.nc")], "no poses of bodies"),
+        (["."], "no run in netCDF"),
     ):
         code, out, err = proofroll("replay", *arguments)
         assert (code, out, err.count("\n")) == (2, "", 1)
