@@ -90,10 +90,10 @@ def test_everybody_is_told_the_same_cause(
     with pytest.raises(AssertionError) as told:
         run_check(mutant, f"certificate_holds[{mutant.formulation}-default-plane]")
     install_engines({"mutant": "proofroll_drill.mutants.ball_models:ToldInertia"})
-    claim, out = tmp_path / "claim.toml", ("--json", "--out", str(tmp_path / "out"))
+    claim = tmp_path / "claim.toml"
     claim.write_text(CLAIM, encoding="utf-8")
-    ran = proofroll("run", mutant.scene[0], "--engine", "mutant[preset=default,dt=0.002]", *out)
-    assert proofroll("report", str(claim), *out)[0] == 1
+    ran = proofroll("run", mutant.scene[0], "--engine", "mutant[preset=default,dt=0.002]", "--json")
+    assert proofroll("report", str(claim), "--json", "--out", str(tmp_path / "out"))[0] == 1
     assert ran[1], ran[2]
     (cause,) = json.loads(ran[1])["diagnosis"]
     assert mutant.named[0] in cause["sentence"]
