@@ -16,8 +16,8 @@ from scipy.integrate import solve_ivp
 from tiny import Tiny
 
 import proofroll
-from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
 from proofroll.running.simulation import build
@@ -54,10 +54,10 @@ def test_an_engine_that_agrees_says_what_was_found() -> None:
 class Drifting(Tiny):
     """Half a degree a second, which nobody announces as a plug-in."""
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """The right state, further along the cylinder."""
         right = super().sample()
-        return Sample(right.p_WB + np.array([0, 0, 0.01 * self.t]), right.v_WB, right.w_WB, force=right.force)
+        return BallSample(right.p_WB + np.array([0, 0, 0.01 * self.t]), right.v_WB, right.w_WB, force=right.force)
 
 
 def test_what_differs_is_told_with_numbers() -> None:

@@ -8,11 +8,12 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
-from proofroll.core.engine import Sample, whole_steps
+from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
-from proofroll.elements.ball_on_surface.model import ROLLS, BallBuilt, RollingBall
+from proofroll.elements.ball_on_surface.model import ROLLS, RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
 
 @dataclass(frozen=True)
@@ -52,8 +53,8 @@ class SemiImplicit:
             self.p = self.p + self.dt * self.v
         self.t = t
 
-    def sample(self) -> Sample:
-        return Sample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
+    def sample(self) -> BallSample:
+        return BallSample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
 
     def built(self) -> BallBuilt:
         resistance = self.body.contact.rolling_resistance

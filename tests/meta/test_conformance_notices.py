@@ -16,9 +16,9 @@ from nonconforming import FAILS, Damped, Forgetful, Heavy
 from tiny import Tiny, TinySettings
 
 from proofroll.conformance import Check, checks, run_check
-from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.sampling import BallSample
 
 
 @pytest.fixture(autouse=True)
@@ -51,7 +51,7 @@ def test_a_conforming_engine_passes(check: Check) -> None:
 class Late(Tiny):
     """Defines reactions only after a first step."""
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """No force at time 0."""
         right = super().sample()
         return right if self.t else dataclasses.replace(right, force=None)

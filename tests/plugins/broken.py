@@ -15,11 +15,10 @@ from typing import ClassVar, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
-from proofroll.elements.ball_on_surface.model import BallBuilt
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.projection import Projection
 
 
@@ -115,7 +114,7 @@ class Broken:
         self.t = t
         self.wrong.advance(t * 0.999 if self.defect == "clock" else t)
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         if self.hidden and self.t == 0:
             return self.right.sample()

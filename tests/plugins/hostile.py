@@ -12,13 +12,13 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import BallBuilt, BallCapability
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
 
 @dataclass(frozen=True)
@@ -68,11 +68,11 @@ class Oracle:
         """See :class:`proofroll.core.engine.Engine`."""
         self.t = t
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         motion = closed_form(self.body, np.array([self.t]))
         assert motion is not None  # the engine does not provide rolling resistance
-        return Sample(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], force=motion.force[0])
+        return BallSample(motion.p_WB[0], motion.v_WB[0], motion.w_WB[0], force=motion.force[0])
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -162,11 +162,11 @@ class NotANumber(Oracle):
 
     name = "not_a_number"
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         right = super().sample()
         v = right.v_WB * (np.nan if self.t >= 0.1 else 1.0)
-        return Sample(right.p_WB, v, right.w_WB, force=right.force)
+        return BallSample(right.p_WB, v, right.w_WB, force=right.force)
 
 
 class GivesUp(Oracle):

@@ -10,12 +10,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from tiny import Tiny, TinySettings
 
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
-from proofroll.elements.ball_on_surface.model import BallBuilt, BallCapability
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
 FAILS: dict[type[Tiny], str] = {}
 
@@ -30,11 +31,11 @@ class Breaking(Tiny):
         if "settings" in vars(cls):
             cls.presets = {"midpoint": {"matched": cls.settings()}}
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """What it tells, right or not."""
         return self._told(super().sample())
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         return right
 
 
@@ -186,7 +187,7 @@ class Mute(Breaking):
         """The scene's own resistance, whatever it does with it."""
         return BallBuilt(rolling_resistance=self.body.contact.rolling_resistance)
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, force=None)
 
 
@@ -201,7 +202,7 @@ class Damped(Mute, breaks="first_steps_fit_the_scene"):
 class Clamped(Mute, breaks="first_steps_fit_the_scene"):
     """Its spin is clamped at 30 rad/s as soon as it moves, and it does not say so."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         silent = super()._told(right)
         return dataclasses.replace(silent, w_WB=np.clip(silent.w_WB, -30, 30) if self.t else silent.w_WB)
 
@@ -218,7 +219,7 @@ class Unresisting(Mute, breaks="first_steps_fit_the_scene"):
 class Drifting(Breaking, breaks="moves_as_the_truth"):
     """Its position moves by a thousandth faster than its velocity says."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         ahead = self.body.surface.position(self.x[:2] + 1e-3 * self.t * self.x[2:4])
         return dataclasses.replace(right, p_WB=ahead)
 
@@ -226,7 +227,7 @@ class Drifting(Breaking, breaks="moves_as_the_truth"):
 class Beating(Breaking, breaks="moves_as_the_truth"):
     """Off by a beat that is over at every hundredth of a second, where everybody samples."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         along = self.body.surface.frame(self.x[:2])[:, 2]
         return dataclasses.replace(right, p_WB=right.p_WB + 1e-4 * np.sin(200 * np.pi * self.t) * along)
 
@@ -255,21 +256,21 @@ class Turning(Breaking, breaks="builds_only_what_is_required"):
         right = super().built()
         return dataclasses.replace(right, terms=(right.terms or frozenset()) | {BallCapability.ORIENTATION})
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, q_WB=np.array([1.0, 0, 0, 0]))
 
 
 class Row(Breaking, breaks="samples_are_well_formed"):
     """Gives its position as a row of a matrix."""
 
-    def _told(self, right: Sample) -> Sample:
-        return Sample(right.p_WB[None], right.v_WB, right.w_WB)
+    def _told(self, right: BallSample) -> BallSample:
+        return BallSample(right.p_WB[None], right.v_WB, right.w_WB)
 
 
 class Hushed(Breaking, breaks="samples_are_well_formed"):
     """Gives a force at time 0, and none later."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         return right if self.t == 0 else dataclasses.replace(right, force=None)
 
 
@@ -280,9 +281,9 @@ class Views(Breaking, breaks="reading_back_changes_nothing"):
         super().__init__(scene, settings)
         self.p = np.zeros(3)
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         self.p[:] = right.p_WB
-        return Sample(self.p, right.v_WB, right.w_WB, force=right.force)
+        return BallSample(self.p, right.v_WB, right.w_WB, force=right.force)
 
     def advance(self, t: float) -> None:
         """Moves what it gave before."""
@@ -314,7 +315,7 @@ class Forgetful(Breaking, breaks="advance_in_two_parts"):
 class Restless(Breaking, breaks="sampling_changes_nothing"):
     """Moves when it is looked at."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         if self.t > 0:
             self.x = self.x * (1 + 1e-15)
         return right
@@ -338,14 +339,14 @@ class Shared(Breaking, breaks="engines_do_not_disturb_each_other"):
 class Millimetres(Breaking, breaks="velocities_are_the_rates"):
     """Gives its velocity in mm/s, but only after the start."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, v_WB=right.v_WB * (1000 if self.t else 1))
 
 
 class BodyFrame(Breaking, breaks="velocities_are_the_rates"):
     """Gives an orientation that does not turn as its angular velocity says."""
 
-    def _told(self, right: Sample) -> Sample:
+    def _told(self, right: BallSample) -> BallSample:
         return dataclasses.replace(right, q_WB=np.array([1.0, 0, 0, 0]))
 
 

@@ -36,6 +36,7 @@ class Spring:
     x0: float
 
     bodies = ("mass",)
+    sample_type = Sample
     requires = frozenset({SPRUNG})
     observables = (
         Observable("x", "m", "elongation", Role.MOTION, floor=1e-9, headline=True, decides=True),

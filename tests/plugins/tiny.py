@@ -11,12 +11,13 @@ import numpy as np
 from annotated_types import Gt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample, whole_steps
+from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
-from proofroll.elements.ball_on_surface.model import ROLLS, BallBuilt, BallCapability
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
 
 @dataclass(frozen=True)
@@ -71,12 +72,12 @@ class Tiny:
             self.x = self.x + self.dt * self.rates(self.x + self.dt / 2 * self.rates(self.x))
         self.t = t
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         _, v, force = reduced_rates(self.body, self.x)
         e1 = self.body.surface.frame(self.x[:2])[:, 0]
         w = self.x[4] * e1 - np.cross(e1, v) / self.body.ball.radius
-        return Sample(self.body.surface.position(self.x[:2]), v, w, force=force)
+        return BallSample(self.body.surface.position(self.x[:2]), v, w, force=force)
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

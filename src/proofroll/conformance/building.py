@@ -11,12 +11,13 @@ import numpy as np
 
 from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking, require, scenes
 from proofroll.core.certificate import certify, first_difference
+from proofroll.core.element import Element
 from proofroll.core.element_abilities import HasOptionalCapabilities
 from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.core.several import OPTIONAL, SAMPLED
+from proofroll.core.several import REQUIRED
 
 
 def builds_or_refuses(subject: Subject) -> None:
@@ -103,25 +104,28 @@ def _listed(capabilities: Iterable[str]) -> str:
 def samples_are_well_formed(subject: Subject) -> None:
     """Samples hold finite arrays of doubles of the right shapes; the orientation starts as the identity."""
     start = subject.build()
-    bodies = sum(len(element.bodies) for element in subject.scene.elements)
-    _well_formed(start.sample(), bodies, "at time 0")
-    orientation = start.sample().q_WB
+    (element,) = subject.scene.elements
+    first = start.sample()
+    _well_formed(first, element, "at time 0")
+    orientation = first.q_WB
     # One that can be asked for counts from the start; any other is part of the scene, and the certificate holds it.
-    if orientation is not None and any("orientation" in element.askable for element in subject.scene.elements):
+    if orientation is not None and "orientation" in element.askable:
         identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
         require(identity < 1e-12, f"q_WB at time 0 is {orientation} instead of 1, 0, 0, 0")
     moved = subject.at(subject.span(1)).sample()
-    _well_formed(moved, bodies, "after a step")
-    told = start.sample().force is not None
-    require(moved.force is not None or not told, "there is a force at time 0, and none later; only time 0 may lack one")
+    _well_formed(moved, element, "after a step")
+    for name in element.sample_type.widths:
+        lost = getattr(first, name) is not None and getattr(moved, name) is None
+        require(not lost, f"{name} is there at time 0, and not later; only time 0 may lack one")
 
 
-def _well_formed(sample: Sample, bodies: int, when: str) -> None:
-    require(isinstance(sample, Sample), f"sample() gave {type(sample).__name__} instead of Sample {when}")
+def _well_formed(sample: Sample, element: Element, when: str) -> None:
+    wanted, bodies = element.sample_type, len(element.bodies)
+    require(isinstance(sample, wanted), f"sample() gave {type(sample).__name__} instead of {wanted.__name__} {when}")
     one = bodies == 1 and np.ndim(sample.p_WB) == np.ndim(sample.v_WB) == 1  # of one body the index may be left out
-    for name, size in SAMPLED.items():
+    for name, size in wanted.widths.items():
         value = getattr(sample, name)
-        if value is None and name in OPTIONAL:
+        if value is None and name not in REQUIRED:
             continue
         require(isinstance(value, np.ndarray), f"{name} is {type(value).__name__} instead of an array {when}")
         shape = (size,) if one else (bodies, size)

@@ -141,7 +141,7 @@ class Subject:
 
 def bits(sample: Sample) -> bytes:
     """All numbers of a sample, exactly."""
-    parts = (sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.force)
+    parts = (getattr(sample, item.name) for item in dataclasses.fields(sample))
     return b"".join(np.asarray(part, dtype=np.float64).tobytes() for part in parts if part is not None)
 
 

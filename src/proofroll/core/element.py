@@ -103,6 +103,7 @@ class Element(Protocol):
     Attributes:
         name: unique in the scene; it tells the variables of several elements apart.
         bodies: names of its rigid bodies, in the order in which a sample holds them.
+        sample_type: what an engine gives of it at a time.
     """
 
     @property
@@ -110,6 +111,9 @@ class Element(Protocol):
 
     @property
     def bodies(self) -> tuple[str, ...]: ...  # noqa: D102 -- see the class
+
+    @property
+    def sample_type(self) -> type[Sample]: ...  # noqa: D102 -- see the class
 
     @property
     def requires(self) -> frozenset[str]:
@@ -142,16 +146,16 @@ class Element(Protocol):
     def softened(self) -> frozenset[str]:
         """Quantities of the certificate by whose softness an engine's first steps may differ."""
 
-    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
+    def variables(self, times: FloatArray, samples: Sequence[Any], between: Mapping[float, Any]) -> Columns:
         """All variables of a run, with ``units`` and ``long_name``.
 
         Args:
             times: of the samples [s], shape (time,).
-            samples: one per time.
+            samples: one per time, of its :attr:`sample_type`.
             between: samples at other times [s], for audits that the grid must not hide.
         """
 
-    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
+    def lacks(self, samples: Sequence[Any], asks: Sequence[str]) -> str | None:
         """One sentence about what samples do not say though the scene requires it, or None."""
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
@@ -160,7 +164,7 @@ class Element(Protocol):
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """Size of each observable in the truth, to which a relative tolerance refers."""
 
-    def certify(self, built: Any, sample: Sample) -> list[Line]:
+    def certify(self, built: Any, sample: Any) -> list[Line]:
         """What the engine built and how it starts, held against the element."""
 
     @property

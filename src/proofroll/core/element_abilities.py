@@ -13,8 +13,6 @@ from proofroll.core.failed_run import FailedRun
 if TYPE_CHECKING:
     import xarray as xr
 
-    from proofroll.core.engine import Sample
-
 
 @dataclass(frozen=True)
 class SeenInRun:
@@ -34,10 +32,10 @@ class SeenInRun:
 class RunWatch(Protocol):
     """Follows one run."""
 
-    def over(self, sample: Sample) -> bool:
+    def over(self, sample: Any) -> bool:
         """Whether the model is no longer that of the scene, so that the run ends here."""
 
-    def conclude(self, times: FloatArray, samples: Sequence[Sample], located: Sequence[Event] | None) -> SeenInRun:
+    def conclude(self, times: FloatArray, samples: Sequence[Any], located: Sequence[Event] | None) -> SeenInRun:
         """What was seen.
 
         Args:

@@ -18,30 +18,24 @@ from proofroll.core.scene import Scene
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """State and reactions of one element now, in the world frame W. None: the engine cannot say.
+    """State of one element now, in the world frame W; kinds of elements add reactions. None: the engine cannot say.
 
-    Of an element of several bodies, as a mechanism is, each array of a body has one axis more in front: (bodies, 3).
+    Of an element of several bodies each array of a body has one axis more in front: (bodies, 3).
 
     Attributes:
-        p_WB: origin of the body's frame, of a ball its centre [m], shape (3,).
+        widths: the arrays of a body, which the harness looks at, and how many finite numbers each has for a body.
+        p_WB: origin of the body's frame [m], shape (3,).
         v_WB: velocity of that point [m/s], shape (3,).
         w_WB: angular velocity [rad/s], shape (3,).
-        q_WB: orientation as a unit quaternion, scalar first, shape (4,); of a ball the identity at time 0.
-        force: of a ball: of the wall on it at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None at time 0
-            alone: the engine defines reactions only after a first step.
-        sticking: of a ball: whether the contact holds by static friction; only where friction is bounded.
-        joint_force, joint_torque: of a mechanism: on the child of each joint, then on body_b of each loop, at the joint
-            [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
+        q_WB: orientation as a unit quaternion, scalar first, shape (4,).
     """
+
+    widths: ClassVar[Mapping[str, int]] = {"p_WB": 3, "v_WB": 3, "w_WB": 3, "q_WB": 4}
 
     p_WB: FloatArray
     v_WB: FloatArray
     w_WB: FloatArray
     q_WB: FloatArray | None = None
-    force: FloatArray | None = None
-    sticking: bool | None = None
-    joint_force: FloatArray | None = None
-    joint_torque: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -115,7 +109,7 @@ class Engine(Protocol):
         """
 
     def sample(self) -> Sample:
-        """State and reactions now. Untimed; changes nothing."""
+        """State and reactions now, as its kind of element has them. Untimed; changes nothing."""
 
     def built(self) -> Any:
         """What was built, read back from the engine, as its kind of element has it. At time 0; changes nothing."""

@@ -20,9 +20,8 @@ from proofroll.core.scene import Scene
 AnySample = Sample | Mapping[str, Sample]
 """What an engine samples: of a scene of several elements one sample for each, by its name."""
 
-# Arrays of a sample with the numbers that each has for a body; an engine need not give the last two.
-SAMPLED = {"p_WB": 3, "v_WB": 3, "w_WB": 3, "q_WB": 4, "force": 3}
-OPTIONAL = frozenset({"q_WB", "force"})
+# Arrays of a sample that every engine gives.
+REQUIRED = frozenset({"p_WB", "v_WB", "w_WB"})
 
 
 class EachAlone:
@@ -94,9 +93,10 @@ def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
         Diverged: there is none.
     """
     found = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
-    if not isinstance(found, Sample) or (found is sample and len(scene.elements) > 1):
+    if not isinstance(found, element.sample_type) or (found is sample and len(scene.elements) > 1):
         each = " for each element, by its name" if len(scene.elements) > 1 else ""
-        raise Diverged(f"the engine's sample() gave {type(found).__name__} instead of a Sample{each}")
+        wanted = element.sample_type.__name__
+        raise Diverged(f"the engine's sample() gave {type(found).__name__} instead of a {wanted}{each}")
     return found
 
 
@@ -108,9 +108,9 @@ def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, Flo
     """
     for element in scene.elements:
         own, bodies = sample_of(scene, element, sample), len(element.bodies)
-        for name, width in SAMPLED.items():
+        for name, width in own.widths.items():
             given = getattr(own, name)
-            if given is None and name in OPTIONAL:
+            if given is None and name not in REQUIRED:
                 continue
             try:
                 values = np.asarray(given, dtype=np.float64)

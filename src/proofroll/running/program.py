@@ -17,6 +17,7 @@ from proofroll.core.engine import Sample, fixed_step, whole_steps
 from proofroll.core.errors import Diverged, InputError, ProofrollError, Refused
 from proofroll.core.plugins import place_of, plain_name
 from proofroll.core.scene import Scene
+from proofroll.core.several import REQUIRED
 from proofroll.files.json_data import plain
 
 PREFIX = "program:"
@@ -90,15 +91,17 @@ class Pipe:
         self._process.communicate()
 
 
+def _in_arrays(said: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: np.asarray(value, dtype=float) if isinstance(value, list) else value for key, value in said.items()}
+
+
 class _Built:
     """What the program says that it built; None: nothing."""
 
     regularised: ClassVar[Mapping[str, Any]] = {}
 
     def __init__(self, said: Mapping[str, Any]) -> None:
-        values = {
-            key: np.asarray(value, dtype=float) if isinstance(value, list) else value for key, value in said.items()
-        }
+        values = _in_arrays(said)
         self.terms = frozenset(values.pop("terms")) if "terms" in values else None
         self.__dict__.update(values)
 
@@ -130,6 +133,7 @@ class Program:
     def __init__(self, scene: Scene, settings: Any) -> None:
         self._pipe, self._step = Pipe(self.path), fixed_step(settings)
         (element,) = scene.elements  # of several, each is built alone
+        self._sample_type = element.sample_type
         content = {"kind": type(element).__name__, "name": element.name} | plain(dataclasses.asdict(element))  # type: ignore[call-overload]  # elements are dataclasses
         try:
             request = {"do": "build", "scene": content, "asks": scene.asks, "settings": dataclasses.asdict(settings)}
@@ -149,17 +153,12 @@ class Program:
     def sample(self) -> Sample:
         """The sample that came with the last answer."""
         said = self._last.get("sample")
-        names = {item.name for item in dataclasses.fields(Sample)}
-        if not isinstance(said, dict) or not {"p_WB", "v_WB", "w_WB"} <= said.keys() <= names:
+        names = [item.name for item in dataclasses.fields(self._sample_type)]
+        if not isinstance(said, dict) or not REQUIRED <= said.keys() <= set(names):
             raise ProofrollError(
                 f"{self.path.name} gave no sample with p_WB, v_WB, w_WB, and of {', '.join(names)} only"
             )
-        arrays = {
-            key: np.asarray(value, dtype=float)
-            for key, value in said.items()
-            if value is not None and key != "sticking"
-        }
-        return Sample(**arrays, sticking=said.get("sticking"))
+        return self._sample_type(**_in_arrays(said))
 
     def built(self) -> _Built:
         """What the program said when it was built."""

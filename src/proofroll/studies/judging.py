@@ -12,7 +12,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import from_samples
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, require_known
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -182,9 +181,10 @@ def _completed(run: xr.Dataset, scene: Scene, times: FloatArray) -> xr.Dataset:
     """With all that follows from the state, if that is given; a scene of several elements is judged by variables."""
     if not all(name in run for name in _STATE) or len(scene.elements) > 1 or times[0] > 0:
         return run
-    names = [field.name for field in fields(Sample) if field.name in run and "FloatArray" in str(field.type)]
+    sample_type = scene.elements[0].sample_type
+    names = [field.name for field in fields(sample_type) if field.name in run]
     arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
-    samples = [Sample(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
+    samples = [sample_type(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
     try:
         return from_samples(scene, times, samples)
     except (ValueError, TypeError, Diverged) as error:

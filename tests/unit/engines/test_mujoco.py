@@ -12,12 +12,12 @@ import pytest
 from proofroll.conformance.motion import order_is_as_declared
 from proofroll.conformance.subject import Subject, scenes
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco
 from proofroll.engines.mujoco.settings import ORDER_OF_TURNING, PRESETS
@@ -47,7 +47,7 @@ def error(scene: str, engine: str, variable: str, *, until: float = 1.0, signed:
     return difference if signed else float(np.max(np.abs(difference)))
 
 
-def numbers(sample: Sample) -> np.ndarray:
+def numbers(sample: BallSample) -> np.ndarray:
     """Everything in a sample as one row."""
     return np.concatenate([sample.p_WB, sample.v_WB, sample.w_WB, sample.q_WB, sample.force])
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hostile import GivesUp, HostileSettings, NotANumber, Oracle
 
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.events import lift_off
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import off_grid, record
 
@@ -28,11 +28,11 @@ class Misshapen(Oracle):
 
     wrong: dict[str, Any] = {"w_WB": np.zeros(2)}  # noqa: RUF012 -- replaced by a subclass, never changed
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         right = super().sample()
         values = {"p_WB": right.p_WB, "v_WB": right.v_WB, "w_WB": right.w_WB, "force": right.force}
-        return Sample(**(values | (self.wrong if self.t >= 0.1 else {})))
+        return BallSample(**(values | (self.wrong if self.t >= 0.1 else {})))
 
 
 def test_record(sphere: Scene) -> None:
@@ -69,7 +69,7 @@ def test_nan_at_the_start(sphere: Scene) -> None:
     class FromTheStart(Misshapen):
         wrong = {"p_WB": np.full(3, np.nan)}  # noqa: RUF012 -- never changed
 
-        def sample(self) -> Sample:
+        def sample(self) -> BallSample:
             self.t = 1.0
             return super().sample()
 
@@ -129,7 +129,7 @@ def test_where_nothing_can_lift_the_ball_a_pull_is_no_lift_off(sphere: Scene) ->
     """In an upright cylinder a wall that pulls is an engine's error, and its run goes on to show it."""
 
     class Pulls(Oracle):
-        def sample(self) -> Sample:
+        def sample(self) -> BallSample:
             right = super().sample()
             return replace(right, force=-np.asarray(right.force) if self.t > 0.2 else right.force)
 

@@ -19,7 +19,7 @@ import proofroll
 from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallBuilt
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.files.data_folders import data_folder
 
 
@@ -87,7 +87,7 @@ class Silent(Tiny):
         """Not even the first acceleration."""
         return BallBuilt()
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """Without the force."""
         return dataclasses.replace(super().sample(), force=None)
 
@@ -199,7 +199,7 @@ def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
     """Whoever writes an engine reads which array has which shape, before its numbers are held against the scene's."""
 
     class Misshapen(Tiny):
-        def sample(self) -> Sample:
+        def sample(self) -> BallSample:
             return dataclasses.replace(super().sample(), **wrong)
 
     with pytest.raises(Diverged, match=words):
@@ -209,8 +209,9 @@ def test_a_sample_of_a_wrong_shape(wrong: dict[str, Any], words: str) -> None:
 @pytest.mark.parametrize(
     ("method", "given", "words"),
     [
-        ("sample", None, r"sample\(\) gave NoneType instead of a Sample"),
-        ("sample", {"p_WB": np.zeros(3)}, r"sample\(\) gave dict instead of a Sample"),
+        ("sample", None, r"sample\(\) gave NoneType instead of a BallSample"),
+        ("sample", Sample(*np.zeros((3, 3))), r"sample\(\) gave Sample instead of a BallSample"),
+        ("sample", {"p_WB": np.zeros(3)}, r"sample\(\) gave dict instead of a BallSample"),
         ("built", None, r"built\(\) gave NoneType, which has no "),
         ("built", {"mass": 1.0}, r"built\(\) gave dict, which has no "),
     ],

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import EXACT, Line, require_shapes, tolerated
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -19,7 +19,8 @@ from proofroll.elements.ball_on_surface.mechanics import (
     stands,
     wall_velocity,
 )
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
 _DEEP = "a ball that is sunk in by its radius has its centre in the wall"
 _LEVER = "a soft contact rolls about a point midway in its depth, and the depth is at most the radius"
@@ -48,7 +49,7 @@ _SHAPES = {
 }
 
 
-def certify(body: RollingBall, built: BallBuilt, sample: Sample) -> list[Line]:
+def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Line]:
     """Compares what was built, and the sample at time 0, with the ball on its surface.
 
     Quantities about which the engine is silent have a line that says so, except those that the scene requires it to

@@ -8,13 +8,13 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, on_turns
 from proofroll.core.columns import SMALLEST, Columns, Variable, axes
-from proofroll.core.engine import Sample
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallSample
 
 
 def from_samples(
-    body: RollingBall, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]
+    body: RollingBall, times: FloatArray, samples: Sequence[BallSample], between: Mapping[float, BallSample]
 ) -> Columns:
     """The variables of a run, from one sample per time [s] and some between them; a force missing at time 0 is NaN."""
 
@@ -41,7 +41,7 @@ def from_samples(
     return Columns(found, made.attrs)
 
 
-def samples_between(samples: Mapping[float, Sample]) -> dict[str, Variable]:
+def samples_between(samples: Mapping[float, BallSample]) -> dict[str, Variable]:
     """Samples off the grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s] along ``between`` [s]; if any."""
     if not samples:
         return {}

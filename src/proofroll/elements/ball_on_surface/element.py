@@ -15,7 +15,6 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
-from proofroll.core.engine import Sample
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.failed_run import FailedRun
 from proofroll.core.gravity import Gravity
@@ -26,6 +25,7 @@ from proofroll.elements.ball_on_surface.dataset import from_samples
 from proofroll.elements.ball_on_surface.failure_program import program
 from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion, RollingBall
 from proofroll.elements.ball_on_surface.optional_terms import optional_terms
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 if TYPE_CHECKING:
@@ -50,6 +50,8 @@ class BallOnSurface:
     contact: Contact
     start: InitialMotion
     gravity: Gravity
+
+    sample_type: ClassVar[type[BallSample]] = BallSample
 
     def __post_init__(self) -> None:
         """Refuses a slip that nothing could ever brake, and what is not known on a wall that moves.
@@ -163,7 +165,9 @@ class BallOnSurface:
         friction = truth["needed_friction"].to_numpy()
         return certificate.another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
 
-    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
+    def variables(
+        self, times: FloatArray, samples: Sequence[BallSample], between: Mapping[float, BallSample]
+    ) -> Columns:
         """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.columns`."""
         return from_samples(self.rolling, times, samples, between)
 
@@ -177,7 +181,7 @@ class BallOnSurface:
         """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
         return events.common_span(truth, runs)
 
-    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:
+    def lacks(self, samples: Sequence[BallSample], asks: Sequence[str]) -> str | None:
         """See the protocol."""
         if BallCapability.BOUNDED_FRICTION in self.requires and any(sample.sticking is None for sample in samples):
             return "the engine does not say whether the ball sticks or slips"
@@ -193,7 +197,7 @@ class BallOnSurface:
         """See the protocol."""
         return observables.scales(self.rolling, truth)
 
-    def certify(self, built: Any, sample: Sample) -> list[Line]:
+    def certify(self, built: Any, sample: BallSample) -> list[Line]:
         """See the protocol."""
         return certificate.certify(self.rolling, built, sample)
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element_abilities import SeenInRun
-from proofroll.core.engine import Sample
 from proofroll.core.events import Event, events_of
 from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_acceleration, normal_force
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallSample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,11 +43,11 @@ class Watch:
         self._body, self._leaves = body, not always_pressed(body)
         self._faint = _FAINT * body.ball.mass * natural_acceleration(body)
 
-    def over(self, sample: Sample) -> bool:
+    def over(self, sample: BallSample) -> bool:
         """Whether the wall pulls."""
         return self._leaves and self._press(sample) < -self._faint
 
-    def conclude(self, times: FloatArray, samples: Sequence[Sample], located: Sequence[Event] | None) -> SeenInRun:
+    def conclude(self, times: FloatArray, samples: Sequence[BallSample], located: Sequence[Event] | None) -> SeenInRun:
         """The events, and how many samples are of the scene."""
         at, kept, ended = times.tolist(), len(samples), None
         events = list(located or ())
@@ -71,7 +71,7 @@ class Watch:
             events = [*between_samples(at, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
-    def _press(self, sample: Sample) -> float:
+    def _press(self, sample: BallSample) -> float:
         """N [N]; NaN where the engine gives no force."""
         if sample.force is None:
             return math.nan

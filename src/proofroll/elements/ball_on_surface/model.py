@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
@@ -13,7 +12,6 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.bounds import OutOfBounds, bounded
-from proofroll.core.engine import Regularised
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 
@@ -40,15 +38,6 @@ ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {
     BallCapability.IMPACTS,
     BallCapability.TANGENTIAL_RESTITUTION,
 }
-
-
-def terms_held(*, resists: object, slips: object = False, turns: object = False) -> frozenset[str]:
-    """What a model holds besides rolling, if it does; for :attr:`BallBuilt.terms`.
-
-    Rolling resistance, friction that is bounded, and the ball's orientation.
-    """
-    held = {"ROLLING_RESISTANCE": resists, "BOUNDED_FRICTION": slips, "ORIENTATION": turns}
-    return frozenset(BallCapability[name] for name, is_there in held.items() if is_there)
 
 
 @dataclass(frozen=True)
@@ -228,40 +217,3 @@ class RollingBall:
         v0 = speed * self.v0 / np.linalg.norm(self.v0)
         w0 = (self.w0 @ e1) * e1 - np.cross(e1, v0) / self.ball.radius
         return replace(self, v0=v0, w0=w0, slip0=np.zeros(3))
-
-
-@dataclass(frozen=True)
-class BallBuilt:
-    """What the engine really built of a ball, read back from the engine (never from the scene). None: it cannot say.
-
-    Attributes:
-        mass: of the ball [kg].
-        inertia: central inertia of the ball, principal values [kg m²], shape (3,).
-        gravity: acceleration of gravity in the world [m/s²], shape (3,).
-        ball_radius: [m].
-        rolling_resistance: f [m]; 0 where nothing of the kind was built. None counts as missing where f > 0.
-        mu_static, mu_kinetic: coefficients of friction [-]; inf where friction has no bound. None counts as missing
-            where friction is bounded.
-        gap: distance of the ball from the engine's own wall at time 0 [m].
-        acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
-        angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
-        terms: the optional parts that are in the built model: rolling resistance, bounded friction, orientation.
-        regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
-            that the model softens, with tolerance and reason, as far as :data:`certificate.CAPS` lets it:
-            mass, inertia, gravity, radius and position along the wall are never soft. Tolerances of acceleration, N,
-            F2 and F3 are relative to :func:`mechanics.natural_acceleration`; one of ``1 / static friction``,
-            where the scene has no bound and the engine needs a number, to 1/mu.
-    """
-
-    mass: float | None = None
-    inertia: FloatArray | None = None
-    gravity: FloatArray | None = None
-    ball_radius: float | None = None
-    rolling_resistance: float | None = None
-    mu_static: float | None = None
-    mu_kinetic: float | None = None
-    gap: float | None = None
-    acceleration: FloatArray | None = None
-    angular_acceleration: FloatArray | None = None
-    terms: frozenset[str] | None = None
-    regularised: Mapping[str, Regularised] = field(default_factory=dict)

@@ -9,10 +9,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import Line, require_shapes, tolerated
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.elements.mechanism.dataset import reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
-from proofroll.elements.mechanism.sampling import MechanismBuilt
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
@@ -42,7 +42,7 @@ _SHAPES = {
 }
 
 
-def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) -> list[Line]:
+def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismSample) -> list[Line]:
     """Compares what was built, and the sample at time 0, with the mechanism; silence has a line that says so."""
     require_shapes(built, _SHAPES)
     mechanism, start, found = element.mechanism, element.start, element.first_motion
@@ -99,7 +99,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: Sample) ->
 
 
 def _compare_reactions(
-    element: MechanismElement, sample: Sample, compare: Callable[[str, str, Any, Any, float], None]
+    element: MechanismElement, sample: MechanismSample, compare: Callable[[str, str, Any, Any, float], None]
 ) -> None:
     """Forces and moments of joints and loops, as far as they are determinate; models without them are not asked."""
     if sample.joint_force is None or sample.joint_torque is None:

@@ -10,9 +10,9 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns, Variable, axes
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.sampling import MechanismSample
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 UNDETERMINED, UNSAID = "not determined by the equations", "not given by the engine"
 
 
-def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[Sample]) -> Columns:
+def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
     """The variables of a run, from one sample per time [s]."""
     count = len(element.bodies)
 
@@ -35,7 +35,7 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
     return columns(element, Placed(element.mechanism, times, p, v, w, stacked("q_WB", 4, count)), wrench)
 
 
-def reactions(element: MechanismElement, sample: Sample, name: str) -> FloatArray:
+def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> FloatArray:
     """``joint_force`` [N] or ``joint_torque`` [N m] of a sample, shape (joints + loops, 3); NaN where it is None.
 
     Raises:

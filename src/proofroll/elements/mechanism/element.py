@@ -12,7 +12,6 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
-from proofroll.core.engine import Sample
 from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.analysis import Analysis, analysed
@@ -23,6 +22,7 @@ from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.sampling import MechanismSample
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,6 +53,7 @@ class MechanismElement:
     mechanism: Mechanism
 
     name: ClassVar[str] = "mechanism"  # there is one in a scene
+    sample_type: ClassVar[type[MechanismSample]] = MechanismSample
     askable: ClassVar[Mapping[str, str]] = {}  # all is given
     softened: ClassVar[frozenset[str]] = frozenset(CAPS)
     failures: ClassVar[Mapping[str, str]] = {
@@ -203,11 +204,11 @@ class MechanismElement:
         wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
         return wrench
 
-    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
+    def variables(self, times: FloatArray, samples: Sequence[MechanismSample], between: object) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
         return from_samples(self, times, samples)
 
-    def lacks(self, samples: Sequence[Sample], asks: Sequence[str]) -> str | None:  # noqa: ARG002 -- the protocol's
+    def lacks(self, samples: Sequence[MechanismSample], asks: Sequence[str]) -> str | None:  # noqa: ARG002 -- the protocol's
         """See the protocol."""
         lacking = any(sample.q_WB is None for sample in samples)
         return "the engine does not give the orientation of the bodies" if lacking else None
@@ -236,7 +237,7 @@ class MechanismElement:
                 sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
         return sizes
 
-    def certify(self, built: Any, sample: Sample) -> list[Line]:
+    def certify(self, built: Any, sample: MechanismSample) -> list[Line]:
         """See the protocol."""
         return certify(self, built, sample)
 

@@ -1,9 +1,4 @@
-"""What an engine says about a mechanism besides its motion, and which mechanism a scene holds.
-
-A :class:`~proofroll.core.engine.Sample` of a mechanism has arrays over its bodies: origin of each body's frame, its
-velocity, orientation and angular velocity; and over its joints, followed by its loops: force and moment on the child
-(on body_b of a loop) at its joint point, world axes; NaN where the engine cannot say one of them.
-"""
+"""What an engine says about a mechanism besides its motion, and which mechanism a scene holds."""
 
 from __future__ import annotations
 
@@ -13,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised
+from proofroll.core.engine import Regularised, Sample
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import joint
 from proofroll.elements.mechanism.analysis import State, general_place
@@ -24,6 +19,19 @@ from proofroll.elements.mechanism.rotations import Array
 # it is independent: an engine's rows have other units and weights.
 DEPENDENT = 1e-9
 WITH_AXIS = joint.WITH_AXIS
+
+
+@dataclass(frozen=True, slots=True)
+class MechanismSample(Sample):
+    """State of the bodies, arrays over them, and reactions of the joints.
+
+    Attributes:
+        joint_force, joint_torque: on the child of each joint, then on body_b of each loop, at the joint, world axes
+            [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
+    """
+
+    joint_force: Array | None = None
+    joint_torque: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.exudyn.friction import slow
 from proofroll.engines.exudyn.local_frame import curvature
 from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads, rigid_body
@@ -35,11 +35,11 @@ class RigidBall:
     marker: Any
     resistance: Any
 
-    def sample(self, force: FloatArray) -> Sample:
+    def sample(self, force: FloatArray) -> BallSample:
         """State from the node, with the force of the wall on the ball [N]."""
         output = self.system.GetNodeOutput
         q_WB = output(self.node, Output.CoordinatesTotal)[3:]
-        return Sample(
+        return BallSample(
             p_WB=output(self.node, Output.Position),
             v_WB=output(self.node, Output.Velocity),
             w_WB=output(self.node, Output.AngularVelocity),

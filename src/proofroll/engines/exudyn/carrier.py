@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.elements.ball_on_surface.surfaces import Generator
 from proofroll.engines.exudyn.ball import add_ball, add_body
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
@@ -118,7 +118,7 @@ class Carrier(ExudynModel):
             "ROLLING": rolling,
         }
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The pivot transmits the whole force of the wall."""
         turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)
         return self.ball.sample(-turn @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))

@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import initial_response, natural_acceleration, newton_euler
-from proofroll.elements.ball_on_surface.model import BallBuilt, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.local_frame import curvature
@@ -171,7 +172,7 @@ class PenaltyContact(ExudynModel):
             "STIFFNESS": contact["contactStiffness"],
         }
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
         force = self.system.GetObjectOutput(self.contact, Output.Force)
         return dataclasses.replace(

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
 from proofroll.engines.exudyn.generic_forces import (
     SIZE,
@@ -143,7 +143,7 @@ class Generic(ExudynModel):
         """Of rolling, on the rates, as Exudyn holds them."""
         return np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The spin is a quasi-velocity, the rate of no orientation.
 
         While the ball slips, N is the wall's multiplier, and the friction what Exudyn was given for this state.
@@ -155,7 +155,7 @@ class Generic(ExudynModel):
         force = -multipliers
         if self.friction is not None and self.friction.applied is not None:
             force[1:] = self.friction.force(self.friction.applied, self.touch(q, q_t).N)
-        return Sample(
+        return BallSample(
             p_WB=self._body.surface.position(q[1:3]) + q[0] * frame[:, 0],
             v_WB=frame @ velocity,
             w_WB=frame @ q_t[3:],

@@ -11,13 +11,20 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import WORLD, Mechanism, Tree
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.loop_points import is_planar
 from proofroll.elements.mechanism.rotations import Array, quaternion_rate, to_quaternion
-from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of, unsaid
+from proofroll.elements.mechanism.sampling import (
+    WITH_AXIS,
+    MechanismBuilt,
+    MechanismSample,
+    independent,
+    mechanism_of,
+    unsaid,
+)
 from proofroll.engines.exudyn.connections import Connections, add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
@@ -92,12 +99,12 @@ class Redundant(ExudynModel):
             [self._connections.body(body.name, output, -self._com[body.name]) for body in self._mechanism.bodies]
         )
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         force, torque = unsaid(self._mechanism)
         for number, made in enumerate(self._joints):
             force[number], torque[number] = self._connections.reaction(made)
-        return Sample(
+        return MechanismSample(
             p_WB=self._over_bodies(Output.Position),
             v_WB=self._over_bodies(Output.Velocity),
             w_WB=self._over_bodies(Output.AngularVelocity),

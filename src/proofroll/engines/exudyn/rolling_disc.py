@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.engines.exudyn.ball import add_ball
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, items
@@ -63,7 +63,7 @@ class RollingDisc(ExudynModel):
         """Lateral, longitudinal and normal direction of the joint in the world, as columns."""
         return np.asarray(self.system.GetObjectOutput(self.joint, Output.RotationMatrix).reshape(3, 3))
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         return self.ball.sample(self._directions() @ self.system.GetObjectOutput(self.joint, Output.ForceLocal))
 

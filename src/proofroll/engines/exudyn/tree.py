@@ -11,12 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
-from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.engines.exudyn.connections import add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items
@@ -117,13 +116,13 @@ class KinematicTree(ExudynModel):
     def _read(self, sensors: Sequence[Any]) -> Array:
         return np.array([self.system.GetSensorValues(sensor) for sensor in sensors])
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`; the tree knows no reactions."""
         links = self._read(self._sensors["RotationMatrix"]).reshape(-1, 3, 3)
         if not np.isfinite(links).all():  # Exudyn's explicit steps go on with such numbers
             raise Diverged(f"the state is not finite at t = {self.integration.t:.6g} s")
         bodies = [R @ self._frames[body.name][0] for R, body in zip(links, self._mechanism.bodies, strict=True)]
-        return Sample(
+        return MechanismSample(
             p_WB=self._read(self._sensors["Position"]),
             v_WB=self._read(self._sensors["Velocity"]),
             w_WB=self._read(self._sensors["AngularVelocity"]),

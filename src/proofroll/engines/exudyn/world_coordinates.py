@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Refused
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.exudyn.ball import resisting
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
 from proofroll.engines.exudyn.native import Output, items
@@ -71,10 +71,10 @@ class WorldCoordinates(ExudynModel):
         self._radius = float(np.linalg.norm(jacobian[6:, 3:6])) / math.sqrt(2)
         self.integration = Integration(self.system, settings, {self._rolling: turning})
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The velocity ω is the rate of no orientation."""
         output, (centre, spin) = self.system.GetNodeOutput, self._nodes
-        return Sample(
+        return BallSample(
             p_WB=output(centre, Output.Position),
             v_WB=output(centre, Output.Velocity),
             w_WB=output(spin, Output.Velocity),

@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 import mujoco
 import numpy as np
 
-from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallBuilt, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.chart import Chart
@@ -163,7 +163,7 @@ class Mujoco(SteppedModel):
         for _ in range(EVALUATIONS if self._body.contact.rolling_resistance else 1):
             self._formulation.evaluate(data)
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         data = self._evaluated()
         force = contact_force(self._model, data, self._geom)
@@ -172,7 +172,7 @@ class Mujoco(SteppedModel):
         mujoco.mj_comVel(self._model, data)
         velocity = np.zeros(6)
         mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_BODY, self._ball, velocity, 0)
-        return Sample(
+        return BallSample(
             p_WB=data.xpos[self._ball].copy(),
             v_WB=velocity[3:],
             w_WB=velocity[:3],

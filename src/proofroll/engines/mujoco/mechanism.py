@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
@@ -19,6 +19,7 @@ from proofroll.elements.mechanism.sampling import (
     DEPENDENT,
     WITH_AXIS,
     MechanismBuilt,
+    MechanismSample,
     independent,
     mechanism_of,
     unsaid,
@@ -99,14 +100,14 @@ class MujocoMechanism(SteppedModel):
         if joint.torque:
             self._data.qfrc_applied[first] = joint.torque
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         data = self._evaluated()
         twists = np.zeros((len(self._bodies), 6))
         for row, body in zip(twists, self._bodies, strict=True):
             mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
         force, torque = self._reactions(data)
-        return Sample(
+        return MechanismSample(
             p_WB=data.xpos[self._bodies].copy(),
             v_WB=twists[:, 3:].copy(),
             w_WB=twists[:, :3].copy(),

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
@@ -15,7 +15,8 @@ from proofroll.elements.ball_on_surface.mechanics import (
     natural_acceleration,
     newton_euler,
 )
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION, ContactSteps
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -33,7 +34,7 @@ class ContactRun(ContactSteps):
         self._body = body
         self._looked_at = self.contact.model.createData()  # for sampling, which leaves the running data alone
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`; the force is that of the step beginning or centred here."""
         contact, kick, data = self.contact, self.kick(), self._looked_at
         # The velocity runs ahead by half a step with leapfrog, once it has begun to run.
@@ -41,7 +42,7 @@ class ContactRun(ContactSteps):
         pin.forwardKinematics(contact.model, data, self.q, v)
         velocity = pin.getVelocity(contact.model, data, contact.ball, pin.LOCAL_WORLD_ALIGNED)
         pose = data.oMi[contact.ball]
-        return Sample(
+        return BallSample(
             p_WB=pose.translation.copy(),
             v_WB=velocity.linear.copy(),
             w_WB=velocity.angular.copy(),
@@ -84,7 +85,7 @@ class ContactRun(ContactSteps):
 
 
 def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
-    """What :attr:`proofroll.elements.ball_on_surface.model.BallBuilt.regularised` holds."""
+    """What :attr:`proofroll.elements.ball_on_surface.sampling.BallBuilt.regularised` holds."""
     dt = steps.dt
     impulse = 0.0 if steps.solver == "pgs" else steps.tolerance  # what the solver leaves of a velocity, but round-off
     natural = natural_acceleration(body)

@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import MechanismBuilt, independent, unsaid
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, independent, unsaid
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.integrators import require_tangent_map
 from proofroll.engines.pinocchio.joint_tree import AXIS_COLUMN, JointTree
@@ -78,7 +77,7 @@ class MechanismRun:
         pin.updateFramePlacements(self._model, data)
         return data, q, v, acceleration, forces, on_loops
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         data, q, v, acceleration, forces, on_loops = self._evaluated()
         velocities = [self.tree.velocity(data, frame) for frame in self.tree.body]
@@ -90,7 +89,7 @@ class MechanismRun:
             if joint.kind != "fixed":  # bodies held by a fixed joint are one body to Pinocchio
                 R = data.oMi[index].rotation
                 force[number], torque[number] = R @ data.f[index].linear, R @ data.f[index].angular
-        return Sample(
+        return MechanismSample(
             p_WB=np.array([data.oMf[frame].translation for frame in self.tree.body]),
             v_WB=np.array([velocity.linear for velocity in velocities]),
             w_WB=np.array([velocity.angular for velocity in velocities]),

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pinocchio as pin
 
-from proofroll.core.engine import Sample
 from proofroll.core.events import Event
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
@@ -46,13 +46,13 @@ class RowsRun:
         """See :class:`proofroll.core.engine.Engine`."""
         self.motion.advance(t)
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`; no orientation where it is not integrated."""
         model, ball, data = self.mechanism.model, self.mechanism.ball, self._looked_at
         force = self.motion.reaction(data)[1]
         velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
         pose = data.oMi[ball]
-        return Sample(
+        return BallSample(
             p_WB=pose.translation.copy(),
             v_WB=velocity.linear.copy(),
             w_WB=velocity.angular.copy(),

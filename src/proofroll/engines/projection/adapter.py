@@ -10,7 +10,6 @@ import numpy as np
 
 import proofroll
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
@@ -19,7 +18,8 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import with_heyoka
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallBuilt, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.mechanism import ProjectionMechanism
@@ -174,7 +174,7 @@ class Projection:
         often = "once, at" if len(times) == 1 else f"{len(times)} times, first at"
         return (f"near the Euler-angle singularity the body's axes were chosen anew {often} t = {times[0]:.6g} s",)
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         x = self._motion.x
         kin = self._ball.kinematics(x)
@@ -186,7 +186,7 @@ class Projection:
             force, sticking = self._motion.force, None
         else:
             force, sticking = self._ball.contact_force(self._ball.response_at(x)), None
-        return Sample(
+        return BallSample(
             p_WB=self._surface.position(x[:2]),
             v_WB=frame @ kin.v[:3],
             w_WB=frame @ kin.v[3:],

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import cross
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, independent, mechanism_of
+from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, independent, mechanism_of
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.settings import ProjectionSettings
 
@@ -65,7 +64,7 @@ class ProjectionMechanism:
         R = answer.bodies.R[:-1]
         return answer, R, answer.bodies.w[:-1], np.einsum("nij,nj->ni", R, self._equations.com)
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._motion.x
         answer, R, w, arm = self._solved()
@@ -74,7 +73,7 @@ class ProjectionMechanism:
         np.add.at(force, equations.connections.owner, answer.multipliers[:, None] * answer.rows.force)
         np.add.at(torque, equations.connections.owner, answer.multipliers[:, None] * answer.rows.torque)
         q = equations.parts(x)[1]
-        return Sample(
+        return MechanismSample(
             p_WB=bodies.r[:count] - arm,
             v_WB=bodies.v[:count] - cross(w, arm),
             w_WB=w.copy(),

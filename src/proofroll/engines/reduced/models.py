@@ -10,7 +10,6 @@ from abc import ABC, abstractmethod
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import DormandPrince853
 from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
@@ -18,9 +17,10 @@ from proofroll.elements.ball_on_surface.compiled.rolling import is_uniform, para
 from proofroll.elements.ball_on_surface.compiled.rolling import start as start_along_arc
 from proofroll.elements.ball_on_surface.compiled.series import Series, still_moving
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
-from proofroll.elements.ball_on_surface.model import BallBuilt, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 
 # A step shorter than this part of the way to the next sample leads nowhere.
 _STUCK = 1e-12
@@ -44,10 +44,10 @@ class ReducedModel(ABC):
         """ω̇1 now [rad/s²]; None: the model has no equation for it."""
         return None
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The orientation is not followed: nothing needs it."""
         motion = self.motion()
-        return Sample(
+        return BallSample(
             p_WB=motion.p_WB[0].copy(),
             v_WB=motion.v_WB[0].copy(),
             w_WB=motion.w_WB[0].copy(),

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import newton_euler, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll_drill.mutants.base import STEP, Honest, Mutant
 
 RESISTED = ("sphere_in_cylinder", {"rolling_resistance": 5e-4})
@@ -199,10 +199,10 @@ class NewtonMutant(Mutant):
         """What the engine does between steps."""
         return x
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         p, v, w = self.x
-        return Sample(p.copy(), v.copy(), w.copy(), force=self.response(self.x)[2])
+        return BallSample(p.copy(), v.copy(), w.copy(), force=self.response(self.x)[2])
 
     def events(self) -> list[Any]:
         """None."""
@@ -296,13 +296,13 @@ class Pyramid(Mutant):
                 self.x = self.x + STEP / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
         self.t = t
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         if self.x is None:
-            seen: Sample = self.inner.sample()
+            seen: BallSample = self.inner.sample()
             return dataclasses.replace(seen, q_WB=None)
         p, v, w = self.x
-        return Sample(p.copy(), v.copy(), w.copy(), force=self.slipping(self.x)[1], sticking=False)
+        return BallSample(p.copy(), v.copy(), w.copy(), force=self.slipping(self.x)[1], sticking=False)
 
 
 class AgainstVelocity(Pyramid):

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 
 
@@ -35,7 +35,7 @@ class BodySpin(ToldBall):
     fault = "body spin for world spin"
     named = ("angular velocity in body axes",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Turned back."""
         assert sample.q_WB is not None  # it is asked for
         turn = Rotation.from_quat(sample.q_WB, scalar_first=True)
@@ -48,7 +48,7 @@ class LocalSpin(ToldBall):
     fault = "spin along the surface's axes"
     named = ("angular velocity in the surface's axes",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Its components."""
         return dataclasses.replace(sample, w_WB=self.local(sample.p_WB).T @ sample.w_WB)
 
@@ -59,7 +59,7 @@ class NegativeForce(ToldBall):
     fault = "force of the ball on the wall"
     named = ("wrong sign",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Minus."""
         assert sample.force is not None
         return dataclasses.replace(sample, force=-sample.force)
@@ -71,7 +71,7 @@ class LocalForce(ToldBall):
     fault = "force in the surface's axes"
     named = ("ball in the surface's axes",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Its components, but at time 0."""
         assert sample.force is not None
         return dataclasses.replace(sample, force=self.local(sample.p_WB).T @ sample.force)
@@ -83,7 +83,7 @@ class BodyForce(ToldBall):
     fault = "force in body axes"
     named = ("ball in body axes",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Turned back."""
         assert sample.force is not None
         assert sample.q_WB is not None
@@ -97,7 +97,7 @@ class FrictionSign(ToldBall):
     fault = "friction with the wrong sign"
     named = ("friction has the wrong sign",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Mirrored at the normal."""
         assert sample.force is not None
         e1 = self.local(sample.p_WB)[:, 0]
@@ -110,7 +110,7 @@ class StaleAxes(ToldBall):
     fault = "stale normal: the force along the axes of a step before"
     named = ("normal of",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Turned by what the normal turns in a step."""
         assert sample.force is not None
         before = sample.p_WB - (STEP if self.t else 0.0) * sample.v_WB
@@ -123,7 +123,7 @@ class Impulse(ToldBall):
     fault = "impulse instead of force"
     named = ("force is the wall's force on the ball",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Times a step."""
         assert sample.force is not None
         return dataclasses.replace(sample, force=sample.force * STEP)
@@ -135,7 +135,7 @@ class Clamped(ToldBall):
     fault = "spin clamped at 100 rad/s"
     named = ("clamped",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """After the first step."""
         return dataclasses.replace(sample, w_WB=np.clip(sample.w_WB, -100, 100) if self.t else sample.w_WB)
 
@@ -146,7 +146,7 @@ class Single(ToldBall):
     fault = "float32"
     named = ("single-precision",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Rounded."""
         cut = {name: np.float64(np.float32(getattr(sample, name))) for name in ("p_WB", "v_WB", "w_WB", "force")}
         return dataclasses.replace(sample, **cut)  # type: ignore[arg-type]  # vectors by name
@@ -195,7 +195,7 @@ class LateForce(OneStepBehind, ToldBall):
     fault = "force of the step before"
     named = ("force is one step (0.002 s) late",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """The other's force."""
         return dataclasses.replace(sample, force=self.behind.sample().force)
 
@@ -206,7 +206,7 @@ class ContactPoint(ToldBall):
     fault = "position of the contact point"
     named = ("contact point",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """One radius out, from the first step on."""
         out = self.body.ball.radius * self.local(sample.p_WB)[:, 0] if self.t else 0.0
         return dataclasses.replace(sample, p_WB=sample.p_WB + out)
@@ -218,7 +218,7 @@ class BallScalarLast(ToldBall):
     fault = "quaternion with its scalar last"
     named = ("scalar last",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """x, y, z, w."""
         assert sample.q_WB is not None
         return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1))
@@ -230,7 +230,7 @@ class Inverse(ToldBall):
     fault = "quaternion of the inverse rotation"
     named = ("inverse rotation",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """Conjugated."""
         assert sample.q_WB is not None
         return dataclasses.replace(sample, q_WB=sample.q_WB * [1, -1, -1, -1])

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.mechanics import newton_euler
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll_drill.mutants.ball_models import RESISTED, NewtonMutant
 from proofroll_drill.mutants.base import OneStepBehind
 
@@ -54,7 +54,7 @@ class MeanForce(OneStepBehind):
     fault = "force averaged over the last step"
     named = ("half a step",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: BallSample) -> BallSample:
         """By the trapezoidal rule."""
         before = self.behind.sample().force
         assert before is not None

@@ -9,10 +9,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from proofroll.core.engine import Sample
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.model import BallBuilt
+from proofroll.elements.ball_on_surface.sampling import BallBuilt
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.settings import ProjectionSettings
 
@@ -62,7 +61,7 @@ class Mutant:
         """The scene that it builds."""
         return scene
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: Any) -> Any:
         """What it says of its state."""
         return sample
 
@@ -75,7 +74,7 @@ class Mutant:
         self.t = t
         self.inner.advance(max(self.clock(t), 0.0))
 
-    def sample(self) -> Sample:
+    def sample(self) -> Any:
         """See :class:`proofroll.core.engine.Engine`; at time 0 as the scene says, which is what it was given."""
         return self.misreport(self.inner.sample())
 

@@ -7,13 +7,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll_drill.mutants.base import STEP, Mutant
 
 PENDULUM: Any = ("double_pendulum", {})
@@ -195,11 +195,11 @@ class JointsMutant(MechanismMutant):
             self.y = self.y + h / 6 * (k1 + 2 * k2 + 2 * k3 + rate(0.0, self.y + h * k3))
         self.t = t
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         n = self.element.mechanism.nq
         said = self.equations.sample(self.y[:n], self.y[n:])
-        return Sample(**{name: said[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")})
+        return MechanismSample(**{name: said[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")})
 
     def built(self) -> Any:
         """What it was given; it does not say how it sets off."""

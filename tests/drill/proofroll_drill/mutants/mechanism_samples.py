@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 from proofroll_drill.mutants.mechanism_models import CRANK, PENDULUM, TOP, MechanismMutant
 
@@ -31,7 +31,7 @@ class ToldMechanism(Mutant):
         return []
 
 
-def _turns(sample: Sample) -> Rotation:
+def _turns(sample: MechanismSample) -> Rotation:
     assert sample.q_WB is not None
     return Rotation.from_quat(sample.q_WB, scalar_first=True)
 
@@ -43,7 +43,7 @@ class BodyRates(ToldMechanism):
     scene = TOP
     named = ("angular velocity in body axes",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Turned back, from the first step on."""
         return dataclasses.replace(sample, w_WB=_turns(sample).inv().apply(sample.w_WB)) if self.t else sample
 
@@ -54,7 +54,7 @@ class CentrePosition(ToldMechanism):
     fault = "positions of the centres of mass"
     named = ("p_WB is the position of the centres of mass",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Shifted, from the first step on."""
         return dataclasses.replace(sample, p_WB=sample.p_WB + _turns(sample).apply(self.com)) if self.t else sample
 
@@ -65,7 +65,7 @@ class CentreVelocity(ToldMechanism):
     fault = "velocities of the centres of mass"
     named = ("v_WB is the velocity of the centres of mass",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Shifted, from the first step on."""
         arm = _turns(sample).apply(self.com)
         return dataclasses.replace(sample, v_WB=sample.v_WB + np.cross(sample.w_WB, arm)) if self.t else sample
@@ -77,7 +77,7 @@ class OnParent(ToldMechanism):
     fault = "reaction on the wrong body"
     named = ("force has the wrong sign",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Minus."""
         assert sample.joint_force is not None
         assert sample.joint_torque is not None
@@ -90,7 +90,7 @@ class BodyReaction(ToldMechanism):
     fault = "reaction in body axes"
     named = ("joint in body axes",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Turned back."""
         assert sample.joint_force is not None
         return dataclasses.replace(sample, joint_force=_turns(sample).inv().apply(sample.joint_force))
@@ -102,7 +102,7 @@ class Swapped(ToldMechanism):
     fault = "reactions in another order of joints"
     named = ("of another joint",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Reversed."""
         assert sample.joint_force is not None
         assert sample.joint_torque is not None
@@ -115,7 +115,7 @@ class AboutCentre(ToldMechanism):
     fault = "moment about the centre of mass"
     named = ("moment about the centre of mass",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Of each child."""
         assert sample.joint_force is not None
         assert sample.joint_torque is not None
@@ -130,7 +130,7 @@ class Unnormalised(ToldMechanism):
     scene = TOP
     named = ("not of unit length",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """By a twentieth per second."""
         assert sample.q_WB is not None
         return dataclasses.replace(sample, q_WB=sample.q_WB * (1 + 0.05 * self.t))
@@ -143,7 +143,7 @@ class MechanismScalarLast(ToldMechanism):
     scene = CRANK
     named = ("scalar last",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """x, y, z, w, from the first step on."""
         assert sample.q_WB is not None
         return dataclasses.replace(sample, q_WB=np.roll(sample.q_WB, -1, axis=-1)) if self.t else sample
@@ -155,7 +155,7 @@ class LateReaction(OneStepBehind, ToldMechanism):
     fault = "reactions of the step before"
     named = ("force is one step (0.002 s) late",)
 
-    def misreport(self, sample: Sample) -> Sample:
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
         """The other's."""
         old = self.behind.sample()
         return dataclasses.replace(sample, joint_force=old.joint_force, joint_torque=old.joint_torque)

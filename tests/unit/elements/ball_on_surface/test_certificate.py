@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.certificate import EXACT, Line, Standing, certify, first_difference, not_reported
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.certificate import CAPS, another_scene
@@ -17,7 +17,7 @@ from proofroll.elements.ball_on_surface.mechanics import (
     initial_response,
     natural_acceleration,
 )
-from proofroll.elements.ball_on_surface.model import BallBuilt
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 from proofroll.files.scene_file import load_scene
 
 
@@ -36,14 +36,14 @@ class Stub:
             acceleration=acceleration,
         )
         self._built = dataclasses.replace(right, **built)
-        state = Sample(body.p0, body.v0, body.w0, np.array([1.0, 0, 0, 0]), force)
+        state = BallSample(body.p0, body.v0, body.w0, np.array([1.0, 0, 0, 0]), force)
         self._sample = dataclasses.replace(state, **(sample or {}))
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         return self._built
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         return self._sample
 

@@ -11,12 +11,12 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.dataset import from_samples, observe, scales
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.dataset import columns, samples_between
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import off_grid
 from proofroll.truth.rolling import reduced
@@ -113,7 +113,7 @@ def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
         for t in times.tolist():
             index = int(np.searchsorted(both, t))
             beat = np.array([0, 0, size * np.sin(200 * np.pi * t)])
-            samples[t] = Sample(probed.p_WB[index] + beat, probed.v_WB[index], probed.w_WB[index])
+            samples[t] = BallSample(probed.p_WB[index] + beat, probed.v_WB[index], probed.w_WB[index])
         return dataset.assign(samples_between(samples))
 
     assert largest(rate_audit(rolling_ball(scene), with_beat(0.0))) < 1e-7
@@ -149,7 +149,7 @@ def test_absent_forces_at_time_0_are_left_out(case: tuple[Scene, xr.Dataset]) ->
     """An engine without a force at time 0 alone has the same audits from the first sample on, and its work counts."""
     scene, whole = case
     motion = reduced(rolling_ball(scene), TIMES)
-    samples = [Sample(p, v, w, force=f) for p, v, w, f in zip(*vars_of(motion), strict=True)]
+    samples = [BallSample(p, v, w, force=f) for p, v, w, f in zip(*vars_of(motion), strict=True)]
     samples[0] = dataclasses.replace(samples[0], force=None)
     dataset = from_samples(scene, TIMES, samples)
     assert np.isnan(dataset["N"][0])

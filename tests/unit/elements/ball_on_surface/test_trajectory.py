@@ -7,12 +7,12 @@ import pytest
 import xarray as xr
 
 from proofroll.core.dataset import from_samples
-from proofroll.core.engine import Sample
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
+from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 
 
@@ -90,10 +90,10 @@ def test_what_the_engine_cannot_say_is_absent() -> None:
     motion = closed_form(rolling_ball(scene), times)
     assert motion is not None
     states = list(zip(motion.p_WB, motion.v_WB, motion.w_WB, motion.force, strict=True))
-    silent = from_samples(scene, times, [Sample(p, v, w) for p, v, w, _ in states])
+    silent = from_samples(scene, times, [BallSample(p, v, w) for p, v, w, _ in states])
     assert not {"N", "F2", "F3", "needed_friction", "q_WB"} & set(silent.data_vars)
     q = np.array([1.0, 0, 0, 0])
-    full = from_samples(scene, times, [Sample(p, v, w, q, f) for p, v, w, f in states])
+    full = from_samples(scene, times, [BallSample(p, v, w, q, f) for p, v, w, f in states])
     assert {"N", "F2", "F3", "needed_friction", "q_WB"} <= set(full.data_vars)
     assert full["q_WB"].dims == ("time", "wxyz")
 
@@ -102,5 +102,5 @@ def test_a_run_that_ended_early_has_fewer_times() -> None:
     """The time axis is as long as the samples."""
     scene = load_scene("sphere_in_cylinder")
     body = rolling_ball(scene)
-    dataset = from_samples(scene, np.linspace(0, 1, 11), [Sample(body.p0, body.v0, body.w0)] * 2)
+    dataset = from_samples(scene, np.linspace(0, 1, 11), [BallSample(body.p0, body.v0, body.w0)] * 2)
     assert dataset["time"].to_numpy() == pytest.approx([0, 0.1])

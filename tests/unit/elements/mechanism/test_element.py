@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from proofroll.core.element import FirstMotion
-from proofroll.core.engine import Regularised, Sample
+from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
-from proofroll.elements.mechanism.sampling import MechanismBuilt
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
@@ -51,11 +51,11 @@ def right(element: MechanismElement) -> MechanismBuilt:
     )
 
 
-def at_start(element: MechanismElement, **changed: object) -> Sample:
+def at_start(element: MechanismElement, **changed: object) -> MechanismSample:
     """The sample at time 0 that is the scene's."""
     start = element.start
     given = {"p_WB": start.p_WB[0], "v_WB": start.v_WB[0], "w_WB": start.w_WB[0], "q_WB": start.q_WB[0]}
-    return Sample(**(given | changed))
+    return MechanismSample(**(given | changed))
 
 
 def noticed(element: MechanismElement, built: MechanismBuilt, **changed: object) -> set[str]:

@@ -13,12 +13,12 @@ from annotated_types import Gt, Le
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.engine import Sample, whole_steps
+from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 
 _KINDS = {"fixed": "Weld", "revolute": "Revolute", "prismatic": "Prismatic", "universal": "Universal"}
 _PROVIDES = frozenset({MechanismCapability[name.upper()] for name in _KINDS} | {MechanismCapability.JOINT_SPRINGS})
@@ -161,11 +161,11 @@ class Dart:
             self._put(*np.split(found.y[:, -1], 2))
         self._t = t
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         bodies = [self._bodies[body.name] for body in self._mechanism.bodies]
         poses = [body.getWorldTransform() for body in bodies]
-        return Sample(
+        return MechanismSample(
             np.array([pose.translation() for pose in poses]),
             np.array([body.getLinearVelocity() for body in bodies]),
             np.array([body.getAngularVelocity() for body in bodies]),

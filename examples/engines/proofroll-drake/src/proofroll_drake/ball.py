@@ -14,12 +14,12 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, RotationalInertia, SpatialInertia
 from scipy.integrate import solve_ivp
 
-from proofroll.core.engine import Sample
 from proofroll.core.errors import Diverged
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
-from proofroll.elements.ball_on_surface.model import ROLLS, BallBuilt, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll_drake.settings import DrakeSettings
 
 PROVIDES: frozenset[str] = ROLLS | {BallCapability.ORIENTATION}
@@ -87,10 +87,10 @@ class DrakeBall:
         self._t, self._x = t, found.y[:, -1]
         self._x[:4] /= np.linalg.norm(self._x[:4])
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`."""
         x = self._x
-        return Sample(x[4:7].copy(), x[10:13].copy(), x[7:10].copy(), x[:4].copy(), self._solved(x)[1])
+        return BallSample(x[4:7].copy(), x[10:13].copy(), x[7:10].copy(), x[:4].copy(), self._solved(x)[1])
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

@@ -17,13 +17,13 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
-from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
-from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, mechanism_of
+from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll_drake.joints import connect, start
 from proofroll_drake.settings import DrakeSettings
 
@@ -142,14 +142,14 @@ class DrakeMechanism:
         except RuntimeError as error:
             raise Diverged(f"Drake: {' '.join(str(error).split())} (t = {t:g} s)") from None
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         plant, context = self._plant, self._context
         bodies = [self._bodies[body.name] for body in self._mechanism.bodies]
         poses = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
         rates = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
         force, torque = self._reactions()
-        return Sample(
+        return MechanismSample(
             np.array([pose.translation() for pose in poses]),
             np.array([rate.translational() for rate in rates]),
             np.array([rate.rotational() for rate in rates]),

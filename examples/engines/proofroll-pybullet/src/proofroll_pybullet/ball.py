@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
-from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallBuilt, BallCapability, RollingBall, terms_held
+from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
+from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -145,7 +146,7 @@ class PybulletBall:
         """Of the centre [m/s], and angular [rad/s]."""
         return self._world.getBaseVelocity(self._ball)
 
-    def sample(self) -> Sample:
+    def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`; the force is that of the last step, and none at time 0."""
         p, q = self._pose()
         v, w = self._velocities()
@@ -156,7 +157,7 @@ class PybulletBall:
             normal = np.array(self._world.getMatrixFromQuaternion(plane)).reshape(3, 3)[:, 2]
             force = N * normal + friction
         sticking = self._status == "stick" if self._bounded else None
-        return Sample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force, sticking)
+        return BallSample(np.array(p), np.array(v), np.array(w), np.roll(q, 1), force, sticking)
 
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""

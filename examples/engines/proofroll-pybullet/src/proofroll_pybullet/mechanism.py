@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised, Sample, whole_steps
+from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Body, Joint, Mechanism, Tree
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
-from proofroll.elements.mechanism.sampling import MechanismBuilt, mechanism_of
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -129,11 +129,11 @@ class PybulletMechanism:
                 q, v = [*q, turned[3], *turned[:3]], [*v, *rates]
         return np.array(q), np.array(v)
 
-    def sample(self) -> Sample:
+    def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`; PyBullet's reactions of chains are not those, so none is given."""
         motion = self._tree.at(*self._state())
         turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
-        return Sample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
+        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
