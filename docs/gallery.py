@@ -9,6 +9,7 @@ from pathlib import Path
 from markdown_tables import caveat_list, remark_list, verdict_table
 
 from proofroll.core.comparison import Comparison
+from proofroll.core.number_text import number
 from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
@@ -18,7 +19,6 @@ from proofroll.files.trajectory_file import read
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.comparison_summary import outcome_content
 from proofroll.report.html import templates
-from proofroll.report.labels import number
 from proofroll.report.scene_sheet import scene_sheet
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
+from proofroll.core.number_text import number
 from proofroll.report.comparison_records import ReportedComparison
-from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, number, step, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, step, verdict_text
 from proofroll.report.tables import remarks
 from proofroll.report.terminal import columns
 from proofroll.studies.recommend import recommend

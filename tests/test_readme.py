@@ -16,9 +16,10 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
+from proofroll.core.number_text import number
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
-from proofroll.report.labels import number, step
+from proofroll.report.labels import step
 from proofroll.running.case import EngineFacts
 from proofroll.studies.claims import claims_for
 

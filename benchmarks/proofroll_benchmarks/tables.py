@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import number
+from proofroll.core.number_text import number
 from proofroll.report.screen import numeric, plain_table, unbroken
 
 _MEANING = {

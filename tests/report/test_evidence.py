@@ -14,13 +14,13 @@ import pytest
 
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.dataset import observe
+from proofroll.core.number_text import error
 from proofroll.core.verdict import Verdict, judge
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read, write
 from proofroll.report.comparison_records import Claims, Cost
 from proofroll.report.html import page
-from proofroll.report.labels import error
 from proofroll.report.plots import MOST_POINTS, kept, point_curves
 from proofroll.report.report_records import report_content
 from proofroll.report.styles import OUTLINES, styles

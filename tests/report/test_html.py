@@ -13,10 +13,11 @@ import pytest
 from poison import Poison
 
 import proofroll.report.html
+from proofroll.core.number_text import number
 from proofroll.files.json_data import plain
 from proofroll.report.growing_report import write_report
 from proofroll.report.html import page
-from proofroll.report.labels import number, symbol
+from proofroll.report.labels import symbol
 from proofroll.report.pages import packed
 from proofroll.report.plots import EngineCurve, point_curves
 from proofroll.report.report_records import report_content

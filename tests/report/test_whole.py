@@ -110,7 +110,7 @@ def test_advice_names_the_cheapest_the_runner_up_and_the_first_failure(
     answer = answers[1e-3]
     assert answer.choice.point.engine == "good"
     assert answer.first_failure.point.engine == "rough"
-    assert "off by 0.003 m" in answer.first_failure.reason
+    assert "off by 3e-3 m" in answer.first_failure.reason
     assert answers[1e-2].choice.point.engine == "rough"
     text = parse(written_page).text
     assert "0.5 (once)" in text

@@ -9,7 +9,8 @@ from typing import Any
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import number, unit
+from proofroll.core.number_text import number
+from proofroll.report.labels import unit
 from proofroll.report.screen import numeric, plain_table, unbroken
 
 _SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}

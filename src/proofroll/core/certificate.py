@@ -12,6 +12,7 @@ import numpy as np
 
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged
+from proofroll.core.number_text import number
 from proofroll.core.scene import Scene
 from proofroll.core.several import sample_of, shaped
 
@@ -94,10 +95,11 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
     if soft is None:
         return tolerance, because
     if cap is None:
-        return tolerance, f"cannot be softened, though the engine asks for {soft.tolerance:.2g} ({soft.because})"
+        return tolerance, f"cannot be softened, though the engine asks for {number(soft.tolerance)} ({soft.because})"
     if soft.tolerance <= cap.tolerance:
         return soft.tolerance, soft.because
-    return cap.tolerance, f"{soft.because}; of the {soft.tolerance:.2g} asked for this much is allowed: {cap.because}"
+    asked = number(soft.tolerance)
+    return cap.tolerance, f"{soft.because}; of the {asked} asked for this much is allowed: {cap.because}"
 
 
 def require_shapes(built: Any, shapes: Mapping[str, tuple[tuple[int, ...], ...]]) -> None:
@@ -137,8 +139,8 @@ def first_difference(lines: list[Line]) -> str | None:
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
             f"the engine's model differs from the scene: {line.quantity} is {found} instead of "
-            f"{expected} {line.unit}{where} (relative difference {line.difference:.2g}, "
-            f"allowed {line.tolerance:.2g}){refused}{_single(line)}"
+            f"{expected} {line.unit}{where} (relative difference {number(line.difference)}, "
+            f"allowed {number(line.tolerance)}){refused}{_single(line)}"
         )
     return None
 

@@ -14,6 +14,7 @@ from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import fixed_step
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.number_text import number
 from proofroll.core.scene import Scene
 from proofroll.core.several import build, sample_of, shaped
 
@@ -80,7 +81,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
                 tuple(np.ravel(found[row]).tolist()),
                 difference if np.isfinite(difference) else float("inf"),
                 _MARGIN * bar + _FLOOR + soft,
-                f"derived from velocities after steps of {h:.2g} s and {h / 2:.2g} s",
+                f"derived from velocities after steps of {number(h)} s and {number(h / 2)} s",
             )
         )
     return lines

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.events import EVENT_ORDER
+from proofroll.core.number_text import number
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.kinds import ReportKind
-from proofroll.report.labels import names, number, off_by, unjudged, with_caveat
+from proofroll.report.labels import names, off_by, unjudged, with_caveat
 from proofroll.report.scores import EVERYDAY, RowAdvice, Score, cheapest, closest, furthest_off, recommendation, scores
 
 

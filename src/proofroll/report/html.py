@@ -12,6 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from proofroll.core import number_text
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
@@ -102,8 +103,8 @@ def templates() -> jinja2.Environment:
 def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Environment:
     made = environment(*(Path(inspect.getfile(kind)).parent / "templates" for kind in kinds))
     made.filters |= {
-        "number": labels.number,
-        "error": labels.error,
+        "number": number_text.number,
+        "error": number_text.error,
         "symbol": labels.symbol,
         "unit": labels.unit,
         "values": labels.values,

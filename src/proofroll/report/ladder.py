@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from proofroll.core.arrays import largest_difference
 from proofroll.core.errors import ProofrollError
+from proofroll.core.number_text import number
 from proofroll.files.json_data import MERGED
 from proofroll.running.case import EngineDescription, Status
 from proofroll.running.timing import Interval, machine, ratio
@@ -203,7 +204,7 @@ def _findings(content: LadderContent) -> Iterator[str]:
         if rung.ran.error is not None and rung.ran.seconds_per_second and rung.ran.error < (content.scale or math.inf)
     ]
     if useful:
-        said = "; ".join(f"{label(rung)} ({rung.ran.error:.2g} {unit})" for rung in front(useful))
+        said = "; ".join(f"{label(rung)} ({number(rung.ran.error)} {unit})" for rung in front(useful))
         yield f"Nothing is both cheaper and nearer to the true {name} than, from the cheapest on: {said}."
     if content.tolerance is not None:
         yield _cheapest(useful, content.tolerance, f"{content.tolerance:g} {unit}")
@@ -223,7 +224,7 @@ def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, sa
     if not within:
         return f"No rung is within {said} at its own step."
     best, _, error = min(within, key=lambda entry: entry[1])
-    return f"The cheapest within {said} is {label(best)} ({best.level}), off by {error:.2g}."
+    return f"The cheapest within {said} is {label(best)} ({best.level}), off by {number(error)}."
 
 
 def _of_terms(content: LadderContent) -> Iterator[str]:
@@ -237,14 +238,15 @@ def _of_terms(content: LadderContent) -> Iterator[str]:
         largest = max((row.change for row in rows if row.change is not None), default=None)
         match verdict:
             case Need.NEEDED if largest is not None:
-                yield f"{term} is needed in {where}: leaving it out moves {name} by up to {largest:.2g} {unit}."
+                yield f"{term} is needed in {where}: leaving it out moves {name} by up to {number(largest)} {unit}."
             case Need.NEEDED:
                 yield f"{term} is needed in {where}: {rows[0].reason}."
             case Need.HARMFUL:
-                yield f"{term} moves {name} away from the truth in {where}, by up to {largest:.2g} {unit}."
+                yield f"{term} moves {name} away from the truth in {where}, by up to {number(largest)} {unit}."
             case Need.NOT_NEEDED:
                 times = ", ".join(f"{label(row)} ({row.cost.value:.2f}×)" for row in rows if row.cost)
-                yield f"{term} is paid for but not needed in {times}: {name} moves by {largest:.1g} {unit} at most."
+                most = f"{name} moves by {number(largest, 1)} {unit} at most"
+                yield f"{term} is paid for but not needed in {times}: {most}."
             case Need.INHERENT:
                 yield f"{term}: it cannot be left out of {where}."
             case Need.NO_ANSWER:

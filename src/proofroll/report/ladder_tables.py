@@ -5,7 +5,8 @@ from __future__ import annotations
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import number, step
+from proofroll.core.number_text import number
+from proofroll.report.labels import step
 from proofroll.report.ladder import LadderContent, label
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.studies.ladder_models import Need

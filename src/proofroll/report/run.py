@@ -9,6 +9,7 @@ from typing import Any
 from proofroll.core.columns import SMALLEST
 from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.events import Event, events_of
+from proofroll.core.number_text import number
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
@@ -92,7 +93,8 @@ def _after(head: str, key: str) -> str:
 
 def _told(event: Event) -> str:
     """One event with its bracket."""
-    return f"{event.kind.replace('_', '-')} at {event.time:.9g} ± {0.5 * (event.time_high - event.time_low):.1g} s"
+    bar = number(0.5 * (event.time_high - event.time_low), 1)
+    return f"{event.kind.replace('_', '-')} at {event.time:.9g} ± {bar} s"
 
 
 def run_lines(content: RunContent) -> list[Any]:

@@ -9,8 +9,9 @@ import textwrap
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.number_text import number
 from proofroll.report.figure import panels, svg_text
-from proofroll.report.labels import name_of, number, step
+from proofroll.report.labels import name_of, step
 from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, REFUSED, TOO_SLOW
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
+from proofroll.core.number_text import number
 from proofroll.report import stability_map
-from proofroll.report.labels import number
 from proofroll.report.stability_tables import silent_lines
 from proofroll.report.study_parts import Part, PartEntry, Tell, held
 from proofroll.running.runner import Runner

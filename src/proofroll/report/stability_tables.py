@@ -9,7 +9,8 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.report.labels import name_of, number, step, with_caveat
+from proofroll.core.number_text import number
+from proofroll.report.labels import name_of, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts
 from proofroll.studies.stability_records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking

@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from math import log
 from typing import Any
 
+from proofroll.core.number_text import number
 from proofroll.report.comparison_records import ReportedComparison
-from proofroll.report.labels import name_of, number, off_by, step, symbol, unit, with_caveat
+from proofroll.report.labels import name_of, off_by, step, symbol, unit, with_caveat
 from proofroll.report.scores import EVERYDAY, cheapest, closest, furthest_off, scores
 from proofroll.report.study_parts import PartEntry
 from proofroll.studies.recommend import Answer

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.certificate import Standing, not_reported
+from proofroll.core.number_text import number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison_records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
-from proofroll.report.labels import names, number, symbol
+from proofroll.report.labels import names, symbol
 
 
 def observables(content: ReportedComparison) -> dict[str, str]:

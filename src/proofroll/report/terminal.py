@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
+from proofroll.core.number_text import number
 from proofroll.core.verdict import Verdict
-from proofroll.report.labels import SYMBOLS, caveat_lines, number, step, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
 from proofroll.report.screen import Screen, numeric, plain_table, unbroken
 from proofroll.report.study_parts import part_kinds
 from proofroll.report.tables import observables, remarks

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import error, listed, name_of, number, step, with_caveat
+from proofroll.core.number_text import error, number
+from proofroll.report.labels import listed, name_of, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.pareto import tied

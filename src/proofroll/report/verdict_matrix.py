@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from proofroll.core.number_text import error, number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison_records import Cost, ReportedComparison, ReportedRow, ReportedRun
-from proofroll.report.labels import SYMBOLS, error, number, symbol, unit, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_text
 from proofroll.report.tables import observables
 
 

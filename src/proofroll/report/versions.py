@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import SYMBOLS, number
+from proofroll.core.number_text import number
+from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import environment, rendered
 from proofroll.report.screen import plain_table, unbroken
 from proofroll.running.case import told_hosts

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.report.labels import error
+from proofroll.core.number_text import error
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.robots.records import GalleryContent, HeldLayer, ImporterRow, RobotCheck
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
+from proofroll.core.number_text import number
 from proofroll.studies.curve import Curve, CurvePoint
 from proofroll.studies.tradeoff_records import CurveBudget
 
@@ -194,20 +195,19 @@ def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
     coarse, fine = found.coarse, found.fine
     if resolution != "dt":
         coarse, fine = (name.replace(TIME_STEP, "step control") for name in (coarse, fine))
-    said = f"At {resolution} {found.coarse_step:.3g}{step} the {coarse} dominates{_order(found)}; "
-    said += f"at {found.fine_step:.3g}{step}, with an error of {found.fine_error:.2g} {unit}, "
+    said = f"At {resolution} {number(found.coarse_step, 3)}{step} the {coarse} dominates{_order(found)}; "
+    said += f"at {number(found.fine_step, 3)}{step}, with an error of {number(found.fine_error)} {unit}, "
     said += "still it does" if fine == coarse else f"the {fine}"
     if found.truth is None:
         said += ". Nothing is known of the model itself: the truth's error bar is not finite"
     elif found.model_form > found.model_form_bar + found.truth:
-        said += (
-            f". In the limit of small steps {found.model_form:.2g} {unit} remain (known to {found.model_form_bar:.1g})"
-        )
+        known = number(found.model_form_bar, 1)
+        said += f". In the limit of small steps {number(found.model_form)} {unit} remain (known to {known})"
     else:
         seen = max(found.model_form_bar, found.truth)
-        said += f". No error of the model itself is seen above {seen:.1g} {unit}"
+        said += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
     if found.floor is not None:
-        said += f"; refining ends at a scatter of {found.floor:.1g} {unit}"
+        said += f"; refining ends at a scatter of {number(found.floor, 1)} {unit}"
     return said + "."
 
 
@@ -215,7 +215,7 @@ def _order(found: CurveBudget) -> str:
     if found.order is None:
         return ""
     declared = "" if found.declared is None else f", declared {found.declared}"
-    seen = f" from {found.order_from:.3g} s to {found.order_to:.3g} s{declared}"
+    seen = f" from {number(found.order_from, 3)} s to {number(found.order_to, 3)} s{declared}"
     if found.order_low is None or found.order_high is None:
         return f" (order {found.order:.2f}{seen})"
     return f" (order {found.order:.2f} ± {(found.order_high - found.order_low) / 2:.2f}{seen})"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from proofroll.core.comparison import Comparison
+from proofroll.core.number_text import number
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.studies.outcome import SEVERITY, worst
 from proofroll.studies.planning import Planned, at_point
@@ -39,23 +40,19 @@ def contradictions_of(
         if alone is not None and verdict not in {*alone, *NOBODY}:
             found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
         if name in row.order and not _within(judgement.order, row.order[name]):
-            low, high = row.order[name]
-            found.append(f"{where}: order of {name} is {_known(judgement.order)}, expected {low:g} to {high:g}")
+            (low, high), order = row.order[name], number(judgement.order, 3, "not known")
+            found.append(f"{where}: order of {name} is {order}, expected {low:g} to {high:g}")
         if name in row.limit:
             allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
-                off = _known(judgement.limit_error)
-                found.append(f"{where}: error of the limit of {name} is {off}, expected at most {allowed:.3g}")
+                off = number(judgement.limit_error, 3, "not known")
+                found.append(f"{where}: error of the limit of {name} is {off}, expected at most {number(allowed, 3)}")
     claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
     if Verdict.INCOMPLETE not in expected:
         claimed |= {*missing}
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
         found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
     return found
-
-
-def _known(value: float | None) -> str:
-    return "not known" if value is None else f"{value:.3g}"
 
 
 def _within(value: float | None, bounds: tuple[float, float]) -> bool:

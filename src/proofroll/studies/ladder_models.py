@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.dataset import part
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import ProofrollError
+from proofroll.core.number_text import number
 from proofroll.core.scene import Scene
 from proofroll.running.case import EngineDescription
 from proofroll.running.timing import Interval, named
@@ -203,17 +204,17 @@ def need_of_term(
         scale: size of the quantity.
     """
     if on.error is None or on.error > scale:
-        said = on.ending if on.error is None else f"the answer is off by {on.error:.2g}, more than its whole size"
+        said = on.ending if on.error is None else f"the answer is off by {number(on.error)}, more than its whole size"
         return Need.NO_ANSWER, f"with it: {said}"
     if off.error is None or change is None:
         return Need.NEEDED, f"without it: {off.ending}"
     limit = max(bar, max(min(on.error, off.error), _ROUND_OFF * scale) if tolerance is None else tolerance)
-    allowed = f"the tolerance, {limit:.2g}" if tolerance is not None else f"the error that is left anyway, {limit:.2g}"
+    allowed = f"{'the error that is left anyway' if tolerance is None else 'the tolerance'}, {number(limit)}"
     if change > limit:
         if off.error > on.error:
-            return Need.NEEDED, f"without it the answer moves by {change:.2g}, more than {allowed}"
-        return Need.HARMFUL, f"without it the error falls from {on.error:.2g} to {off.error:.2g}"
-    moved = f"without it the answer moves by {change:.2g}, no more than {allowed}"
+            return Need.NEEDED, f"without it the answer moves by {number(change)}, more than {allowed}"
+        return Need.HARMFUL, f"without it the error falls from {number(on.error)} to {number(off.error)}"
+    moved = f"without it the answer moves by {number(change)}, no more than {allowed}"
     if cost is None:
         return Need.FREE, f"{moved}; its price is not known"
     price = (

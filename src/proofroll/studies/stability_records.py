@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from proofroll.core.number_text import number
 from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
@@ -195,11 +196,11 @@ def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
     if not sizes or (not without and max(sizes)[0] <= _SAME[fixed_step] * min(sizes)[0]):
         return ""
     what = " of the natural time" if fixed_step else ""
-    said = f"{max(sizes)[0]:.2g}{what} at {max(sizes)[1]:g}"
+    said = f"{number(max(sizes)[0])}{what} at {max(sizes)[1]:g}"
     if without:
         places = ", ".join(f"{point.value:g} ({point.sides[name].failure})" for point in without)
         return f"{said}, but nowhere at {places}"
-    return f"{said}, but {min(sizes)[0]:.2g}{what} at {min(sizes)[1]:g}"
+    return f"{said}, but {number(min(sizes)[0])}{what} at {min(sizes)[1]:g}"
 
 
 def silent_ranking(study: StabilityStudy) -> list[BoundaryPoint]:

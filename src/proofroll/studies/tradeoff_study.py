@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.number_text import number
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status, hosts, told_hosts
@@ -205,6 +206,6 @@ def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     ended = len(found.points) - len(done) - refused
     said.append(
         f"{len(found.points)} runs: {refused} refused, {ended} that did not reach the end, all with a reason; "
-        f"{len(broken)} that reached it silently with {quantity} off by more than {BROKEN * scale:.2g} {unit}."
+        f"{len(broken)} that reached it silently with {quantity} off by more than {number(BROKEN * scale)} {unit}."
     )
     return said

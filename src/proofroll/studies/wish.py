@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError, require_known
+from proofroll.core.number_text import number
 
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff_records import MeasuredPoint, SparseRun, TradeoffStudy
@@ -41,7 +42,7 @@ def absolute_tolerance(study: TradeoffStudy, wish: Wish) -> float:
     scale = known[wish.quantity].scale
     if wish.tolerance.relative and scale is None:
         advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity].unit}"
-        raise InputError("tolerance", f"{100 * wish.tolerance.value:.3g} %", advice)
+        raise InputError("tolerance", f"{number(100 * wish.tolerance.value, 3)} %", advice)
     return wish.tolerance.absolute(scale or 1.0)
 
 
@@ -63,14 +64,15 @@ def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolut
     if error is None or held is None:
         return f"{name} has no finite error: {point.message}"
     if error > absolute:
-        return f"{name} is off by {error:.2g} {unit}; {_blame(study, point, name, absolute)}"
+        return f"{name} is off by {number(error)} {unit}; {_blame(study, point, name, absolute)}"
     if held > absolute:
-        return f"its error of {error:.2g} {unit} is luck: finer steps of the same model are off by {held:.2g} {unit}"
+        finer = f"finer steps of the same model are off by {number(held)} {unit}"
+        return f"its error of {number(error)} {unit} is luck: {finer}"
     if held * MARGIN > absolute:
-        return f"{name} is off by {held:.2g} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
+        return f"{name} is off by {number(held)} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
     bar = study.quantities[name].truth_error_bar or 0.0
     if bar * MARGIN > absolute:
-        return f"the truth itself is known only to {bar:.2g} {unit}, so nothing can be seen to hold it"
+        return f"the truth itself is known only to {number(bar)} {unit}, so nothing can be seen to hold it"
     return None
 
 
@@ -79,7 +81,7 @@ def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absol
     dense, rare, unit = sparse.dense_error.get(name), sparse.error.get(name), study.quantities[name].unit
     if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
         return None
-    seen = f"{name} is off by {rare:.2g} {unit}" if rare is not None else f"there is no {name}: {sparse.message}"
+    seen = f"{name} is off by {number(rare)} {unit}" if rare is not None else f"there is no {name}: {sparse.message}"
     return (
         f"it holds only because its steps end at every sample: sampled every {sparse.every:g} s instead of "
         f"{study.every:g} s, {seen}"
@@ -99,7 +101,7 @@ def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absol
         if there is None:
             return f"at {where} there is no {name}: {corner.message}"
         if there > allowed:
-            return f"at {where} {name} is off by {corner.errors[name]:.2g} {unit}"
+            return f"at {where} {name} is off by {number(corner.errors[name])} {unit}"
     return None
 
 
@@ -109,5 +111,5 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
     if budget is None or budget.model_form is None:
         return "too few finer runs reached the end to say whether a finer step would do"
     if budget.model_form - (budget.model_form_bar or 0.0) > absolute:
-        return f"no step would do, for {budget.model_form:.2g} remain in the limit of small steps"
+        return f"no step would do, for {number(budget.model_form)} remain in the limit of small steps"
     return "the step is too coarse"

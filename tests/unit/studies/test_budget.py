@@ -150,4 +150,4 @@ def test_an_order_is_told_with_the_steps_it_holds_on() -> None:
     assert (found.coarsest, found.finest) == (16.0, 1.0)
     swept = made(order=2)
     assert (swept.order_from, swept.order_to) == (STEPS[0], STEPS[-1])
-    assert "from 0.05 s to 0.001 s" in swept.sentence
+    assert "from 0.05 s to 1e-3 s" in swept.sentence

@@ -128,13 +128,13 @@ def test_a_claim_about_what_is_not_reported(tmp_path: Path, row: Row, bounds: Ma
     [
         (
             {"order": 0.123456789, "limit_error": 1.23456789e-3},
-            ["order of z is 0.123, expected 1.9 to 2.1", "error of the limit of z is 0.00123, expected at most 0.001"],
+            ["order of z is 0.123, expected 1.9 to 2.1", "error of the limit of z is 1.23e-3, expected at most 1e-3"],
         ),
         (
             {},
             [
                 "order of z is not known, expected 1.9 to 2.1",
-                "error of the limit of z is not known, expected at most 0.001",
+                "error of the limit of z is not known, expected at most 1e-3",
             ],
         ),
     ],

@@ -16,6 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
+from proofroll.core.number_text import number
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,7 +95,8 @@ class Cause:
     def sentence(self) -> str:
         """What it does, and the proof."""
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.says} ({self.quantity} off by {self.before:.2g}{unit}, by {self.after:.1g}{unit} with that)"
+        before, after = number(self.before), number(self.after, 1)
+        return f"{self.says} ({self.quantity} off by {before}{unit}, by {after}{unit} with that)"
 
 
 @dataclass(frozen=True)

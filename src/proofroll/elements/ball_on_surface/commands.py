@@ -57,7 +57,7 @@ def _onset_table(study: OnsetStudy) -> Table:
     from rich.table import Column
     from rich.text import Text
 
-    from proofroll.report.labels import number
+    from proofroll.core.number_text import number
     from proofroll.report.screen import numeric, plain_table, unbroken
 
     table = plain_table(

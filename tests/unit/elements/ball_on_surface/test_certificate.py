@@ -183,7 +183,7 @@ def test_the_sentence_names_the_first_difference() -> None:
     bad = Line("gravity", "m/s^2", (0.0, 0.0, -9.81), (0.0, 0.0, -9.8), 1e-3, EXACT)
     assert first_difference([good, bad, bad]) == (
         "the engine's model differs from the scene: gravity is 0, 0, -9.8 instead of 0, 0, -9.81 m/s^2 "
-        "(relative difference 0.001, allowed 1e-12)"
+        "(relative difference 1e-3, allowed 1e-12)"
     )
 
 

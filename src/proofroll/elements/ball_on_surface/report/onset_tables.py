@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from proofroll.core.number_text import number
 from proofroll.elements.ball_on_surface.report.onsets import TrueSlips, first_slip
-from proofroll.report.labels import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -1,0 +1,24 @@
+"""How numbers that were found are written for people: errors, costs, steps that hold.
+
+A number that was given, as a parameter or the length of a run, is told as it was given, by ``:g``.
+"""
+
+from __future__ import annotations
+
+import math
+
+
+def number(value: float | None, digits: int = 2, none: str = "–") -> str:
+    """A number in few characters, e.g. ``3.4e-7``; ``none`` where there is none, or none that is finite."""
+    if value is None or not math.isfinite(value):
+        return none
+    if 0 < abs(value) < 0.01:  # one form for all small numbers: 5.4e-4 below 3.0e-5 is read at a glance
+        mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+        return f"{mantissa.rstrip('0').rstrip('.') if '.' in mantissa else mantissa}e{int(power)}"
+    mantissa, exponent, power = f"{value:.{digits}g}".partition("e")
+    return f"{mantissa}e{int(power)}" if exponent else mantissa
+
+
+def error(value: float | None, digits: int = 2) -> str:
+    """An error; infinite where there is none that is finite."""
+    return number(value, digits, none="∞")
