@@ -68,7 +68,8 @@ def _compiled(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
     up, down = hy.event_direction.positive, hy.event_direction.negative
 
     def integrator(system: list[tuple[Any, Any]], events: list[Any]) -> Any:
-        return hy.taylor_adaptive(system, [1.0] * len(system), t_events=events)
+        # optimised, it takes ten times as long to compile, which a run does not earn back
+        return hy.taylor_adaptive(system, [1.0] * len(system), t_events=events, opt_level=0)
 
     # Slaved direction: on the slow solution the angle between u and b is δ = -|u| φ̇_b / (|b| + d|u|/dt).
     strength = hy.sqrt(b2**2 + b3**2)

@@ -23,11 +23,6 @@ except ImportError:  # no wheel for this platform
     heyoka = None
 
 
-# States of a system whose compilation is optimised; measured on trees of bodies in space, thirteen states each: seven
-# bodies compile in 0.6 s of processor time, or optimised in 4 s, and run for a second of motion in 0.2 s or 0.08 s.
-_SMALL = 60
-
-
 class MaximalTaylor:
     """A compiled integrator of a mechanism; it starts anew on every run.
 
@@ -54,8 +49,7 @@ class MaximalTaylor:
             self._start,
             fp_type=self._number,
             compact_mode=True,
-            # optimising a large system costs ten times what it saves
-            opt_level=3 if len(state) <= _SMALL else 0,
+            opt_level=0,  # optimised, it takes two to ten times as long to compile, which a run does not earn back
         )
 
     def run(self, times: Array) -> Array:
