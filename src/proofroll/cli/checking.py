@@ -64,8 +64,10 @@ def checked(name: str) -> SoundFile:
     scene = str(path.parent) if path.name == "scene.toml" and path.is_file() else name
     try:
         scene_folder(scene)
-    except InputError:
+    except InputError as error:
         file = named_file(name)
+        if path.is_dir():
+            raise error from None
         if file is None:
             advice = (
                 f"there is no such scene or file; the scenes are {choices(scene_names())}, "
@@ -88,10 +90,13 @@ def _scene(name: str) -> SoundFile:
 def _comparison(path: Path) -> SoundFile:
     from proofroll.files.comparison_file import load_comparison
     from proofroll.files.scene_file import load_scene
-    from proofroll.studies.planning import row_facts
+    from proofroll.running.asking import lent_workers
+    from proofroll.studies.planning import require_fit, row_facts
 
     found = load_comparison(str(path))
-    row_facts(found, list(enumerate(found.rows)), load_scene(found.scene).requires)
+    with lent_workers(None) as workers:
+        facts, _ = row_facts(found, list(enumerate(found.rows)), load_scene(found.scene).requires, workers)
+        require_fit(found, facts, workers)
     counts = {"points": len(found.combinations()), "rows": len(found.rows), "tolerances": len(found.bands)}
     return SoundFile("comparison", path.stem, str(path), found.scene, counts)
 

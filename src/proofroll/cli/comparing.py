@@ -61,7 +61,7 @@ def asked(name: str, parameters: Mapping[str, str], workers: Workers) -> Compari
     from proofroll.files.scene_sources import source_of
     from proofroll.files.toml import named_file
 
-    if source_of(name) is not None or (named_file(name) is None and is_scene(name)):
+    if source_of(name) is not None or (named_file(name) is None and (is_scene(name) or Path(name).is_dir())):
         from proofroll.studies.first_look import compared
 
         return compared(name, parameters, workers)

@@ -32,6 +32,11 @@ class InputError(ProofrollError):
         """The same problem as that of a larger thing, of which this is a part."""
         return InputError(field, value, str(self))
 
+    def of(self, place: str) -> InputError:
+        """The same problem with the name of the file, or the part of one, before the field."""
+        known = self.field.startswith(place) or self.field == "file"
+        return self if known else InputError(f"{place}: {self.field}", self.value, self.advice)
+
 
 class Refused(ProofrollError):  # noqa: N818 -- a refusal is an honest answer, not an error
     """The engine cannot represent this scene honestly; the text says why."""
@@ -47,7 +52,7 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
     """The error for a key of a file that nothing reads, with the keys that there are."""
-    return InputError(field, value, f"there is no such key here; the keys are {choices(known)}")
+    return InputError(field, value, f"there is no such key here; the keys are {', '.join(known)}")
 
 
 def require_known(field: str, name: object, known: Iterable[str], advice: str = "choose one of") -> None:
@@ -107,5 +112,7 @@ def choices(names: Iterable[str]) -> str:
 
 
 def _shown(value: object) -> str:
+    if isinstance(value, Path):
+        return repr(str(value))  # whole, or nobody finds the file
     text = repr(value) if isinstance(value, str) else str(value)
     return text if len(text) <= 60 else text[:57] + "..."

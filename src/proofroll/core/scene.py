@@ -19,6 +19,8 @@ from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.observable import Observable
 from proofroll.core.source_code import code_of
 
+_NOTHING = "nothing of this scene can be asked for besides its motion; leave it out"
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -56,7 +58,7 @@ class Scene:
         for name in self.asks:
             if not any(name in element.askable for element in self.elements):
                 known = choices(dict.fromkeys(known for element in self.elements for known in element.askable))
-                advice = f"no element of the scene has that to ask for; choose {known}" if known else "ask for nothing"
+                advice = f"no element of the scene has that to ask for; choose {known}" if known else _NOTHING
                 raise InputError("asks", name, advice)
 
     @property

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any, TypeVar, get_args, get_type_hints
@@ -13,6 +13,20 @@ from proofroll.core.bounds import OutOfBounds
 from proofroll.core.errors import InputError, no_such_key
 
 _T = TypeVar("_T")
+# The beginning of a type of error in pydantic -> what a person is told, where pydantic's own words say less.
+_WORDS = {
+    "int": "give a whole number",
+    "float": "give a number",
+    "finite": "give a finite number",
+    "string": "give a text",
+    "bool": "give true or false",
+    "list": "give a list: [value, value]",
+    "tuple": "give a list: [value, value]",
+    "dict": "give a table of names and values",
+    "mapping": "give a table of names and values",
+    "missing": "the list is too short; add what is missing",
+    "dataclass": "give a table of names and values",
+}
 
 
 def strict(*types: type, finite: bool = False) -> None:
@@ -34,9 +48,25 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
         raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
     try:
         found: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
-        return found
     except ValidationError as error:
-        raise _first_problem(error, where, kind, own) from None
+        raise _first_problem(error, where, kind, content, own) from None
+    for place, given in _turned(content, found):
+        raise InputError(f"{where}: {'.'.join(place)}", given, "this is not a number; give one")
+    return found
+
+
+def _turned(content: object, found: object) -> Iterator[tuple[list[str], bool]]:
+    """Every true and false that was taken for a number, with its place."""
+    if isinstance(content, bool):
+        if not isinstance(found, bool):
+            yield [], content
+    elif isinstance(content, Mapping):
+        for name, item in content.items():
+            inside = found.get(name) if isinstance(found, Mapping) else getattr(found, name, item)
+            yield from (([str(name), *place], given) for place, given in _turned(item, inside))
+    elif isinstance(content, (list, tuple)) and isinstance(found, (list, tuple)):
+        for index, (item, inside) in enumerate(zip(content, found, strict=False)):
+            yield from (([str(index), *place], given) for place, given in _turned(item, inside))
 
 
 @cache
@@ -61,13 +91,27 @@ def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str
     return [key for key in dict.fromkeys(found) if place or key not in own]
 
 
-def _first_problem(error: ValidationError, where: str, kind: type, own: Iterable[str]) -> InputError:
+def _place(location: Iterable[str | int], content: Any) -> list[str]:
+    """Where a problem lies as a file has it: pydantic puts the names of types that may stand there in between."""
+    found = []
+    for part in location:
+        inside = isinstance(content, Mapping) and part in content
+        inside = inside or (isinstance(content, (list, tuple)) and isinstance(part, int) and part < len(content))
+        found += [str(part)] * inside
+        content = content[part] if inside else content
+    return found
+
+
+def _first_problem(
+    error: ValidationError, where: str, kind: type, content: Mapping[str, Any], own: Iterable[str]
+) -> InputError:
     """One line about the first thing that pydantic found wrong in ``where``."""
     problem = error.errors()[0]
-    location = ".".join(str(part) for part in problem["loc"])
+    absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
+    location = ".".join(_place(problem["loc"], content) + [str(problem["loc"][-1])] * absent)
     if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
         return no_such_key(f"{where}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], own))
-    if problem["type"] in {"missing", "missing_argument"}:
+    if absent:
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")
     error_found = problem.get("ctx", {}).get("error")
     if isinstance(error_found, OutOfBounds):
@@ -80,7 +124,13 @@ def _first_problem(error: ValidationError, where: str, kind: type, own: Iterable
         return InputError(
             f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
         )
-    return InputError(f"{where}: {location}", problem["input"], problem["msg"][0].lower() + problem["msg"][1:])
+    return InputError(f"{where}: {location}", problem["input"], _advice(problem["type"], problem["msg"]))
+
+
+def _advice(kind: str, said: str) -> str:
+    """What pydantic says of a problem in words of ours."""
+    words = said.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
+    return _WORDS.get(kind.partition("_")[0], words[0].lower() + words[1:])
 
 
 def units_of(*types: type) -> dict[str, str]:

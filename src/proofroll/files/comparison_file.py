@@ -58,6 +58,13 @@ def load_comparison(name: str) -> Comparison:
 
 
 def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
+    try:
+        return _checked(path, content)
+    except InputError as error:
+        raise error.of(path.name) from None
+
+
+def _checked(path: Path, content: dict[str, Any]) -> Comparison:
     where = path.name
     tolerances = _table(f"{where}: tolerances", content.pop("tolerances", {}))
     bands = {name: _band(f"{where}: tolerances.{name}", table) for name, table in tolerances.items()}
@@ -89,6 +96,9 @@ def _check_brief(where: str, comparison: Comparison) -> None:
 
 def _check_times(where: str, comparison: Comparison) -> None:
     time_grid(comparison.until, comparison.every)
+    if comparison.every > comparison.until:
+        advice = f"samples lie further apart than the run is long, {comparison.until:g} s; sample more often"
+        raise InputError("every", comparison.every, advice)
     if not (math.isfinite(comparison.time_limit) and comparison.time_limit > 0):
         raise InputError(f"{where}: time_limit", comparison.time_limit, "give a positive, finite time in s")
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.element import Element
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, no_such_key
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.plugins import load_element_kinds
@@ -106,13 +107,16 @@ def scene_folder(name: str) -> Path:
     Raises:
         InputError: there is no such scene.
     """
+    missing = "there is no such scene"
     for folder in (data_folder("models") / name, Path(name)):
         try:
             if name and (folder / "scene.toml").is_file():
                 return folder
+            if name and folder.is_dir():
+                missing = "this folder has no scene.toml; proofroll new scene writes one"
         except (OSError, ValueError):  # too long for a file system, or a zero byte
             break
-    raise InputError("scene", name, f"there is no such scene; choose one of {', '.join(scene_names())}")
+    raise InputError("scene", name, f"{missing}; choose one of {', '.join(scene_names())}")
 
 
 def is_scene(name: str) -> bool:
@@ -140,14 +144,18 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     where = str(path)
     numbers = Numbers(values, {name: item.unit for name, item in file.parameters.items()})
     gravity = {"gravity": numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity))}
-    return Scene(
-        name=path.parent.name if own else path.stem,
-        title=file.title,
-        elements=_elements(file.tables, validated(_GravityTable, gravity, where).gravity, numbers, where),
-        parameters=values,
-        folder=path.parent if own else Path(),
-        asks=tuple(dict.fromkeys([*file.asks, *_names(asks)])),
-    )
+    wanted = _names(asks)
+    try:
+        return Scene(
+            name=path.parent.name if own else path.stem,
+            title=file.title,
+            elements=_elements(file.tables, validated(_GravityTable, gravity, where).gravity, numbers, where),
+            parameters=values,
+            folder=path.parent if own else Path(),
+            asks=tuple(dict.fromkeys([*file.asks, *wanted])),
+        )
+    except InputError as error:
+        raise error if error.field == "asks" and error.value in wanted else error.of(where) from None
 
 
 def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> tuple[Element, ...]:
@@ -156,9 +164,7 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, whe
     known = [name for kind in kinds for name in kind.tables]
     for name in tables:
         if name not in known:
-            raise InputError(
-                f"{where}: {name}", "this key", f"no kind of element reads it; choose from {', '.join(known)}"
-            )
+            raise no_such_key(f"{where}: {name}", tables[name], [*sorted(_OWN), *known])
     found: list[Element] = []
     for kind in kinds:
         own = {name: tables[name] for name in kind.tables if name in tables}
@@ -181,5 +187,7 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     file = validated(SceneFile, own, str(path), tables=tables)
+    if file.duration is not None and not 0 < file.duration < math.inf:
+        raise InputError(f"{path}: duration", file.duration, "give a positive, finite time in s")
     check_parameters(file.parameters, _units(), path)
     return file

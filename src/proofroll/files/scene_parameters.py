@@ -67,6 +67,10 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
                 advice = f"its unit is {parameters[other].unit}, that of {name} is {parameter.unit}"
                 raise InputError(f"{where}.{key}", other, advice)
         _check_end(parameters, name, f"{where}.value")
+    try:
+        values_of(parameters, {})
+    except InputError as error:
+        raise InputError(f"{path}: parameters.{error.field}.value", error.value, error.advice) from None
 
 
 def _check_end(parameters: Mapping[str, Parameter], name: str, where: str) -> None:

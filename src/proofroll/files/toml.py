@@ -24,18 +24,18 @@ def read_toml(path: Path) -> dict[str, Any]:
     """
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for without end
-            raise InputError(str(path), "TOML", "this is no ordinary file")
+            raise InputError("file", path, "this is no ordinary file")
         with path.open("rb") as file:
             text = file.read(_MOST_BYTES + 1)
         if len(text) > _MOST_BYTES:
-            raise InputError(str(path), "TOML", f"the file is larger than {_MOST_BYTES >> 10} kB; shorten it")
+            raise InputError("file", path, f"the file is larger than {_MOST_BYTES >> 10} kB; shorten it")
         content = tomllib.loads(text.decode())
     except ValueError as error:  # no TOML, no UTF-8, or an integer of thousands of digits
-        raise InputError(str(path), "TOML", f"the file is broken: {error}") from None
+        raise InputError("file", path, f"the file is broken: {error}") from None
     except RecursionError:
         raise _too_deep(path) from None
     except OSError as error:
-        raise InputError(str(path), "TOML", f"the file cannot be read: {error.strerror}") from None
+        raise InputError("file", path, f"the file cannot be read: {error.strerror}") from None
     level: list[Any] = [content]
     for _ in range(_DEEPEST):  # without recursion, which has an end of its own
         inside = (list(item.values()) if isinstance(item, dict) else item for item in level)
@@ -46,7 +46,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _too_deep(path: Path) -> InputError:
-    return InputError(str(path), "TOML", f"tables and lists are nested more than {_DEEPEST} deep; use fewer levels")
+    return InputError("file", path, f"tables and lists are nested more than {_DEEPEST} deep; use fewer levels")
 
 
 def study_of(path: Path) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,10 +13,13 @@ from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
-from proofroll.running.asking import resolve, resolve_with_truth
-from proofroll.running.case import Case, EngineFacts
+from proofroll.running.asking import described, resolve, resolve_with_truth
+from proofroll.running.case import Case, EngineDescription, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
+
+# What is expected of a row whose formulation cannot represent the scene.
+_UNFIT = frozenset({"failed", "refused", "another-scene"})
 
 
 def point_name(parameters: dict[str, float]) -> str:
@@ -76,7 +79,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     runs: list[Planned] = []
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):
-            scene = load_scene(comparison.scene, **point)
+            scene = scene_at(comparison, point)
             truths.setdefault(point_name(point), _case(comparison, scene.fully_asked, point, truth_facts))
             if not isinstance(facts, EngineFacts):
                 runs.append(Planned(row, point, facts))
@@ -87,6 +90,19 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
             }
             runs.append(Planned(row, point, facts.on(scene.requires), ladder))
     return Plan(comparison, truths, runs)
+
+
+def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
+    """The scene at a point of the parameters.
+
+    Raises:
+        InputError: it has no such parameter, or not with this value; with the name of the file.
+    """
+    try:
+        return load_scene(comparison.scene, **point)
+    except InputError as error:
+        table = "vary" if error.field in comparison.vary else "points"
+        raise error.of(f"{comparison.name}.toml: {table}") if error.field in point else error from None
 
 
 def _moved(row: Row, name: str) -> Row | None:
@@ -111,6 +127,32 @@ def row_facts(
         if isinstance(facts, InputError):
             raise facts.within(f"{comparison.name}.toml: rows.{index}.engine", row.engine)
     return resolved, truth
+
+
+def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollError], workers: Workers) -> None:
+    """Every point is one of the scene, and of every row, where nothing else is expected, one of its formulation.
+
+    Raises:
+        InputError: the first that is not.
+    """
+    known = described([item.name for item in facts if isinstance(item, EngineFacts)], workers)
+    for point in comparison.combinations():
+        ends = [{key: value for key, value in point.items() if isinstance(value, float)}]
+        for name, value in point.items():
+            if isinstance(value, Edge):
+                ends = [{**end, name: limit} for end in ends for limit in value.edge_between]
+        requires, *_ = [scene_at(comparison, end).requires for end in ends]
+        for index, (row, item) in enumerate(zip(comparison.rows, facts, strict=True)):
+            if not isinstance(item, EngineFacts) or point not in comparison.combinations(row.only):
+                continue
+            told = known[item.name]
+            provided = told.provides[item.settings["formulation"]] if isinstance(told, EngineDescription) else requires
+            lacking = sorted(requires - set(provided))
+            if lacking and not _UNFIT & set(row.expected(ends[0])):
+                advice = (
+                    f"it does not have {', '.join(lacking)}{at_point(ends[0])}; expect failed there, or leave it out"
+                )
+                raise InputError(f"{comparison.name}.toml: rows.{index}.engine", row.engine, advice)
 
 
 def _rungs(

@@ -68,6 +68,19 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
     [
         ("inclined_plane.toml", "formulation=euler", "formulation=eulr", ["rows.0.engine", "eulr"]),
         ("inclined_plane.toml", 'gap = "1e-5 m"', 'gap = "1e-5 s"', ["gap", "its unit is m"]),
+        (
+            "inclined_plane.toml",
+            "tilt = [0.35]",
+            "tlt = [0.35]",
+            ["inclined_plane.toml: vary: tlt = 0.35", "choose from"],
+        ),
+        ("inclined_plane.toml", "tilt = [0.35]", "tilt = [9.0]", ["vary: tilt = 9", "must be below"]),
+        (
+            "inclined_plane.toml",
+            "=euler]",
+            "=dependent]",
+            ["rows.0.engine", "not have rolling without slip at tilt=0.35"],
+        ),
         ("tradeoff.toml", 'quantity = "z"', 'quantity = "height"', ["quantity = 'height'"]),
         ("stability_plane.toml", "values = [0.05,", "value = [0.05,", ["axes.0"]),
         ("regimes.toml", "low = 1.0", "low = 9.0", ["speed", "low <= high"]),
@@ -82,6 +95,14 @@ def test_a_slip_of_the_pen(
     assert (code, out, err.count("\n")) == (2, "", 1)
     for word in words:
         assert word in err
+
+
+def test_a_folder_without_a_scene(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Every command says of a folder what it lacks."""
+    for command in (["check"], ["compare"], ["run", "--engine", "truth"]):
+        code, out, err = proofroll(*command, str(tmp_path))
+        assert (code, out, err.count("\n")) == (2, "", 1)
+        assert "this folder has no scene.toml" in err
 
 
 def test_neither_scene_nor_file(proofroll: Proofroll) -> None:

@@ -99,8 +99,8 @@ def test_options_go_over_the_preset() -> None:
         ({"dt": "nan"}, "toy: dt", ["nan"]),
         ({"dt": "inf"}, "toy: dt", ["finite"]),
         ({"dt": "small"}, "toy: dt", ["'small'", "number"]),
-        ({"iterations": "2.5"}, "toy: iterations", ["2.5", "integer"]),
-        ({"exact": "perhaps"}, "toy: exact", ["perhaps", "boolean"]),
+        ({"iterations": "2.5"}, "toy: iterations", ["2.5", "whole number"]),
+        ({"exact": "perhaps"}, "toy: exact", ["perhaps", "true or false"]),
     ],
     ids=str,
 )

@@ -167,8 +167,8 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ('radius = "$radius"', "radius = 0", ["balls.0.radius = 0", "above 0"]),
         ('radius = "$radius"', "radius = 0.3", ["radius = 0.3", "smaller than wall with 0.225 m"]),
         ('mass = "$mass"', 'mass = "$mass"\ninertia_ratio = -0.4', ["balls.0.inertia_ratio = -0.4", "above 0"]),
-        ('radius = "$cylinder_radius"', "radius = -0.2", ["surfaces.0.cylinder.radius = -0.2", "above 0"]),
-        ('radius = "$cylinder_radius"', "radius = 1\ntilt = nan", ["surfaces.0.cylinder.tilt = nan", "finite"]),
+        ('radius = "$cylinder_radius"', "radius = -0.2", ["surfaces.0.radius = -0.2", "above 0"]),
+        ('radius = "$cylinder_radius"', "radius = 1\ntilt = nan", ["surfaces.0.tilt = nan", "finite"]),
         ('magnitude = "$gravity"', "magnitude = -9.81", ["gravity.magnitude = -9.81", "at least 0"]),
         ("direction = [0, 0, -1]", "direction = [0, 0, 0]", ["gravity.length of direction = 0", "above 0"]),
         ("direction = [0, 0, -1]", "direction = [0, nan, -1]", ["gravity.direction = nan", "finite"]),
@@ -196,13 +196,23 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
             ["mu_kinetic.value = '$mu_static'", "by its name alone, without $"],
         ),
         ('mass = "$mass"', "mass = 5e-324", ["balls.0.inertia = 0.0", "above 0"]),
+        ("value = 0.517", "value = true", ["parameters.mass.value = True", "not a number"]),
+        ("value = 0.517", "value = -1", ["parameters.mass.value = -1", "must be above 0 kg"]),
+        ("value = 0.517", "value = [1]", ["parameters.mass.value = [1]", "give a number"]),
+        ("[parameters.mass]", "[parameters]\nwheels = 4\n[parameters.mass]", ["parameters.wheels = 4", "give a table"]),
+        ('title = "', 'duration = inf\ntitle = "', ["duration = inf", "positive, finite time in s"]),
+        ('title = "', 'duration = 0\ntitle = "', ["duration = 0", "positive, finite time in s"]),
+        ('title = "', 'duration = true\ntitle = "', ["duration = True", "not a number"]),
+        ('title = "', 'asks = ["colour"]\ntitle = "', ["asks = 'colour'", "choose orientation"]),
+        ('title = "', 'wheels = 4\ntitle = "', ["wheels = 4", "no such key", "duration, gravity", "balls, surfaces"]),
+        ("direction = [0, 0, -1]", "direction = [0, 1]", ["gravity.direction = [0, 1]", "list is too short"]),
     ],
 )
 def test_broken_scene_files(edited: Callable[[str, str], str], old: str, new: str, words: list[str]) -> None:
     """A broken file gives one line with the file, the key and what to do."""
     folder = edited(old, new)
     text = str(problem(folder))
-    assert text.startswith(folder)
+    assert folder in text
     for word in words:
         assert word in text
 

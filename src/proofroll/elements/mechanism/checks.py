@@ -38,7 +38,10 @@ def number(field: str, value: Any, *, at_least: float | None = None) -> float:
     Raises:
         InputError: it is none, or lies below ``at_least``.
     """
-    return numbers(field, [value], 1, at_least=at_least)[0]
+    try:
+        return numbers(field, [value], 1, at_least=at_least)[0]
+    except InputError as error:
+        raise InputError(field, value, error.advice) from None
 
 
 def numbers(field: str, value: Any, count: int, *, at_least: float | None = None) -> tuple[float, ...]:

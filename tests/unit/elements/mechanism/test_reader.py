@@ -231,7 +231,7 @@ BAD = {
     "name used twice": (SLIDER_CRANK.replace('"wrist"', '"pin"'), "used twice"),
     "out of bounds": (
         SLIDER_CRANK.replace("value = 0.15", "value = 0.5"),
-        "crank = 0.5: crank must be below rod = 0.4 m",
+        "parameters.crank.value = 0.5: crank must be below rod = 0.4 m",
     ),
     "no gravity": (SLIDER_CRANK.replace("[gravity]\nmagnitude = 9.81", "[gravity]"), "gravity.magnitude.*required"),
     "axis where there is none": (
