@@ -1,27 +1,12 @@
-"""Axes of a stability map: how one number changes a scene, as data; and its truth and runs at their values."""
+"""Axes of a stability map: how one number changes a scene, as data; and how much of them is mapped."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from proofroll.core.errors import ProofrollError, require_known
+from proofroll.core.errors import require_known
 from proofroll.core.scene import Scene
-from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
-from proofroll.running.asking import resolve_with_truth
-from proofroll.running.case import Case, EngineFacts, Status
-from proofroll.running.runner import Runner
-from proofroll.studies.curve import Question
-from proofroll.studies.failure import Yardstick
-
-# Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
-PER_PERIOD = 8
-# More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
-# samples still visit all phases of an oscillation.
-_MOST_SAMPLES = 400
-# The truth is computed by two routes at the tightest tolerance, once per place.
-_TRUTH_LIMIT = 60.0
 
 
 @dataclass(frozen=True)
@@ -125,76 +110,3 @@ class Effort:
 
 # Most of a map's time is spent on the longest runs and on engines that no affordable step makes accurate.
 QUICK = Effort(values=3, steps=2_500, limit=3.0, longest=10.0, matched=True)
-
-
-@dataclass
-class Place:
-    """A value of an axis: the scene there, and the truth.
-
-    Attributes:
-        axis, value: where.
-        parameters: of the scene, those that differ from the defaults.
-        scene: with them, or None if it does not exist; then ``problem`` says why.
-        period: natural time of the scene [s].
-        until, every: length and sampling interval of every run [s].
-        yardstick: what runs are measured by, or None if there is no scene.
-        problem: why there is no truth here.
-    """
-
-    axis: Axis
-    value: float
-    parameters: dict[str, float]
-    scene: Scene | None = None
-    period: float = 0.0
-    until: float = 0.0
-    every: float = 0.0
-    yardstick: Yardstick | None = None
-    problem: str | None = None
-
-
-def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place]:
-    """Every value of every axis, without the truth yet."""
-    default = load_scene(name)
-    found = []
-    for axis in axes:
-        for value in effort.values_of(axis):
-            # A default that is given is left out, so that axes share the runs of the place where they meet.
-            given = {
-                key: number for key, number in axis.at(default, value).items() if number != default.parameters[key]
-            }
-            place = Place(axis, value, given)
-            found.append(place)
-            try:
-                scene = load_scene(name, **place.parameters)
-            except ProofrollError as error:
-                place.problem = str(error)
-                continue
-            place.scene, place.period = scene, scene.natural_time
-            intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
-            stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
-            place.every = stride * place.period / PER_PERIOD
-            place.until = place.every * max(1, intervals // stride)
-    return found
-
-
-def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
-    """The truth of every place, or why there is none."""
-    _, facts = resolve_with_truth([], runner.workers)
-    cases = {id(place): case_at(name, place, facts, _TRUTH_LIMIT) for place in places if place.scene is not None}
-    results = runner.run(cases.values(), lambda *_: tell())
-    for place in places:
-        if place.scene is None:
-            continue
-        case = cases[id(place)]
-        result = results[case.key]
-        truth = read(runner.store.trajectory(case)) if result.status == Status.DONE else None
-        if truth is None:
-            place.problem = f"there is no truth here: {result.message}"
-        place.yardstick = Yardstick.of(place.scene, truth)
-
-
-def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
-    """A run at a place with a limit of time [s]."""
-    assert place.scene is not None  # the caller looked
-    question = Question(name, place.parameters, place.until, place.scene.deciding)
-    return question.case(place.scene, facts, place.every, limit)

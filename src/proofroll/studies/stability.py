@@ -17,10 +17,12 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
-from proofroll.studies.axes import PER_PERIOD, Axis, Effort, Place, case_at, measure, places_of
+from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.bisection import SearchResult, search
 from proofroll.studies.curve import Curve
 from proofroll.studies.failure import TOO_SLOW, RunOutcome, judge
+from proofroll.studies.stability_places import PER_PERIOD, Place, case_at, measure, places_of
+from proofroll.studies.stability_records import MappedPlace
 from proofroll.studies.sweep import curves_of
 
 # Parts into which a sampling interval is divided, about two per octave.
@@ -86,7 +88,7 @@ class StabilityMap:
     scene: str
     axes: list[Axis]
     effort: Effort
-    places: list[Place]
+    places: list[MappedPlace]
     points: list[MapPoint]
     absent: dict[str, str]
 
@@ -124,15 +126,15 @@ def stability(
         absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
     curves = [curve for curve in curves if curve.facts.resolution is not None]
     curves = _matched(curves) if effort.matched else curves
-    places = places_of(scene, axes, effort)
+    asked = places_of(scene, axes, effort)
+    places = [place for place in asked if isinstance(place, Place)]
     measure(scene, places, runner, lambda: tell("the truth", 0))
-    points = [
-        MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places if place.scene is not None
-    ]
+    points = [MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places]
     _search(scene, points, effort, runner, tell)
     refused = _refused(points)
     points = [point for point in points if point.curve.engine not in refused]
-    return StabilityMap(scene, list(axes), effort, places, points, absent | refused)
+    mapped = [MappedPlace(place.axis, place.value, place.parameters, place.problem) for place in asked]
+    return StabilityMap(scene, list(axes), effort, mapped, points, absent | refused)
 
 
 def _refused(points: Sequence[MapPoint]) -> dict[str, str]:
@@ -158,7 +160,7 @@ def _matched(curves: Sequence[Curve]) -> list[Curve]:
 def _ladder(curve: Curve, place: Place) -> list[float]:
     if not curve.fixed_step:
         return list(_TOLERANCES)
-    return [place.period / PER_PERIOD / part for part in _PARTS]
+    return [place.scene.natural_time / PER_PERIOD / part for part in _PARTS]
 
 
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:
@@ -170,7 +172,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
     def ended(point: MapPoint) -> None:
         nonlocal finished
         finished += 1
-        where = f"{point.curve.facts.name}, {point.place.axis.name} = {point.place.value:g}"
+        where = f"{point.curve.facts.name}, {point.place.axis} = {point.place.value:g}"
         tell(f"{where}: {finished} of {len(points)} points", 1)
 
     def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
@@ -193,7 +195,6 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         if result.status == Status.TIMEOUT:  # a faster machine would have seen what came of it
             return _send(point, searching, None)
         dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
-        assert point.place.yardstick is not None  # points have a scene
         return _send(point, searching, judge(result, dataset, point.place.yardstick))
 
     def arrived(case: Case, result: Result) -> list[Case]:

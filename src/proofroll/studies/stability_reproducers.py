@@ -44,7 +44,7 @@ def with_programs(
         wanted, programs([item[-1] for item in wanted], workers), strict=True
     ):
         made, point = found.points[index], study.points[index]
-        element = made.place.scene.elements[0] if made.place.scene is not None else None
+        element = made.place.scene.elements[0]
         if not isinstance(element, WritesPrograms):
             points[index] = replace(point, reproducer_note="elements of this kind offer no program")
             continue
@@ -59,7 +59,6 @@ def with_programs(
 
 def _failed(made: MapPoint, point: BoundaryPoint, case: Case, boundary: str, note: str | None) -> FailedRun:
     yardstick, facts, side = made.place.yardstick, case.engine, point.sides[boundary]
-    assert yardstick is not None  # a point has one
     assert side.failure is not None  # it is shown
     return FailedRun(
         scene=case.scene,

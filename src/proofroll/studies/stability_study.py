@@ -21,7 +21,6 @@ from proofroll.studies.stability_records import (
     BoundaryPoint,
     ExplainedBoundary,
     MapClaims,
-    MappedPlace,
     StabilityStudy,
     dependence,
 )
@@ -81,7 +80,7 @@ def stability_study(found: StabilityMap) -> StabilityStudy:
         points=points,
         explanations=_explanations(points),
         findings=_scale_findings(found, points),
-        places=[MappedPlace(place.axis.name, place.value, place.parameters, place.problem) for place in found.places],
+        places=found.places,
         absent=found.absent,
         hosts=hosts(result for point in found.points for result in point.results.values()),
         effort=found.effort,
@@ -92,7 +91,7 @@ def stability_study(found: StabilityMap) -> StabilityStudy:
 def _point(point: MapPoint) -> BoundaryPoint:
     place, facts = point.place, point.curve.facts
     sides = {name: _side(point, name) for name in BOUNDARIES}
-    if place.yardstick is None or place.yardstick.true is None:
+    if place.yardstick.true is None:
         sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # without truth nobody is right
     # Where nothing breaks on the ladder, what is to be shown is where it stops being right.
     boundary = "stable" if sides["stable"].failure else "accurate"
@@ -105,11 +104,11 @@ def _point(point: MapPoint) -> BoundaryPoint:
         level=point.curve.level,
         caveat=facts.caveat,
         resolution=facts.resolution,
-        axis=place.axis.name,
+        axis=place.axis,
         value=place.value,
         parameters=place.parameters,
         until=place.until,
-        period=place.period,
+        period=place.scene.natural_time,
         largest_stable=sides["stable"].largest,
         largest_accurate=sides["accurate"].largest,
         boundary=boundary,
@@ -131,8 +130,6 @@ def _side(point: MapPoint, name: str) -> Boundary:
     holding, failing = point.found.boundary(attrgetter(name))
     beyond = failure_beyond(point, failing)
     scene, yardstick = point.place.scene, point.place.yardstick
-    assert scene is not None  # points have both
-    assert yardstick is not None
     largest = None if holding is None else point.ladder[holding]
     return Boundary(
         largest=largest,

@@ -24,10 +24,11 @@ from proofroll.report.stability_tables import boundary_table, headline, silent_l
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.axes import Axis, AxisTerm, Effort, chosen, places_of, thinned
+from proofroll.studies.axes import Axis, AxisTerm, Effort, chosen, thinned
 from proofroll.studies.failure import meanings
 from proofroll.studies.stability import _refused, stability
 from proofroll.studies.stability_claims import Claim, file_for
+from proofroll.studies.stability_places import places_of
 from proofroll.studies.stability_records import Boundary, BoundaryPoint, StabilityStudy, dependence
 from proofroll.studies.stability_reproducers import with_programs
 from proofroll.studies.stability_study import stability_study
