@@ -55,9 +55,9 @@ def comparisons() -> dict[str, Comparison]:
 def failures(content: ReportedComparison) -> str:
     """Why rows have no result, a line each."""
     return "".join(
-        f"- {row.name} {row.formulation} {row.setting} failed, {row.reason}.\n"
+        f"- {row.name} {row.formulation} {row.setting} {row.verdict}, {row.reason}.\n"
         for row in content.rows
-        if row.verdict is Verdict.FAILED
+        if row.verdict in {Verdict.REFUSED, Verdict.FAILED}
     )
 
 

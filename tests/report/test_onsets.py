@@ -177,6 +177,7 @@ def test_page_shows_ill_posed_points_without_colour(content: ReportContent, slip
     text = " ".join(parse(html).text.split())
     assert '<span aria-hidden="true">?</span><span class="vh">ill-posed</span>' in html
     assert '<b class="v ill-posed">? ill-posed here</b>' in html
+    assert 'title="refused: needs &lt;b&gt;more&lt;/b&gt;">⊘ refused</b>' in html
     assert MEANINGS["ill-posed"] in text
     assert "? 6, not 2" in text
     assert "✗ 6, not 2" in text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import io
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
-from proofroll.core.verdict import judge
+from proofroll.core.verdict import Verdict, judge
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.comparison_summary import outcome_content
 from proofroll.report.findings import findings
@@ -75,20 +76,44 @@ def printed(content: ReportedComparison, width: int) -> str:
 
 
 def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -> None:
-    """A row that failed at one point says how the other ten ended, on the terminal and in the matrix."""
+    """A row that was refused at one point says how the other ten ended, on the terminal and in the matrix."""
     run = made[0].runs[0]
     points = [{"speed": 3.0 + number} for number in range(11)]
     runs = [dataclasses.replace(answered(run), parameters=point) for point in points]
     runs[3] = dataclasses.replace(runs[3], result=Result(Status.REFUSED, "one coefficient only"), judgements=[])
-    runs[5] = dataclasses.replace(answered(run, 0.05, OTHER), parameters=points[5])
     content = outcome_content(with_runs(made[0], {0: runs}))
     row = content.rows[0]
-    assert row.verdict == "failed"
-    assert verdict_text(row) == "failed 1/11 ✗1 ✓9"
-    assert row.reason == "refused at speed=6: one coefficient only"
-    assert "failed 1/11 ✗1 ✓9" in printed(content, 100)
+    assert row.verdict == "refused"
+    assert verdict_text(row) == "refused 1/11 ✓10"
+    assert row.reason == "at speed=6: one coefficient only"
+    assert "⊘ refused 1/11 ✓10" in printed(content, 100)
     first = next(iter(overview(content, 0).groups.values()))[0]
-    assert (first.verdict_text, first.cells["z"].judgement.verdict) == ("failed 1/11 ✗1 ✓9", "differs")
+    assert (first.verdict_text, first.cells["z"].judgement.verdict) == ("refused 1/11 ✓10", "agrees")
+
+
+def test_a_refusal_hides_no_difference_and_no_failure(made: tuple[Outcome, Store]) -> None:
+    """Of a row the worse is said: what differs or failed at another point; the refusal is counted beside it."""
+    run = made[0].runs[0]
+    refused = dataclasses.replace(run, result=Result(Status.REFUSED, "no"), judgements=[], contradictions=[])
+    off = answered(run, 0.05, OTHER)
+    lost = dataclasses.replace(refused, result=Result(Status.CRASHED, "gone"))
+    for runs, said in (([refused, off], "differs 1/2 ⊘1"), ([refused, lost], "failed 1/2 ⊘1")):
+        assert verdict_text(outcome_content(with_runs(made[0], {0: runs})).rows[0]) == said
+
+
+def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
+    """The answer says that a setting refuses, with no word of failing; nor is it said not to have finished."""
+    run = next(run for run in made[0].runs if run.row.engine == "alpha[formulation=fine,preset=default]")
+    number = made[0].comparison.rows.index(run.row)
+    result = Result(Status.REFUSED, "no wall, no ball")
+    refused = dataclasses.replace(run, result=result, judgements=[], contradictions=[], missing=[])
+    content = outcome_content(with_runs(made[0], {number: [refused]}))
+    found = findings(content, [], None)
+    assert "1 refuses the scene, or some case of it, with the reason" in found.answer
+    assert "did not even finish" not in " ".join(found.sentences)
+    assert "⊘ 1 refused" in counted(content)
+    text = page(report_content([with_runs(made[0], {number: [refused]})], made[1], ""), [[]], {}, None)
+    assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
 
 def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Outcome) -> None:
@@ -177,3 +202,12 @@ def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -
     assert "closest is alpha fine matched" in three_sentences([content], {})[0]
     content.rows[0] = dataclasses.replace(content.rows[0], shared="rests on the same equations")
     assert "closest is alpha fine default" in three_sentences([content], {})[0]
+
+
+def test_every_verdict_is_documented() -> None:
+    """The page about verdicts has a line for each word with its sign; that about JSON names all."""
+    docs = Path(__file__).parents[2] / "docs"
+    page, json = ((docs / f"{name}.md").read_text(encoding="utf-8") for name in ("read_a_verdict", "json"))
+    for verdict in Verdict:
+        assert f"| {SYMBOLS[verdict]} *{verdict}* |" in page
+        assert f"`{verdict}`" in json

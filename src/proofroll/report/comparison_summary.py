@@ -122,6 +122,8 @@ def _why(runs: list[Run]) -> tuple[str, str]:
         return "", limit
     if worst == Verdict.INCOMPLETE:
         return f"agrees, but does not report {', '.join(run.missing)}", limit
+    if worst == Verdict.REFUSED:  # the verdict says the rest
+        return f"{where.strip()}: {run.result.message}" if where else run.result.message, ""
     if judgement is None or worst == Verdict.FAILED:
         return f"{run.result.status}{where}: {run.result.message}", ""
     return f"{judgement.observable}{where}: {judgement.reason}", limit

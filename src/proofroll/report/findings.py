@@ -50,6 +50,7 @@ def _answer(content: ReportedComparison, found: list[Score]) -> str:
         "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
         "another-scene": ("is", "are", "of another kind than the scene, so not judged"),
         "not-judged": ("is", "are", "not judged, for there is no truth, or none exact enough for the tolerance"),
+        "refused": ("refuses", "refuse", "the scene, or some case of it, with the reason"),
         "differs": ("differs", "differ", "somewhere, with no limit of small steps shown to be the truth"),
         "failed": ("gives", "give", "no result somewhere"),
     }
@@ -104,7 +105,8 @@ def _obvious(content: ReportedComparison, found: list[Score]) -> str:
             continue
         best = min(others, key=lambda other: other.motion or 0.0)
         if score.motion is None:
-            lost.append(score.name)
+            if row.verdict != "refused":
+                lost.append(score.name)
         elif best.motion and (worst is None or score.motion / best.motion > worst[0]):
             worst = (score.motion / best.motion, score, best)
     failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.number_text import number
 from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import name_of, step
-from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, REFUSED, TOO_SLOW
+from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,7 +21,15 @@ if TYPE_CHECKING:
     from proofroll.studies.stability_records import BoundaryPoint, StabilityStudy
 
 # Letters for what is beyond the boundary of any scene; with "!" where the engine was silent.
-_LETTERS = {DIVERGED: "d", LOST_PHASE: "p", GAVE_UP: "g", CRASHED: "x", TOO_SLOW: "t", REFUSED: "r"}
+_LETTERS = {
+    DIVERGED: "d",
+    LOST_PHASE: "p",
+    GAVE_UP: "g",
+    CRASHED: "x",
+    TOO_SLOW: "t",
+    REFUSED: "r",
+    WRONG_MODEL: "m",
+}
 # Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
@@ -159,7 +167,7 @@ def heat_map(study: StabilityStudy) -> HeatMap:
 
 def told(point: BoundaryPoint) -> str:
     """Who was told of a failure: nobody, or before the run, or the engine said so."""
-    if point.failure == "refused":
+    if point.failure in NOT_RUN:
         return "before the run"
     return "silent" if point.silent else "says so"
 

@@ -41,6 +41,8 @@ def headline(study: StabilityStudy) -> str:
         said += f" Beyond: {counts}."
     if study.refused:
         said += f" {study.refused} points were refused before the run."
+    if study.wrong_model:
+        said += f" {study.wrong_model} were not run, for what the engine built is not the scene."
     if study.never_accurate:
         said += f" At {study.never_accurate} points no step or tolerance that was affordable holds 1 %."
     return " ".join([said, *told_hosts(study.hosts)])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
-_STYLES = {
+STYLES = {
     "agrees": "green",
     "unconfirmed": "yellow",
     "incomplete": "yellow",
@@ -33,6 +33,7 @@ _STYLES = {
     "ill-posed": "cyan",
     "not-judged": "cyan",
     "another-scene": "cyan",
+    "refused": "magenta",
     "differs": "red",
     "failed": "bold red",
 }
@@ -71,7 +72,7 @@ def verdict_table(content: ReportedComparison) -> Table:
         table.add_row(
             Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
             step(row.resolution, row.resolution_value),
-            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=_STYLES[verdict]),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=STYLES[verdict]),
             *(number(judged[name].error if name in judged else None) for name, _ in names),
             number(worst.order if worst else None),
             number(row.seconds_per_second),

@@ -9,7 +9,9 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_text import error
+from proofroll.report.labels import SYMBOLS
 from proofroll.report.screen import numeric, plain_table, unbroken
+from proofroll.report.terminal import STYLES
 from proofroll.robots.records import GalleryContent, HeldLayer, ImporterRow, RobotCheck
 
 WIDTH = 80
@@ -24,8 +26,8 @@ SHORT = {
     "inverse dynamics": "inv",
     "forward dynamics": "fwd",
 }
-_MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": "–", "missing": " "}
-_COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": "magenta"}
+_MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": SYMBOLS["refused"], "missing": " "}
+_COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": STYLES["refused"]}
 
 
 def check_parts(content: RobotCheck) -> Iterator[Table | str]:

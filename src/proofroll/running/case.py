@@ -23,7 +23,8 @@ class Status(StrEnum):
 
     DONE = "done"
     DIVERGED = "diverged"
-    REFUSED = "refused"
+    REFUSED = "refused"  # the engine says that it cannot represent the scene
+    WRONG_MODEL = "wrong model"  # what the engine built is not the scene, so it was not run (certificate)
     ANOTHER_SCENE = "another scene"  # it ran, but what it ran is not this scene (KnowsAnotherScene)
     NO_TRUTH = "no truth"  # it ran, but there is no truth to hold it against
     MISSING = "missing"
@@ -31,8 +32,8 @@ class Status(StrEnum):
     TIMEOUT = "timeout"
 
 
-# A crash, a hang or a missing engine may be gone next time; these three are the engine's answer and stay.
-LASTING = frozenset({Status.DONE, Status.DIVERGED, Status.REFUSED})
+# A crash, a hang or a missing engine may be gone next time; these are the engine's answer and stay.
+LASTING = frozenset({Status.DONE, Status.DIVERGED, Status.REFUSED, Status.WRONG_MODEL})
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         spent.on("certificate")
         lines = [line.as_dict() for line in found]
         if difference is not None:
-            return Result(Status.REFUSED, difference, certificate=lines, versions=versions)
+            return Result(Status.WRONG_MODEL, difference, certificate=lines, versions=versions)
         recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine

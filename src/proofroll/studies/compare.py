@@ -39,7 +39,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:
-            judged.append(_failed(run, result))
+            judged.append(_without_result(run, result))
             continue
         name = point_name(run.parameters)
         truth = results[planned.truths[name].key]
@@ -105,20 +105,25 @@ def _absent(run: Planned) -> Run:
     return _run(run, Result(status, str(run.facts)))
 
 
-def _failed(run: Planned, result: Result) -> Run:
-    expected = Verdict.FAILED in run.row.expected(run.parameters)
-    sentence = f"{run.row.engine}{at_point(run.parameters)} {result.status}: {result.message}"
+def _without_result(run: Planned, result: Result) -> Run:
+    """A row that was refused, or failed."""
     case = run.ladder[1.0]
     causes = diagnosed(load_scene(case.scene, **run.parameters), result.certificate, step=case.engine.step)
-    return _run(run, result, contradictions=[] if expected else [sentence], diagnosis=causes)
+    found = _run(run, result, diagnosis=causes)
+    expected = run.row.expected(run.parameters)
+    if found.verdict in expected:
+        return found
+    where = f"{run.row.engine}{at_point(run.parameters)}"
+    said = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"
+    return replace(found, contradictions=[said])
 
 
 def _without_truth(run: Planned, result: Result, truth: Result) -> Run:
     """A row at a point where the truth refuses, which says nothing about the engine; or where it was lost."""
-    refused = truth.status in LASTING
-    status = Status.NO_TRUTH if refused else truth.status
+    lasts = truth.status in LASTING
+    status = Status.NO_TRUTH if lasts else truth.status
     result = replace(result, status=status, message=f"there is no truth here: {truth.message}")
-    return _run(run, result) if refused else _failed(run, result)
+    return _run(run, result) if lasts else _without_result(run, result)
 
 
 def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:

@@ -28,15 +28,18 @@ ACCURATE = 0.01
 WRONG = 1.0
 
 DIVERGED, GAVE_UP, CRASHED = "diverged", "solver gave up", "crashed"
-LOST_PHASE, TOO_SLOW, REFUSED = "lost phase", "too slow", "refused"
+LOST_PHASE, TOO_SLOW, REFUSED, WRONG_MODEL = "lost phase", "too slow", "refused", "wrong model"
 MEANINGS = {
     DIVERGED: "the state became NaN or overflowed",
     LOST_PHASE: "bounded, with no other sign of failure, but wrong",
     GAVE_UP: "the engine stopped and said why",
     CRASHED: "the engine's process ended",
     TOO_SLOW: "no result within the time that the map allows",
-    REFUSED: "the engine, or the check of what it built, refused before the run",
+    REFUSED: "the engine said before the run that it cannot represent the scene",
+    WRONG_MODEL: "what the engine built is not the scene, so it was not run",
 }
+# Who was not run has passed no boundary.
+NOT_RUN = frozenset({REFUSED, WRONG_MODEL})
 
 
 def meanings(scene: Scene) -> Mapping[str, str]:
@@ -100,7 +103,12 @@ class Yardstick:
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
     """What a run gave: how it ended, and its trajectory as far as it went, held against the yardstick of its place."""
-    early = {Status.CRASHED: CRASHED, Status.TIMEOUT: TOO_SLOW, Status.REFUSED: REFUSED}
+    early = {
+        Status.CRASHED: CRASHED,
+        Status.TIMEOUT: TOO_SLOW,
+        Status.REFUSED: REFUSED,
+        Status.WRONG_MODEL: WRONG_MODEL,
+    }
     if result.status in early or dataset is None:
         return _failed(early.get(result.status, GAVE_UP), result, None, None)
     errors = _errors(dataset, yardstick)

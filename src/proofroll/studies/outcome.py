@@ -13,8 +13,13 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 SEVERITY = list(Verdict)
 
 
-# What a run is called that came to its end and cannot be judged; any other without a judgement failed.
-_UNJUDGED = {Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE, Status.NO_TRUTH: Verdict.NOT_JUDGED}
+# What a run is called that was honestly not made, or came to its end and cannot be judged; any other that is not done
+# failed.
+_UNJUDGED = {
+    Status.REFUSED: Verdict.REFUSED,
+    Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE,
+    Status.NO_TRUTH: Verdict.NOT_JUDGED,
+}
 
 
 def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:

@@ -142,7 +142,8 @@ class StabilityStudy:
         runs: how many there were.
         boundaries: how many points have a failure beyond them.
         silent: how many of these the engine did not report.
-        refused: points that were refused before the run.
+        refused: points that the engine refused before the run.
+        wrong_model: points that were not run, for what the engine built is not the scene.
         failures: kind of failure -> how many points.
         never_accurate: points at which nothing affordable holds.
         meanings: kind of failure -> what it is.
@@ -166,6 +167,7 @@ class StabilityStudy:
     boundaries: int
     silent: int
     refused: int
+    wrong_model: int
     failures: dict[str, int]
     never_accurate: int
     meanings: dict[str, str]

@@ -12,13 +12,14 @@ from proofroll.running.asking import programs
 from proofroll.running.case import Case
 from proofroll.running.store import write_text
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG
+from proofroll.studies.failure import ACCURATE, REFUSED, TOO_SLOW, WRONG, WRONG_MODEL
 from proofroll.studies.stability import MapPoint, StabilityMap
 from proofroll.studies.stability_records import BOUNDARIES, BoundaryPoint, StabilityStudy
 
 # A run that did not begin, and one that nobody waited for, show nothing.
 _NOTHING_TO_SHOW = {
     REFUSED: "the run was refused before it began",
+    WRONG_MODEL: "what was built is not the scene, so it was not run",
     TOO_SLOW: "the run was only too slow for the map",
 }
 

@@ -12,7 +12,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.running.case import hosts
 from proofroll.running.runner import Runner
 from proofroll.studies.axes import Axis, Effort
-from proofroll.studies.failure import ACCURATE, REFUSED, meanings
+from proofroll.studies.failure import ACCURATE, NOT_RUN, REFUSED, WRONG_MODEL, meanings
 from proofroll.studies.stability import MapPoint, Progress, StabilityMap, failure_beyond, stability, stability_path
 from proofroll.studies.stability_claims import StabilityFile
 from proofroll.studies.stability_records import (
@@ -62,8 +62,7 @@ def stability_study(found: StabilityMap) -> StabilityStudy:
     """Everything, with counts on top."""
     points = [_point(point) for point in found.points]
     scene = load_scene(found.scene)
-    # Who refuses before the run, or is refused by the certificate, has passed no boundary.
-    failing = [point for point in points if point.failure and point.failure != REFUSED]
+    failing = [point for point in points if point.failure and point.failure not in NOT_RUN]
     return StabilityStudy(
         scene=found.scene,
         axes=found.axes,
@@ -73,6 +72,7 @@ def stability_study(found: StabilityMap) -> StabilityStudy:
         boundaries=len(failing),
         silent=sum(point.silent for point in failing),
         refused=sum(point.failure == REFUSED for point in points),
+        wrong_model=sum(point.failure == WRONG_MODEL for point in points),
         failures=dict(Counter(point.failure for point in failing if point.failure)),
         never_accurate=sum(point.largest_accurate is None and not point.problem for point in points),
         meanings=dict(meanings(scene)),

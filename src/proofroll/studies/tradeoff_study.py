@@ -203,9 +203,11 @@ def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     done = [point for point in found.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
     refused = sum(point.result.status == Status.REFUSED for point in found.points)
-    ended = len(found.points) - len(done) - refused
+    wrong = sum(point.result.status == Status.WRONG_MODEL for point in found.points)
+    ended = len(found.points) - len(done) - refused - wrong
+    built = f"{wrong} of a wrong model, " if wrong else ""
     said.append(
-        f"{len(found.points)} runs: {refused} refused, {ended} that did not reach the end, all with a reason; "
+        f"{len(found.points)} runs: {refused} refused, {built}{ended} that did not reach the end, all with a reason; "
         f"{len(broken)} that reached it silently with {quantity} off by more than {number(BROKEN * scale)} {unit}."
     )
     return said

@@ -307,5 +307,5 @@ def test_verdicts_are_ordered_from_best_to_worst() -> None:
     """Summaries take the worst verdict by this order."""
     assert list(Verdict) == [
         "agrees", "unconfirmed", "incomplete", "converges", "ill-posed", "not-judged", "another-scene",
-        "differs", "failed",
+        "refused", "differs", "failed",
     ]  # fmt: skip

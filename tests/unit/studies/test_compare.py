@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from hostile import ENTRY_POINTS
 
+from proofroll.cli.comparing import exit_code
 from proofroll.core.certificate import Line
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
@@ -255,9 +256,28 @@ def test_an_exception_may_expect_a_failure(tmp_path: Path) -> None:
 
     row = dataclasses.replace(ROW, except_at=[ExceptAt({"speed": [4.0]}, [Verdict.FAILED])])
     outcome = judged(tmp_path, claim([row], [3.0, 4.0]), crash)
-    assert outcome.contradictions == ["alpha at speed=3 crashed: no licence"]
+    assert outcome.contradictions == ["alpha at speed=3 crashed, expected: agrees (no licence)"]
     assert [run.parameters for run in outcome.lost] == [{"speed": 3.0}]
     assert [run.verdict for run in outcome.runs] == [Verdict.FAILED] * 2
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"), [(Status.REFUSED, Verdict.REFUSED), (Status.WRONG_MODEL, Verdict.FAILED)]
+)
+def test_a_refusal_is_no_failure(tmp_path: Path, status: Status, verdict: Verdict) -> None:
+    """An engine that refuses has not failed, one that built something else has; either contradicts what it is not."""
+
+    def answer(*_: object) -> Result:
+        return Result(status, "one coefficient only")
+
+    for expected in (Verdict.AGREES, Verdict.REFUSED, Verdict.FAILED):
+        row = dataclasses.replace(ROW, expect=[expected])
+        outcome = judged(tmp_path / expected, claim([row], [4.0]), answer)
+        assert [run.verdict for run in outcome.runs] == [verdict]
+        said = f"alpha at speed=4 {status}, expected: {expected} (one coefficient only)"
+        assert outcome.contradictions == ([] if expected is verdict else [said])
+        assert outcome.lost == []
+        assert exit_code([outcome]) == (0 if expected is verdict else 1)
 
 
 def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
@@ -359,4 +379,4 @@ def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status) -> None
     assert len(outcome.contradictions) == 2
     for said in outcome.contradictions:
         assert "at speed=4" in said
-        assert said.endswith("there is no truth here: the ball is back on the wall")
+        assert said.endswith("expected: agrees (there is no truth here: the ball is back on the wall)")

@@ -85,6 +85,7 @@ def test_what_came_first() -> None:
         (Status.CRASHED, "was killed by SIGSEGV", "crashed", False),
         (Status.TIMEOUT, "no result within 8 s", "too slow", False),
         (Status.REFUSED, "needs rolling resistance", "refused", False),
+        (Status.WRONG_MODEL, "the engine's model differs from the scene", "wrong model", False),
     ],
 )
 def test_runs_that_ended_early(status: Status, message: str, failure: str, silent: bool) -> None:

@@ -32,6 +32,7 @@ def onset(
     """Say when the ball first slips, in every engine, and how well that is posed."""
     from proofroll.core.time_grid import time_grid
     from proofroll.elements.ball_on_surface.onset_study import onset_study, summary
+    from proofroll.running.case import Status
 
     time_grid(until, 0.01)
     with options.progress_bar("runs") as advance:
@@ -46,8 +47,9 @@ def onset(
         )
     options.show(found, as_json, lambda: [summary(found), _onset_table(found)])
     verdicts = {item.verdict for item in found.engines}
-    # A refusal is an answer where nobody asked for that engine in particular.
-    if "failed" in verdicts or (engine and "refused" in verdicts):
+    # Where nobody asked for that engine in particular it is an answer that it cannot, or that it builds something else.
+    answers = set() if engine else {Status.REFUSED, Status.WRONG_MODEL}
+    if any(item.verdict in {"failed", "refused"} and item.status not in answers for item in found.engines):
         raise typer.Exit(options.ENGINE)
     raise typer.Exit(options.CONTRADICTED if "disagree" in verdicts else options.OK)
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 # Events that the table shows; the page says how many more there are.
 SHOWN = 4
 # How the page paints a verdict on the onset, and the sign that goes with it: as the verdict of the same meaning.
-PAINTED = {"agree": "agrees", "disagree": "differs", "ill-posed": "ill-posed", "refused": "failed", "failed": "failed"}
+PAINTED = {"agree": "agrees", "disagree": "differs", "ill-posed": "ill-posed", "refused": "refused", "failed": "failed"}
 
 
 @dataclass(frozen=True)
