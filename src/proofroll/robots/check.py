@@ -67,7 +67,7 @@ def check(
         folder = Path(name)
         written = reading.write(file, folder)
         robot, compiler = meaning(file, written, time_limit, lent)
-        by = f"the model that {compiler} compiles" if compiler else "our own reading of the file"
+        by = f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
         if not robot.moving:
             raise InputError("file", str(path), "nothing in it moves" + _fixed_hint(file))
         sampled = random_states(robot, states, seed)
@@ -90,7 +90,8 @@ def check(
             except WorkerDied as error:
                 return ImporterRow(engine=str(spec), status=str(error.status), refused=str(error))
             found = judged(file, truth, bar, spec, answer, lent)
-            if _is_another_version(spec, answer.version, compiler):
+            # It defines the format, and its meaning here is that of another version of it.
+            if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
                 found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))
             return found
 
@@ -112,12 +113,6 @@ def check(
         engines=rows,
         robot=_drawn(truth),
     )
-
-
-def _is_another_version(spec: EngineSpec, version: str, compiler: str) -> bool:
-    """Whether the engine defines the format, and its meaning here is that of another version of it."""
-    engine, _, compiled_by = compiler.partition(" ")
-    return plain_name(spec.name) == engine and version != compiled_by
 
 
 def _fixed_hint(file: RobotFile) -> str:

@@ -100,8 +100,10 @@ def _offending(truth: RobotTruth, held: Reading) -> list[str]:
     return found
 
 
-def meaning(file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None) -> tuple[Robot, str]:
-    """The robot that a file means, and the engine here that defines the format, with its version; empty: we read it.
+def meaning(
+    file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
+) -> tuple[Robot, reading.Compiler | None]:
+    """The robot that a file means, and the engine here that defines the format; None: we read it.
 
     An engine that defines the format is asked for no longer than ``time_limit`` [s], of the file as engines get it.
 
@@ -109,7 +111,7 @@ def meaning(file: RobotFile, written: Path, time_limit: float, workers: Workers 
         InputError: it has no meaning.
     """
     if file.kind == "urdf":
-        return read_urdf(file), ""
+        return read_urdf(file), None
     asked = _defines.get(file.kind, file.kind)
     with lent_workers(workers) as lent:
         try:
@@ -117,8 +119,8 @@ def meaning(file: RobotFile, written: Path, time_limit: float, workers: Workers 
                 robot, by = reading.compiled(worker, file, written, time_limit)
         except WorkerDied as error:
             raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
-        _defines[file.kind] = by.partition(" ")[0]
-        lent.rename(asked, _defines[file.kind])  # which it has loaded, and is asked next what it holds
+        _defines[file.kind] = by.engine
+        lent.rename(asked, by.engine)  # which it has loaded, and is asked next what it holds
     return robot.change(name=file.root.get("model", "robot")), by
 
 

@@ -7,7 +7,7 @@ import dataclasses
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -68,6 +68,13 @@ class ReaderAnswer:
     tolerances: dict[str, float]
     reading: Reading | None
     refused: str
+
+
+class Compiler(NamedTuple):
+    """An engine that defines a format, and compiled a file of it, with its version."""
+
+    engine: str
+    version: str
 
 
 def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit: float) -> ReaderAnswer:
@@ -133,16 +140,16 @@ def compile_robot(path: str) -> dict[str, Any]:
         except Missing:
             continue
         if getattr(reader, "defines", None) == "mjcf":
-            by = f"{name} {reader.version()}"
+            by = Compiler(name, reader.version())
             try:
                 return {"robot": plain(reader.compiled(Path(path))), "by": by}
             except Exception as error:
-                return {"robot": None, "by": by, "message": one_line(error)}
+                return {"robot": None, "message": f"{' '.join(by)} says: {one_line(error)}"}
     lacking = "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"
-    return {"robot": None, "by": "", "message": lacking}
+    return {"robot": None, "message": lacking}
 
 
-def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, str]:
+def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
     """The robot that an MJCF means, and by whom it was compiled.
 
     Raises:
@@ -151,8 +158,8 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
     """
     told = worker.request(_call(compile_robot, path=str(written)), time_limit)
     if told["robot"] is None:
-        raise InputError("file", str(file.path), f"it has no meaning: {told['by']} says: {told['message']}")
-    return robot_from(told["robot"]), told["by"]
+        raise InputError("file", str(file.path), f"it has no meaning: {told['message']}")
+    return robot_from(told["robot"]), Compiler(*told["by"])
 
 
 def write(file: RobotFile, folder: Path) -> Path:
