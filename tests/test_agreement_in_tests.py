@@ -135,6 +135,7 @@ def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
         ({"q.pivot": [0.0]}, "it has no time"),
         ({"time": [0.0, 0.1], "q.pivot": [0.0]}, "one row for each of the 2 times"),
         ({"time": [0.1, 0.0], "q.pivot": [0.0, 0.0]}, "rise from 0"),
+        ({"time": [0.0], "q.pivot": [2.8]}, "it has only the start"),
         ({"time": [0.0, 0.1], "angle": [0.0, 0.0]}, "the truth has none of these; it has .*q.pivot"),
         ("nowhere.nc", "there is no such file"),
         (STILL | {"p_WB": np.zeros((2, 2))}, "p_WB .*: these are no states of pendulum"),
@@ -145,6 +146,50 @@ def test_a_trajectory_that_is_none(run: Any, words: str) -> None:
     """What cannot be judged is told in one line, with what is missing."""
     with pytest.raises(InputError, match=words):
         proofroll.judge(run, "pendulum")
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "words"),
+    [
+        ("q.pivot", "degrees", "'q.pivot in degrees': convert q.pivot to rad"),
+        ("time", "ms", "'time in ms': convert time to s"),
+        ("p_WB", "mm", "'p_WB in mm': convert p_WB to m,"),
+        ("q.pivot", "radians", ""),
+    ],
+)
+def test_units_are_those_of_the_truth(name: str, unit: str, words: str) -> None:
+    """A variable that says another unit is refused in one line, of the state too; a unit in words is the same."""
+    import xarray as xr
+
+    arrays = swing() if name != "p_WB" else STILL
+    dims = {key: ("time", *(f"{key}_{axis}" for axis in range(1, np.ndim(values)))) for key, values in arrays.items()}
+    given = {key: xr.DataArray(values, dims=dims[key]) for key, values in arrays.items()}
+    given[name].attrs["units"] = unit
+    whole = xr.Dataset({key: item for key, item in given.items() if key != "time"}, {"time": given["time"]})
+    for run in (given, whole):
+        if not words:
+            assert proofroll.judge(run, "pendulum", "1e-6 rad").agrees
+            continue
+        with pytest.raises(InputError, match=words) as caught:
+            proofroll.judge(run, "pendulum")
+        assert "\n" not in str(caught.value)
+
+
+def test_what_is_not_judged_is_named() -> None:
+    """What the truth does not have, what has no tolerance, and what the state says already, each with its reason."""
+    own = swing()
+    given = own | {"q.pviot": own["q.pivot"], "v.pivot": np.gradient(own["q.pivot"], own["time"])}
+    found = proofroll.judge(given, "pendulum", {"q.pivot": "1e-6 rad"})
+    assert found.agrees
+    assert str(found).splitlines()[2:] == [
+        "  not judged: q.pviot; the truth has nothing of that name",
+        "  not judged: v.pivot; no tolerance is given for it",
+    ]
+    assert not proofroll.judge(own, "pendulum", {"q.pivot": "1e-6 rad"}).unjudged
+    run = proofroll.simulate("pendulum", "projection", until=0.1)
+    assert not proofroll.judge(run, "pendulum").unjudged
+    state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB", "energy")}
+    assert proofroll.judge(state, "pendulum").unjudged == {"energy": "it is taken from the state"}
 
 
 def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -212,3 +212,14 @@ def test_replay_and_judge(command_line: Proofroll, springs: Path) -> None:
     code, _, err = command_line("replay", "run.nc")
     assert code == 2
     assert "nothing that is installed draws the scene A mass on a spring" in err
+
+
+def test_cite(command_line: Proofroll, springs: Path) -> None:
+    """The truths that cover the scene are cited, and those of other kinds only where no scene is named."""
+    names = {}
+    for subject in (str(springs), "pendulum", "sprung"):
+        code, out, err = command_line("cite", subject, "--json")
+        assert code == 0, err
+        names[subject] = [len(item["references"]) for item in json.loads(out)["cited"] if item["kind"] == "truth"]
+    assert names[str(springs)] == [0]
+    assert names["pendulum"] == names["sprung"] != [0]

@@ -18,13 +18,13 @@ import proofroll
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
+from proofroll.core.truth import TRUTHS, load_truths
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.scene_file import is_scene, read_scene_file, scene_folder
+from proofroll.files.scene_file import is_scene, load_scene, read_scene_file, scene_folder
 from proofroll.files.toml import named_file
 from proofroll.files.trajectory_file import NETCDF, STORED, read
 
 FILE = "references.bib"
-TRUTHS = "proofroll.truths"
 _ENTRY = re.compile(r"^@(\w+)\{\s*([^\s,]+)\s*,\n(.*?)^\}", flags=re.DOTALL | re.MULTILINE)
 _FIELD = re.compile(r"^\s*(\w+)\s*=\s*\{(.*)\},?\s*$", flags=re.MULTILINE)
 
@@ -59,7 +59,7 @@ _Named = tuple[str, str, str]
 
 
 def cited(subjects: Iterable[str]) -> list[Cited]:
-    """What is behind results, comparisons, scenes or engines; without any, proofroll and its truths alone.
+    """What is behind results, comparisons, scenes or engines; without a scene all truths are cited.
 
     Args:
         subjects: files of results (``.json`` of a command, ``.nc`` or ``.npz`` of a run), comparisons, scenes, names of
@@ -79,10 +79,15 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
             versions.append(version)
     told = [
         Cited("suite", "proofroll", [proofroll.__version__], references=entries(Path(proofroll.__file__).parent)),
-        Cited("truth", "by two routes", references=_beside(TRUTHS)),
+        Cited("truth", "by two routes", references=_beside(_truths_of(scenes))),
     ]
     told += [
-        Cited("engine", name, versions, references=_beside(GROUP, name))
+        Cited(
+            "engine",
+            name,
+            versions,
+            references=_beside(point.module for point in announced(GROUP) if point.name == name),
+        )
         for name, versions in engines.items()
         if name != "truth"
     ]
@@ -150,9 +155,20 @@ def _scene(name: str) -> Cited:
     return Cited("scene", name, source=read_scene_file(name).source, references=entries(folder))
 
 
-def _beside(group: str, name: str = "") -> list[str]:
-    """Entries beside the modules that entry points name; the modules are not imported, for an engine may be absent."""
-    folders = [_folder(point.module) for point in announced(group) if not name or point.name == name]
+def _truths_of(scenes: Iterable[str]) -> list[str]:
+    """The modules of the truths that cover these scenes; of all truths where there is no scene."""
+    announcements = announced(TRUTHS)
+    elements = [element for name in scenes for element in load_scene(name).elements]
+    if not elements:
+        return [point.module for point in announcements]
+    truths = list(zip(announcements, load_truths(), strict=True))
+    used = (next((point.module for point, truth in truths if truth.covers(one)), None) for one in elements)
+    return [module for module in dict.fromkeys(used) if module is not None]
+
+
+def _beside(modules: Iterable[str]) -> list[str]:
+    """Entries beside modules; these are not imported, for an engine may be absent."""
+    folders = map(_folder, modules)
     return list(dict.fromkeys(entry for folder in folders if folder for entry in entries(folder)))
 
 

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Tolerance
-from proofroll.core.dataset import from_samples
-from proofroll.core.errors import Diverged, InputError, require_known
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Doubt, Judgement, Verdict
 from proofroll.core.verdict import judge as judge_curve
 from proofroll.files.scene_file import load_scene
+from proofroll.studies.given_run import GivenRun, Run, read_run
 from proofroll.studies.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Run = Any
-"""An ``xarray.Dataset``, the path of a netCDF file, or arrays by name, ``time`` [s] among them."""
-_STATE = ("p_WB", "v_WB", "w_WB")
 _USUAL = Tolerance(0.01, True)
 _MOST_TRUTHS = 64
 _truths: dict[tuple[str, bytes], xr.Dataset] = {}
@@ -71,11 +67,13 @@ class Judged:
         scene: its name.
         compared: each quantity that was judged, the farthest from its tolerance first.
         because: why the tolerances are what they are; empty if nobody says.
+        unjudged: variables that were given and are not judged -> why.
     """
 
     scene: str
     compared: tuple[Compared, ...]
     because: str = ""
+    unjudged: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def agrees(self) -> bool:
@@ -83,10 +81,13 @@ class Judged:
         return all(item.agrees for item in self.compared)
 
     def __str__(self) -> str:
-        """One line, and one for each quantity."""
+        """One line, one for each quantity, and one for each reason why something that was given is not judged."""
         why = f" (tolerance: {self.because})" if self.because else ""
         head = f"{'agrees with' if self.agrees else 'differs from'} the truth of {self.scene}{why}"
-        return "\n".join([head, *(f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared)])
+        lines = [f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared]
+        for why in dict.fromkeys(self.unjudged.values()):
+            lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
+        return "\n".join([head, *lines])
 
     def content(self) -> dict[str, Any]:
         """As plain data."""
@@ -96,7 +97,8 @@ class Judged:
             | {"at": item.at, "verdict": item.judgement.verdict.value}
             for item in self.compared
         ]
-        return {"scene": self.scene, "agrees": self.agrees, "because": self.because, "compared": rows}
+        said = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
+        return said | {"compared": rows, "unjudged": dict(self.unjudged)}
 
 
 def judge(
@@ -107,7 +109,8 @@ def judge(
     Args:
         run: from :func:`proofroll.simulate`, the path of a netCDF file, or arrays by name: ``time`` [s], and the state
             (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for each time; for
-            mechanisms ``q_WB``), or variables that the truth has, as ``q.hinge``, ``tip.x``, ``positions``, ``z``.
+            mechanisms ``q_WB``), or variables that the truth has, as ``q.hinge``, ``tip.x``, ``positions``, ``z``; in
+            the truth's units.
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
             one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity.
@@ -118,8 +121,10 @@ def judge(
         Refused, Diverged: there is no truth of this scene.
     """
     scene = load_scene(scene) if isinstance(scene, str) else scene
-    dataset = _dataset(run, scene)
+    given = read_run(run, scene)
+    dataset = given.dataset
     reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy()))
+    given.require_units(reference.dataset)
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
@@ -127,69 +132,18 @@ def judge(
     bounds = _bounds(tolerance, reference, observed, [str(name) for name in dataset.data_vars])
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
-    return Judged(scene.name, tuple(compared), because)
+    return Judged(scene.name, tuple(compared), because, _unjudged(given, reference, bounds))
 
 
-def _dataset(run: Run, scene: Scene) -> xr.Dataset:
-    """The trajectory as a dataset with ``time``; everything that follows from the state, where that is given."""
-    import xarray as xr
-
-    if isinstance(run, str | Path):
-        from proofroll.files.trajectory_file import read
-
-        try:
-            run = read(Path(run))
-        except FileNotFoundError:
-            raise InputError("run", str(run), "there is no such file") from None
-        except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
-            advice = f"it cannot be read ({error}); xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
-            raise InputError("run", str(run), advice) from None
-    given = {str(name): np.asarray(run[name]) for name in run} if not isinstance(run, xr.Dataset) else None
-    if given is not None:
-        if "time" not in given:
-            raise InputError("run", ", ".join(given), "it has no time; add the times in s as time")
-        dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
-        _check_lengths(given)
-        run = xr.Dataset(
-            {name: (dims[name], v) for name, v in given.items() if name != "time"}, {"time": given["time"]}
-        )
-    elif "time" not in run.variables:
-        raise InputError("run", ", ".join(map(str, run.variables)), "it has no time; add the times in s as time")
-    made_of = run.attrs.get("scene_digest")
-    if made_of is not None and made_of != scene.digest:
-        made = str(run.attrs.get("scene"))
-        numbers = made == scene.name
-        advice = f"it is a run of {made}" + (" with other numbers; give those parameters here too" if numbers else "")
-        raise InputError("scene", scene.name, advice)
-    times = run["time"].to_numpy()
-    number = np.issubdtype(times.dtype, np.number)
-    if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
-        raise InputError("run", "time", "give times in s that rise from 0 or later")
-    return run if made_of is not None else _completed(run, scene, times)
-
-
-def _check_lengths(given: Mapping[str, Any]) -> None:
-    count = np.shape(given["time"])[0] if np.ndim(given["time"]) == 1 else 0
-    for name, values in given.items():
-        if np.ndim(values) == 0 or len(values) != count:
-            raise InputError(
-                "run", name, f"its shape is {np.shape(values)}; give one row for each of the {count} times"
-            )
-
-
-def _completed(run: xr.Dataset, scene: Scene, times: FloatArray) -> xr.Dataset:
-    """With all that follows from the state, if that is given; a scene of several elements is judged by variables."""
-    if not all(name in run for name in _STATE) or len(scene.elements) > 1 or times[0] > 0:
-        return run
-    sample_type = scene.elements[0].sample_type
-    names = [field.name for field in fields(sample_type) if field.name in run]
-    arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
-    samples = [sample_type(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
-    try:
-        return from_samples(scene, times, samples)
-    except (ValueError, TypeError, Diverged) as error:
-        shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
-        raise InputError("run", shapes, f"these are no states of {scene.name} ({error})") from None
+def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
+    """What somebody gave besides -> why it is not judged."""
+    found = {}
+    for name, why in given.besides.items():
+        if not _comparable(reference, name):
+            found[name] = "the truth has nothing of that name"
+        elif why or name not in judged:
+            found[name] = why or "no tolerance is given for it"
+    return found
 
 
 def _truth(scene: Scene, times: FloatArray) -> xr.Dataset:

@@ -1,0 +1,142 @@
+"""A trajectory from anywhere, read as a dataset with ``time`` and what can be held against the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import from_samples
+from proofroll.core.errors import Diverged, InputError
+from proofroll.core.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Run = Any
+"""An ``xarray.Dataset``, the path of a netCDF file, or arrays by name, ``time`` [s] among them."""
+_STATE = ("p_WB", "v_WB", "w_WB")
+# Other ways to write a unit of the truth, as in files of other programs.
+_SPELT = {
+    "sec": "s", "second": "s", "seconds": "s", "radian": "rad", "radians": "rad", "m s-1": "m/s", "rad s-1": "rad/s",
+    "meter": "m", "meters": "m", "metre": "m", "metres": "m",
+}  # fmt: skip
+FROM_STATE = "it is taken from the state"
+
+
+@dataclass(frozen=True)
+class GivenRun:
+    """What somebody gave.
+
+    Attributes:
+        dataset: with ``time``, and with all that follows from the state where that is given.
+        units: of the variables that say theirs.
+        besides: variables that are none of the state, with why they are not judged where that is known already; none
+            of a run of proofroll's own.
+    """
+
+    dataset: xr.Dataset
+    units: Mapping[str, str]
+    besides: Mapping[str, str | None]
+
+    def require_units(self, truth: xr.Dataset) -> None:
+        """Every variable that the truth has too is in the truth's unit, if it says its own.
+
+        Raises:
+            InputError: one is not.
+        """
+        for name, unit in self.units.items():
+            if name in truth.data_vars:
+                _require_unit(name, unit, str(truth[name].attrs["units"]))
+
+
+def _require_unit(name: str, unit: str, wanted: str) -> None:
+    if _SPELT.get(unit, unit) != wanted:
+        advice = f"convert {name} to {wanted}, the unit of the truth, or correct its attribute units"
+        raise InputError("run", f"{name} in {unit}", advice)
+
+
+def read_run(run: Run, scene: Scene) -> GivenRun:
+    """Reads a trajectory.
+
+    Raises:
+        InputError: it is none, or of another scene.
+    """
+    dataset = _dataset(run)
+    made_of = dataset.attrs.get("scene_digest")
+    if made_of is not None and made_of != scene.digest:
+        made = str(dataset.attrs.get("scene"))
+        numbers = made == scene.name
+        advice = f"it is a run of {made}" + (" with other numbers; give those parameters here too" if numbers else "")
+        raise InputError("scene", scene.name, advice)
+    units = {str(k): str(v.attrs["units"]).strip() for k, v in dataset.variables.items() if "units" in v.attrs}
+    if "time" in units:
+        _require_unit("time", units["time"], "s")
+    times = dataset["time"].to_numpy()
+    number = np.issubdtype(times.dtype, np.number)
+    if not (times.size and number and np.all(np.isfinite(times)) and times[0] >= 0 and np.all(np.diff(times) > 0)):
+        raise InputError("run", "time", "give times in s that rise from 0 or later")
+    if times[-1] == 0:
+        raise InputError("run", "time", "it has only the start, t = 0 s, where nothing has moved; add samples after it")
+    if made_of is not None:
+        return GivenRun(dataset, units, {})
+    names = [str(name) for name in dataset.data_vars]
+    # a scene of several elements is judged by variables
+    if not all(name in dataset for name in _STATE) or len(scene.elements) > 1 or times[0] > 0:
+        return GivenRun(dataset, units, dict.fromkeys(names))
+    state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
+    besides = dict.fromkeys([name for name in names if name not in state], FROM_STATE)
+    return GivenRun(_completed(dataset, scene, times, state), units, besides)
+
+
+def _dataset(run: Run) -> xr.Dataset:
+    """The trajectory as a dataset with ``time``."""
+    import xarray as xr
+
+    if isinstance(run, str | Path):
+        from proofroll.files.trajectory_file import read
+
+        try:
+            run = read(Path(run))
+        except FileNotFoundError:
+            raise InputError("run", str(run), "there is no such file") from None
+        except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
+            advice = f"it cannot be read ({error}); xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
+            raise InputError("run", str(run), advice) from None
+    if isinstance(run, xr.Dataset):
+        if "time" not in run.variables:
+            raise InputError("run", ", ".join(map(str, run.variables)), "it has no time; add the times in s as time")
+        return run
+    given = {str(name): np.asarray(run[name]) for name in run}
+    if "time" not in given:
+        raise InputError("run", ", ".join(given), "it has no time; add the times in s as time")
+    _check_lengths(given)
+    said = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
+    dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
+    found = {name: (dims[name], values, said[name]) for name, values in given.items()}
+    return xr.Dataset({name: item for name, item in found.items() if name != "time"}, {"time": found["time"]})
+
+
+def _check_lengths(given: Mapping[str, Any]) -> None:
+    count = np.shape(given["time"])[0] if np.ndim(given["time"]) == 1 else 0
+    for name, values in given.items():
+        if np.ndim(values) == 0 or len(values) != count:
+            raise InputError(
+                "run", name, f"its shape is {np.shape(values)}; give one row for each of the {count} times"
+            )
+
+
+def _completed(run: xr.Dataset, scene: Scene, times: FloatArray, names: list[str]) -> xr.Dataset:
+    """All that follows from the state."""
+    sample_type = scene.elements[0].sample_type
+    arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
+    samples = [sample_type(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
+    try:
+        return from_samples(scene, times, samples)
+    except (ValueError, TypeError, Diverged) as error:
+        shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
+        raise InputError("run", shapes, f"these are no states of {scene.name} ({error})") from None
