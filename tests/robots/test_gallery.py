@@ -29,7 +29,7 @@ def test_unknown_cause(tmp_path: Path) -> None:
     """A cause that there is not, or a missing field, is refused in one line."""
     path = tmp_path / "robots.toml"
     path.write_text('[[robots]]\nname="r"\npackage="p"\nfile="f"\n[robots.engines]\nmujoco=["no_such_cause"]\n')
-    with pytest.raises(InputError, match="choose from"):
+    with pytest.raises(InputError, match="choose one of"):
         read_gallery(path)
     path.write_text('[[robots]]\nname="r"\n')
     with pytest.raises(InputError, match="is missing"):
@@ -50,7 +50,7 @@ def test_unknown_robot(proofroll: Proofroll) -> None:
     """A robot that is not in the gallery gives one line."""
     code, _, err = proofroll("robots", "no_such_robot")
     assert code == 2
-    assert "choose from panda" in err
+    assert "choose one of panda" in err
 
 
 @pytest.mark.parametrize("name", ["z1", "allegro_right_hand", "half_cheetah", "pusher"])

@@ -55,15 +55,19 @@ def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
     return InputError(field, value, f"there is no such key here; the keys are {', '.join(known)}")
 
 
-def require_known(field: str, name: object, known: Iterable[str], advice: str = "choose one of") -> None:
+def require_known(
+    field: str, name: object, known: Iterable[str], advice: str = "choose one of", given: object = None
+) -> None:
     """Refuses a name that is not among those that there are, of which the advice is followed by the first twenty.
+
+    ``given`` is what was written, where that is more than the name.
 
     Raises:
         InputError: there is no such name.
     """
     names = list(known)
     if name not in names:
-        raise InputError(field, name, f"{advice} {choices(names)}")
+        raise InputError(field, name if given is None else given, f"{advice} {choices(names)}")
 
 
 def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str, str]]) -> None:
@@ -108,7 +112,7 @@ def lack_behind(error: BaseException) -> BaseException | None:
 def choices(names: Iterable[str]) -> str:
     """Names to choose from, of many the first twenty."""
     shown = list(names)
-    return ", ".join(shown[:20] + ["…"] * (len(shown) > 20))
+    return ", ".join(shown[:20] + ["…"] * (len(shown) > 20)) or "none"
 
 
 def _shown(value: object) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from proofroll.core.errors import InputError, choices
+from proofroll.core.errors import InputError, require_known
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,7 @@ class Numbers:
         if isinstance(content, bool):
             raise InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit else ""))
         if isinstance(content, str) and content.startswith("$"):
-            if content[1:] not in self.values:
-                raise InputError(where, content, f"there is no such parameter; choose from {choices(self.values)}")
+            require_known(where, content[1:], self.values, "there is no such parameter; choose from", content)
             given = self.units[content[1:]]
             if unit and given != unit:
                 raise InputError(where, content, f"this number is in {unit}, that parameter in {given}")

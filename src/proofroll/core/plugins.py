@@ -177,10 +177,7 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
 
     fields = [field.name for field in dataclasses.fields(engine.settings)]
     for key, value in options.items():
-        if key not in fields:
-            raise InputError(
-                f"{engine.name}: {key}", value, f"there is no such setting; choose from {', '.join(fields)}"
-            )
+        require_known(f"{engine.name}: {key}", key, fields, "there is no such setting; choose from", value)
     able = (name for name in engine.presets if set(requires) <= engine.provides[name])
     formulation = options.get("formulation") or next(able, next(iter(engine.presets)))
     require_known(f"{engine.name}: formulation", formulation, engine.presets)

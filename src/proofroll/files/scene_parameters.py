@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.core.errors import InputError, choices
+from proofroll.core.errors import InputError, choices, require_known
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,8 @@ def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], 
     known_units = dict.fromkeys(units)
     for name, parameter in parameters.items():
         where = f"{path}: parameters.{name}"
-        if parameter.unit not in known_units:
-            advice = f"this unit is not known, and nothing is converted; write the value in {choices(known_units)}"
-            raise InputError(f"{where}.unit", parameter.unit, advice)
+        advice = "this unit is not known, and nothing is converted; write the value in"
+        require_known(f"{where}.unit", parameter.unit, known_units, advice)
         for key in ("value", "above", "at_least", "below", "at_most"):
             other = getattr(parameter, key)
             if not isinstance(other, str):
@@ -89,8 +88,7 @@ def values_of(parameters: Mapping[str, Parameter], given: Mapping[str, object]) 
         InputError: there is no such parameter, or a value is no number or out of its bounds.
     """
     for name, value in given.items():
-        if name not in parameters:
-            raise InputError(name, value, f"there is no such parameter; choose from {choices(parameters)}")
+        require_known(name, name, parameters, "there is no such parameter; choose from", value)
     values: dict[str, float] = {}
     for name, parameter in parameters.items():
         source = name

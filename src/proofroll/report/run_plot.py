@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, require_known
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,8 +18,7 @@ _COLUMNS = 2
 
 def require_ending(path: Path) -> None:
     """Raises InputError if the ending of a file names no kind of picture."""
-    if path.suffix.lower() not in ENDINGS:
-        raise InputError("plot", str(path), f"end the name of the file in one of {', '.join(ENDINGS)}")
+    require_known("plot", path.suffix.lower(), ENDINGS, "end the name of the file in one of", str(path))
 
 
 def read_run(path: Path) -> xr.Dataset:

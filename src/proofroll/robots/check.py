@@ -57,10 +57,8 @@ def check(
     """
     asked = []
     for spec in map(parse_engine, engines or reading.reader_names()):
-        if not place_of(spec.name) and spec.name not in reading.reader_names():
-            raise InputError(
-                "engine", spec.name, f"it reads no robot files; choose one of {', '.join(reading.reader_names())}"
-            )
+        if not place_of(spec.name):
+            reading.require_reader(spec.name)
         asked.append((spec, reading.options_of(spec.options, spec.name)))
     file = open_robot(path, base)
     with lent_workers(workers) as lent, tempfile.TemporaryDirectory() as name:

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.plugins import parse_engine
 from proofroll.files.data_folders import data_folder
 from proofroll.files.toml import read_toml
@@ -54,7 +54,7 @@ def read_gallery(path: str | Path | None = None) -> list[Entry]:
         InputError: it is broken, or names a cause that there is not.
     """
     path = Path(path or data_folder("comparisons") / "robots.toml")
-    known = {REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())}
+    known = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
     entries = []
     for item in read_toml(path).get("robots", []):
         try:
@@ -62,8 +62,8 @@ def read_gallery(path: str | Path | None = None) -> list[Entry]:
             entry = Entry(item["name"], item["package"], item["file"], item.get("base", "fixed"), engines)
         except KeyError as error:
             raise InputError(str(path), item.get("name", "robots"), f"{error.args[0]} is missing") from None
-        for cause in {cause for causes in engines.values() for cause in causes} - known:
-            raise InputError(f"{entry.name}: engines", cause, f"choose from {', '.join(sorted(known))}")
+        for cause in {cause for causes in engines.values() for cause in causes}:
+            require_known(f"{entry.name}: engines", cause, known)
         entries.append(entry)
     return entries
 
@@ -92,8 +92,8 @@ def gallery(
         InputError: there is no such robot or engine.
     """
     entries = read_gallery()
-    for name in set(names) - {entry.name for entry in entries}:
-        raise InputError("robot", name, f"choose from {', '.join(entry.name for entry in entries)}")
+    for name in names:
+        require_known("robot", name, [entry.name for entry in entries])
     for name in engines:
         reading.load_reader(parse_engine(name).name)
     rows = []

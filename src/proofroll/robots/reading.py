@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from proofroll.core.announced import announced
-from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.core.errors import InputError, Missing, Refused, require_known
 from proofroll.files.json_data import plain
 from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import GROUP, Reading, Request
@@ -33,6 +33,11 @@ def reader_names() -> list[str]:
     return sorted({point.name for point in announced(GROUP)})
 
 
+def require_reader(name: str) -> None:
+    """Raises InputError if no installed package announces a reader for this engine."""
+    require_known("engine", name, reader_names(), "it reads no robot files; choose one of")
+
+
 def load_reader(name: str) -> Any:
     """A reader.
 
@@ -40,15 +45,14 @@ def load_reader(name: str) -> Any:
         InputError: no installed package announces one for this engine.
         Missing: what it needs is not installed.
     """
-    for point in announced(GROUP):
-        if point.name == name:
-            try:
-                reader = point.load()()
-                reader.version()
-            except ModuleNotFoundError as error:
-                raise Missing(f"{name} is not installed here ({error.name or error} is missing)") from None
-            return reader
-    raise InputError("engine", name, f"it reads no robot files; choose one of {', '.join(reader_names())}")
+    require_reader(name)
+    point = next(point for point in announced(GROUP) if point.name == name)
+    try:
+        reader = point.load()()
+        reader.version()
+    except ModuleNotFoundError as error:
+        raise Missing(f"{name} is not installed here ({error.name or error} is missing)") from None
+    return reader
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,9 +113,8 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     content["torques"] = {name: np.array(rows) for name, rows in content["torques"].items()}
     request = Request(**content)
     for option in request.options:
-        if option not in reader.options:
-            known = ", ".join(reader.options) or "none"
-            raise InputError(f"{engine}: {option}", request.options[option], f"there is no such option; it has {known}")
+        value = request.options[option]
+        require_known(f"{engine}: {option}", option, reader.options, "there is no such option; it has", value)
     if request.kind not in reader.kinds:
         raise Missing(f"{engine} reads no {request.kind.upper()}")
     told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}

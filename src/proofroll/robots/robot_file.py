@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 
 # Of the XML of strangers; a robot file is a few hundred kB, the largest known is 2 MB.
 LARGEST, DEEPEST, MOST_ELEMENTS = 32 * 2**20, 400, 200_000
@@ -59,8 +59,7 @@ def open_robot(path: Path, base: str = "fixed") -> RobotFile:
     """
     from proofroll.robots import mjcf, urdf
 
-    if base not in BASES:
-        raise InputError("base", base, f"choose one of {', '.join(BASES)}")
+    require_known("base", base, BASES)
     root = read_xml(path)
     if root.tag == "robot":
         kind, (root, findings), body = "urdf", urdf.stripped(root), "link"

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, place
+from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, place, require_known
 from proofroll.running.case import Case
 from proofroll.running.ending import end_with, end_with_pipe
 from proofroll.running.handshake import hello
@@ -55,8 +55,7 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
     }
     name = request.pop("do")
     try:
-        if name not in actions:
-            raise InputError("do", name, f"this worker knows {', '.join(actions)}")
+        require_known("do", name, actions, "this worker knows")
         return actions[name](**request)
     except InputError as error:
         value = error.value if isinstance(error.value, (bool, int, float, str)) else str(error.value)

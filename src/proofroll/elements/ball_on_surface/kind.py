@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Union, cast
 
 from pydantic import Field
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
@@ -139,8 +139,8 @@ def _check_names(found: BallTables, where: str) -> None:
         for index, item in enumerate(items):
             for key, known in (("body", balls), ("surface", surfaces)):
                 named = getattr(item, key, None)
-                if named is not None and named not in known:
-                    raise InputError(f"{where}: {kind}.{index}.{key}", named, f"choose one of {', '.join(known)}")
+                if named is not None:
+                    require_known(f"{where}: {kind}.{index}.{key}", named, known)
     for index, contact in enumerate(found.contacts):
         ball, wall = found.balls[balls.index(contact.body)], found.surfaces[surfaces.index(contact.surface)]
         try:

@@ -11,7 +11,7 @@ from typing import Any
 
 from simpleeval import InvalidExpression, SimpleEval
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 
 _OPERATORS = {
     ast.Add: operator.add,
@@ -68,8 +68,7 @@ def substituted(field: str, content: Any, values: Mapping[str, float]) -> Any:
     if not isinstance(content, str):
         return content
     if content.startswith("$"):
-        if content[1:] not in values:
-            raise InputError(field, content, f"there is no such parameter; choose from {_list(values)}")
+        require_known(field, content[1:], values, "there is no such parameter; choose from", content)
         return values[content[1:]]
     if content.startswith("="):
         return evaluated(field, content[1:], values)

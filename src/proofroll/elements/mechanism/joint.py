@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector, Z
 from proofroll.elements.mechanism.rotations import Array
@@ -121,7 +121,7 @@ class Joint:
 
     def __post_init__(self) -> None:
         field = f"joints.{checks.name(self.name, 'joints')}"
-        check_kind(field, self.kind)
+        require_known(f"{field}.kind", self.kind, FACTS)
         if self.parent == self.child:
             raise InputError(f"{field}.child", self.child, "a joint connects two bodies; parent and child are the same")
         if self.child == WORLD:
@@ -184,16 +184,6 @@ class Joint:
         """Axes of the joint's frame A in the parent's axes, as columns; A and B coincide at q = 0."""
         frame: Array = rotations.from_rpy(self.orientation) @ self.child_frame
         return frame
-
-
-def check_kind(field: str, kind: str) -> None:
-    """The kind is one of :data:`FACTS`.
-
-    Raises:
-        InputError: it is not.
-    """
-    if kind not in FACTS:
-        raise InputError(f"{field}.kind", kind, f"choose one of {', '.join(FACTS)}")
 
 
 def _none(values: object) -> bool:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import slices
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.checks import WORLD, Vector
 from proofroll.elements.mechanism.joint import Joint
@@ -61,12 +61,11 @@ class Mechanism:
             _check_unique(key, getattr(self, key))
         checks.assign(self, unmodelled=tuple(self.unmodelled))
         _check_unique("loops", self.joints + self.loops)  # results name both alike
-        names = {WORLD, *(body.name for body in self.bodies)}
+        names = sorted({WORLD, *(body.name for body in self.bodies)})
         for item in self.joints + self.loops + self.springs + self.points:
             for key in ("parent", "child", "body_a", "body_b", "body"):
-                if getattr(item, key, WORLD) not in names:
-                    field = f"{type(item).__name__.lower()}s.{item.name}.{key}"
-                    raise InputError(field, getattr(item, key), f"there is no such body; choose from {_list(names)}")
+                field = f"{type(item).__name__.lower()}s.{item.name}.{key}"
+                require_known(field, getattr(item, key, WORLD), names, "there is no such body; choose from")
         checks.assign(self, joints=_depth_first(self.bodies, self.joints))
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
         _check_masses(self.bodies, self.joints)
@@ -144,10 +143,6 @@ def _check_unique(kind: str, items: Iterable[Any]) -> None:
         if item.name in seen:
             raise InputError(f"{kind}.{item.name}.name", item.name, "this name is used twice; names must be unique")
         seen.add(item.name)
-
-
-def _list(names: Iterable[str]) -> str:
-    return ", ".join(sorted(names))
 
 
 def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint, ...]:

@@ -7,10 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import WORLD, ZERO, Matrix, Vector, Z
-from proofroll.elements.mechanism.joint import Kind, check_kind
+from proofroll.elements.mechanism.joint import FACTS, Kind
 from proofroll.elements.mechanism.rotations import Array
 
 
@@ -67,7 +67,7 @@ class Loop:
 
     def __post_init__(self) -> None:
         field = f"loops.{checks.name(self.name, 'loops')}"
-        check_kind(field, self.kind)
+        require_known(f"{field}.kind", self.kind, FACTS)
         if self.kind == "free":
             raise InputError(f"{field}.kind", self.kind, "a free loop holds nothing; remove it")
         if self.body_a == self.body_b:
