@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -29,11 +30,12 @@ class EachAlone:
 
     def __init__(self, kind: Any, scene: Scene, settings: Any) -> None:
         self.parts, self._others = {}, []
-        for element in scene.elements:
-            alone = dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.askable.get, scene.asks)))
+        self.steps: list[float | None] = []
+        for element, alone in zip(scene.elements, each_alone(scene), strict=True):
             own = _settings_for(kind, alone, settings)
             require_provided(kind, own.formulation, alone)
             self.parts[element.name] = kind.build(alone, own)
+            self.steps.append(fixed_step(own))
             if own.formulation != settings.formulation:
                 self._others.append(f"{element.name} is in formulation {own.formulation}, preset {own.preset}")
         if len(self._others) == len(self.parts):
@@ -58,6 +60,41 @@ class EachAlone:
         return [*self._others, *(remark for part in telling for remark in part.remarks())]
 
 
+def each_alone(scene: Scene) -> list[Scene]:
+    """For each element the scene that holds it alone, with what is asked of it."""
+    return [
+        dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.askable.get, scene.asks)))
+        for element in scene.elements
+    ]
+
+
+def formulation_for(requires: Collection[str], formulation: str, provides: Mapping[str, Collection[str]]) -> str | None:
+    """In which formulation an element is built, if it requires this and the run of its scene is in some formulation.
+
+    It is that of the run, or, of a kind of element that it knows nothing of, the first one that provides all.
+
+    Args:
+        requires: by the element alone.
+        formulation: of the run.
+        provides: what each formulation of the engine does.
+
+    Returns:
+        None where there is none.
+    """
+    if set(requires) <= set(provides[formulation]):
+        return formulation
+    kinds = {known for need in requires for known in (type(need) if isinstance(need, Enum) else (need,))}
+    if kinds & set(provides[formulation]):
+        return None
+    return next((name for name, given in provides.items() if set(requires) <= set(given)), None)
+
+
+def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection[str]]) -> bool:
+    """Whether a run in this formulation has a model of each element, and of one at least in the formulation itself."""
+    found = [formulation_for(alone.requires, formulation, provides) for alone in each_alone(scene)]
+    return None not in found and formulation in found
+
+
 def build(kind: Any, scene: Scene, settings: Any) -> Any:
     """The scene in an engine at time 0.
 
@@ -70,17 +107,26 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
     return kind.build(scene, settings)
 
 
+def step_of(engine: Any, settings: Any) -> float | None:
+    """The fixed step of what was built with some settings [s], the largest of several elements; None: none has any.
+
+    Beside an element that adapts its steps there may be one in a formulation that has a fixed one.
+    """
+    steps = engine.steps if isinstance(engine, EachAlone) else [fixed_step(settings)]
+    return max((step for step in steps if step is not None), default=None)
+
+
 def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
     """The settings themselves, or, for a kind of element that their formulation knows nothing of, those of the first.
 
     That is the first formulation that provides what the element requires, with the same preset, if it has it, and step.
     """
-    known = {type(capability) for capability in kind.provides[settings.formulation]}
-    able = [name for name in kind.presets if alone.requires <= kind.provides[name]]
-    if not able or known & {type(capability) for capability in alone.requires}:
+    provides = {name: kind.provides[name] for name in kind.presets}
+    name = formulation_for(alone.requires, settings.formulation, provides)
+    if name in {None, settings.formulation}:
         return settings
-    presets = kind.presets[able[0]]
-    options = {"formulation": able[0]} | ({"preset": settings.preset} if settings.preset in presets else {})
+    presets = kind.presets[name]
+    options = {"formulation": name} | ({"preset": settings.preset} if settings.preset in presets else {})
     own = resolve_settings(kind, options)
     step = fixed_step(settings)
     return own if step is None or fixed_step(own) is None else dataclasses.replace(own, dt=step)

@@ -33,9 +33,8 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
-    from proofroll.core.engine import fixed_step
     from proofroll.core.first_steps import certificate
-    from proofroll.core.several import build
+    from proofroll.core.several import build, step_of
     from proofroll.core.time_grid import time_grid
     from proofroll.files.trajectory_file import write
     from proofroll.running.loading import loaded, scene_of
@@ -58,7 +57,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         lines = [line.as_dict() for line in found]
         if difference is not None:
             return Result(Status.WRONG_MODEL, difference, certificate=lines, versions=versions)
-        recording = record(engine, scene, times, off_grid(times, fixed_step(settings)))
+        recording = record(engine, scene, times, off_grid(times, step_of(engine, settings)))
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except (Refused, Diverged) as error:

@@ -106,7 +106,7 @@ def simulate(
     difference = first_difference(lines)
     if difference is not None:
         raise Refused(difference)
-    recording = record(built, scene, times, off_grid(times, fixed_step(resolved)))
+    recording = record(built, scene, times, off_grid(times, several.step_of(built, resolved)))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),

@@ -10,6 +10,7 @@ from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
+from proofroll.core.several import each_alone, represents
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.asking import described
@@ -38,7 +39,7 @@ def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None =
     every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
     rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene, workers)]
     if not rows:
-        raise InputError("scene", name, f"no installed engine has {', '.join(_lacking(scene, workers))}")
+        raise InputError("scene", name, _why_none(scene, workers))
     return Comparison(
         name=scene.name,
         title=file.title,
@@ -66,7 +67,7 @@ def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -
     """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
     found = []
     for engine, provides in _provided(workers):
-        fitting = [name for name, given in provides.items() if scene.requires <= set(given)]
+        fitting = [name for name in provides if represents(scene, name, provides)]
         found += [f"{engine}[formulation={name}]" for name in fitting[: 1 if first else None]]
     return found
 
@@ -78,10 +79,21 @@ def _provided(workers: Workers | None) -> Iterator[tuple[str, Mapping[str, Colle
             yield engine, told.provides
 
 
-def _lacking(scene: Scene, workers: Workers | None) -> list[str]:
-    """What no formulation provides; all that the scene requires where each is provided by some."""
-    given = {item for _, provides in _provided(workers) for items in provides.values() for item in items}
-    return sorted(scene.requires - given) or ["all of", *sorted(scene.requires)]
+def _why_none(scene: Scene, workers: Workers | None) -> str:
+    """What no formulation provides; where each is provided by some, of which elements each engine has no model."""
+    engines = list(_provided(workers))
+    given = {item for _, provides in engines for items in provides.values() for item in items}
+    if lacking := scene.requires - given:
+        return f"no installed engine has {', '.join(sorted(lacking))}"
+    said = []
+    for engine, provides in engines:
+        none = [
+            f"{alone.elements[0].name} ({', '.join(sorted(alone.requires))})"
+            for alone in each_alone(scene)
+            if not any(alone.requires <= set(items) for items in provides.values())
+        ]
+        said.append(f"{engine} has no formulation for {' and '.join(none) or 'all elements of one kind at once'}")
+    return f"no installed engine can represent all of the scene: {'; '.join(said)}"
 
 
 def axes_of(name: str) -> list[Axis]:

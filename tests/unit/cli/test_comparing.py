@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+
+from proofroll.files.comparison_file import load_comparison
 
 
 @pytest.mark.own_workers
@@ -20,3 +23,90 @@ def test_each_engine_is_started_once(
     monkeypatch.setattr("proofroll.studies.first_look._UNTIL", 0.1)
     assert command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path))[0] == 0
     assert sorted(started_workers) == ["reduced", "truth"]
+
+
+BALL_AND_PENDULUM = """
+title = "A ball on a plane, and a pendulum"
+source = "chosen"
+duration = 0.1
+
+[gravity]
+magnitude = 9.81
+direction = [0, 0, -1]
+
+[[balls]]
+name = "ball"
+radius = 0.025
+mass = 0.5
+
+[[surfaces]]
+kind = "plane"
+name = "wall"
+tilt = 0.35
+
+[[contacts]]
+body = "ball"
+surface = "wall"
+
+[[initial]]
+body = "ball"
+velocity = [0.5, 0.2]
+
+[[bodies]]
+name = "rod"
+mass = 1.0
+com = [0, 0, -0.5]
+inertia = [0.08, 0.08, 0.001]
+
+[[joints]]
+name = "pivot"
+kind = "revolute"
+axis = [0, 1, 0]
+parent = "world"
+child = "rod"
+q0 = 1.0
+"""
+
+
+@pytest.fixture
+def mixed(tmp_path: Path) -> Path:
+    """A scene of a ball and a mechanism."""
+    folder = tmp_path / "mixed"
+    folder.mkdir()
+    (folder / "scene.toml").write_text(BALL_AND_PENDULUM, encoding="utf-8")
+    return folder
+
+
+def test_a_scene_of_two_kinds_is_compared(
+    tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each formulation that is for one of the elements has a row, the other element in one that is for that."""
+    monkeypatch.setattr("proofroll.studies.first_look.engine_names", lambda: ["projection", "reduced"])
+    code, out, err = command_line("compare", str(mixed), "--out", str(tmp_path / "out"), "--json")
+    assert code == 0, err
+    found = {row["engine"]: row["verdict"] for row in json.loads(out)["rows"]}
+    assert found == {
+        f"projection[formulation={name}]": "agrees" for name in ("euler", "rotating_frame", "dependent")
+    }  # of a mechanism `reduced` has no equations
+    monkeypatch.chdir(tmp_path)
+    assert command_line("new", "comparison", "look", "--scene", str(mixed))[0] == 0
+    assert [row.engine for row in load_comparison("look.toml").rows] == ["projection[formulation=euler]"]
+
+
+def test_why_nobody_can_is_said_engine_by_engine(
+    mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What nobody provides is named; where each is provided by somebody, each engine's elements without a model."""
+    monkeypatch.setattr("proofroll.studies.first_look.engine_names", lambda: ["reduced"])
+    code, _, err = command_line("compare", str(mixed))
+    assert code == 2
+    assert "no installed engine has revolute joints" in err
+    rods_alone = {"rods": ["revolute joints"]}
+    monkeypatch.setattr(
+        "proofroll.studies.first_look._provided",
+        lambda _: [("jointed", rods_alone), ("rolling", {"ball": ["rolling without slip"]})],
+    )
+    code, _, err = command_line("compare", str(mixed))
+    assert code == 2
+    said = "jointed has no formulation for ball (rolling without slip); rolling has no formulation for mechanism"
+    assert f"can represent all of the scene: {said} (revolute joints)" in err

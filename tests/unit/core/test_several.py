@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from enum import StrEnum
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from proofroll.core.dataset import observe
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
+from proofroll.core.several import formulation_for
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
@@ -65,3 +67,36 @@ def test_what_no_formulation_of_an_engine_has_is_still_refused(mixed: Scene) -> 
     """Equations of a ball alone do not become those of a pendulum."""
     with pytest.raises(Refused, match="needs revolute joints"):
         simulate(mixed, "reduced", until=0.1, every=0.05)
+
+
+def test_a_fixed_step_beside_steps_that_adapt(mixed: Scene) -> None:
+    """Where the ball's formulation has a tolerance and the mechanism's a step, samples lie whole steps apart."""
+    found = simulate(mixed, "pinocchio[formulation=composite]", until=0.5, every=0.01)
+    assert (found.attrs["status"], found["time"].size) == ("done", 51)
+
+
+class Provided(StrEnum):
+    """What some kind of element may need."""
+
+    ONE = "one"
+    OTHER = "another"
+
+
+@pytest.mark.parametrize(
+    ("requires", "own", "expected"),
+    [
+        ({Provided.ONE}, "both", "both"),
+        ({Provided.ONE, Provided.OTHER}, "one", None),
+        ({Provided.ONE, Provided.OTHER}, "foreign", "both"),
+        ({"a word"}, "one", "foreign"),
+        ({"a word"}, "foreign", "foreign"),
+        ({"nobody's"}, "one", None),
+        (set(), "foreign", "foreign"),
+    ],
+)
+def test_another_formulation_stands_in_for_foreign_elements_alone(
+    requires: set[str], own: str, expected: str | None
+) -> None:
+    """A formulation that knows the kind of an element and lacks something of it is replaced by none."""
+    provides = {"foreign": ["a word"], "one": ["one"], "both": ["one", "another"]}
+    assert formulation_for(requires, own, provides) == expected
