@@ -96,7 +96,7 @@ BAD = {
     "unknown comparison to report": (["report", "no_such_claim"], 2, ["comparison = 'no_such_claim'"]),
     "unknown axis of a map": (["stability", "sphere_in_cylinder", "--axis", "speed"], 2, ["axis = 'speed'", "V0"]),
     "unknown scene of a map": (["stability", "sphere_in_cone"], 2, ["scene = 'sphere_in_cone'"]),
-    "a file that asks for no map": (["stability", "comparisons/paper.toml"], 2, ["asks for a stability map"]),
+    "a file that asks for no map": (["stability", "comparisons/paper.toml"], 2, ['"stability" can be used here']),
     "no jobs": (["compare", "x", "--jobs", "0"], 2, ["--jobs"]),
 }  # fmt: skip
 

@@ -66,15 +66,15 @@ def study_files(study: str) -> Iterator[tuple[Path, dict[str, Any]]]:
                 yield path, study_content(path, study)
 
 
-def study_content(path: Path, study: str, use: str = "can be used here") -> dict[str, Any]:
-    """What a file for a study says besides that it is for it; ``use`` is the end of the message where it is not.
+def study_content(path: Path, study: str) -> dict[str, Any]:
+    """What a file for a study says besides that it is for it.
 
     Raises:
         InputError: it is broken, or for something else.
     """
     content = read_toml(path)
     if content.pop("study", None) != study:
-        raise InputError(str(path), "study", f'only a file with study = "{study}" {use}')
+        raise InputError(str(path), "study", f'only a file with study = "{study}" can be used here')
     return content
 
 

@@ -79,7 +79,7 @@ def load_claims(path: str | Path) -> TradeoffClaims:
     Raises:
         InputError: it is broken, or is about something else.
     """
-    return _claims(Path(path), study_content(Path(path), STUDY, "is about a trade-off"))
+    return _claims(Path(path), study_content(Path(path), STUDY))
 
 
 def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:

@@ -165,7 +165,7 @@ def file_for(scene: str) -> StabilityFile:
 
 def _load(path: Path) -> StabilityFile:
     where = path.name
-    content = study_content(path, STUDY, "asks for a stability map")
+    content = study_content(path, STUDY)
     found = validated(StabilityFile, content, where, name=path.stem)
     _check(where, found)
     return found

@@ -391,7 +391,7 @@ BROKEN = [
     ('number = "spin"', 'number = "spine"', "choose one of"),
     ("between = [0, 1]", "between = [1, 0]", r"\[low, high\]"),
     ("values = [1, 2]", "values = []", "needs its values"),
-    ('study = "stability"', 'study = "tradeoff"', "asks for a stability map"),
+    ('study = "stability"', 'study = "tradeoff"', "can be used here"),
     ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
 ]
 FILE = """

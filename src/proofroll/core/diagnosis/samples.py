@@ -162,15 +162,12 @@ def _turned(said: FloatArray, other: FloatArray) -> float:
     return apart(said * signs, other)
 
 
-def at_start(
-    frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str], *, rates: bool = True
-) -> Hypothesis:
+def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:
     """That velocities and accelerations at time 0 have other signs, units or axes.
 
     Args:
         frames_of: of an element at time 0, in which a vector may be given by mistake; each of shape (vectors, 3, 3).
         follows: quantities that follow from the velocities.
-        rates: whether accelerations are looked at, where nothing else differs.
     """
     state, accelerations = ({name for name, _, _ in vectors} for vectors in (_STATE, _RATES))
 
@@ -179,7 +176,7 @@ def at_start(
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
         wrong = {str(line["quantity"]): line for line in differing(evidence.lines)}
-        for vectors, others in ((_STATE, state | accelerations | follows), (_RATES if rates else (), set())):
+        for vectors, others in ((_STATE, state | accelerations | follows), (_RATES, set())):
             for name, what, unit in vectors:
                 if name not in wrong or not set(wrong) <= others | {name}:
                     continue

@@ -143,7 +143,7 @@ CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque"
 SAID: tuple[Any, ...] = (
     CLOCK,
     reported_vectors(_UNITS, _frames, CLOCK, _size, _of_centres),
-    at_start(_axes_at_start, frozenset(), rates=False),
+    at_start(_axes_at_start, frozenset()),
     reported_quaternions(_attitudes),
     single_precision_run,
     reactions,
