@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Any, TypeVar, get_args, get_type_hints
+from typing import Annotated, Any, TypeVar, get_args, get_type_hints
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.bounds import OutOfBounds
 from proofroll.core.errors import InputError, no_such_key
 
 _T = TypeVar("_T")
+# JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
+Parameter = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
 # The beginning of a type of error in pydantic -> what a person is told, where pydantic's own words say less.
 _WORDS = {
     "int": "give a whole number",

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from proofroll.core.errors import require_known
 from proofroll.core.scene import Scene
+from proofroll.core.validation import Parameter
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Axis:
     name: str
     unit: str
     meaning: str
-    values: list[float]
+    values: list[Parameter]
     parameters: dict[str, AxisTerm] = field(default_factory=dict)
     horizon: bool = False
     scale_free: bool = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -176,6 +177,11 @@ def _check(where: str, found: StabilityFile) -> None:
     for index, axis in enumerate(found.axes):
         if not axis.values:
             raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
+        for value in axis.values:
+            # a parameter may be infinite, the length of a run not
+            if math.isnan(value) or (axis.horizon and not (math.isfinite(value) and value > 0)):
+                what = "a length in natural times that is positive and finite" if axis.horizon else "a number"
+                raise InputError(f"{where}: axes.{index}.values", value, f"give {what}")
         axis.at(scene, axis.values[0])
     known = [axis.name for axis in found.axes]
     numbers = [item.name for item in step_numbers(scene)]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from proofroll.core.number_text import number
+from proofroll.core.validation import Parameter
 from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
@@ -73,8 +74,8 @@ class BoundaryPoint:
     caveat: str
     resolution: str | None
     axis: str
-    value: float
-    parameters: dict[str, float]
+    value: Parameter
+    parameters: dict[str, Parameter]
     until: float
     period: float
     largest_stable: float | None
@@ -119,8 +120,8 @@ class MappedPlace:
     """A value of an axis, the scene's parameters there, and why there is no truth."""
 
     axis: str
-    value: float
-    parameters: dict[str, float]
+    value: Parameter
+    parameters: dict[str, Parameter]
     problem: str | None
 
 

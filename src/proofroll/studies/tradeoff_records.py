@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BeforeValidator
-
+from proofroll.core.validation import Parameter
 from proofroll.running.case import Status
 from proofroll.studies.study_store import Measured
-
-# JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
-Parameter = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
 
 
 @dataclass(frozen=True, kw_only=True)

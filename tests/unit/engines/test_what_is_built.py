@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.projection.modes import Exit
@@ -20,6 +21,7 @@ NEEDS = {
     "resistance": ({"rolling_resistance": RESISTANCE}, {BallCapability.ROLLING_RESISTANCE}),
     "friction": ({"mu_static": 0.35}, {BallCapability.BOUNDED_FRICTION}),
 }
+OURS = ("projection", "reduced", "exudyn", "pinocchio", "mujoco")
 TURNING = frozenset({BallCapability.ORIENTATION})
 
 
@@ -170,3 +172,20 @@ def test_mujoco_dimensions_that_make_no_sense(options: str, parameters: dict[str
     assert advice in str(caught.value)
     assert "condim" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_who_builds_without_the_harness_is_refused_too(name: str) -> None:
+    """A formulation refuses in `build` itself what it does not provide, for tests call it without the harness."""
+    kind = load_engine(name)
+    slips, flies, turns = (load_scene(name) for name in ("slide_to_roll", "bouncing_ball", "turntable"))
+    tried = 0
+    for formulation, presets in kind.presets.items():
+        for one in (slips, flies, turns, scene("orientation")):
+            lacking = one.requires - kind.provides[formulation]
+            if not lacking:
+                continue
+            with pytest.raises(Refused, match="needs "):
+                kind.build(one, next(iter(presets.values())))
+            tried += 1
+    assert tried > 1

@@ -393,6 +393,8 @@ BROKEN = [
     ("values = [1, 2]", "values = []", "needs its values"),
     ('study = "stability"', 'study = "tradeoff"', "can be used here"),
     ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
+    ("values = [1, 2]", "values = [1, nan]", "give a number"),
+    ("values = [1, 2]", "values = [1, inf]\nhorizon = true", "positive and finite"),
 ]
 FILE = """
 study = "stability"

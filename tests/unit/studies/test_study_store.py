@@ -8,14 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from invented import invented_study, measured_point
+from invented import boundary_point, invented_study, measured_point, stability_study
 
 from proofroll.running.environments import STAMP, VARIABLE, Environment
 from proofroll.running.timing import machine
 from proofroll.studies import study_store
-from proofroll.studies.axes import QUICK, Effort
+from proofroll.studies.axes import QUICK, Axis, Effort
 from proofroll.studies.stability import stability_path
 from proofroll.studies.stability_claims import file_for
+from proofroll.studies.stability_records import MappedPlace, StabilityStudy
 from proofroll.studies.study_store import keep, kept
 from proofroll.studies.tradeoff_records import Corner, TradeoffStudy
 
@@ -58,6 +59,17 @@ def test_parameters_without_a_bound_come_back(tmp_path: Path) -> None:
     study = invented_study(point, parameters=unbounded, over={"mu_static": [0.3, math.inf]})
     keep(study, tmp_path / "study.json")
     assert kept(tmp_path / "study.json", TradeoffStudy) == (study, [])
+
+
+def test_an_axis_to_infinity_comes_back(tmp_path: Path) -> None:
+    """So may a map be taken to friction that nothing exceeds: its axis, its points and its places are as they were."""
+    unbounded = {"mu_static": math.inf}
+    axes = [Axis("friction", "1", "how it grips", [0.3, math.inf])]
+    points = [boundary_point(axis="friction", value=math.inf, parameters=unbounded)]
+    places = [MappedPlace("friction", math.inf, unbounded, None)]
+    study = dataclasses.replace(stability_study(), axes=axes, points=points, places=places)
+    keep(study, tmp_path / "study.json")
+    assert kept(tmp_path / "study.json", StabilityStudy) == (study, [])
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, ClassVar
 
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -147,6 +147,7 @@ class Exudyn:
             )
         if settings.formulation in OF_MECHANISMS:
             return OF_MECHANISMS[settings.formulation](scene, settings)
+        require_provided(cls, settings.formulation, scene)
         return OF_BALLS[settings.formulation](rolling_ball(scene), settings)
 
     @classmethod

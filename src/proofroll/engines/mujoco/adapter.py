@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import mujoco
 import numpy as np
 
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -117,6 +117,7 @@ class Mujoco(SteppedModel):
         """See :class:`proofroll.core.engine.Engine`; what ``joints`` builds is a run of a mechanism."""
         if settings.formulation == "joints":
             return MujocoMechanism(scene, settings)
+        require_provided(cls, settings.formulation, scene)
         return cls._build_ball(scene, settings)
 
     @classmethod

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import pinocchio as pin
 
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
@@ -108,6 +108,7 @@ class Pinocchio:
             raise Refused(f"{settings.formulation} needs the constraints of pinocchio 4.0, and this is {cls.version()}")
         if settings.formulation in OF_MECHANISMS:
             return _of_mechanism(scene, settings)
+        require_provided(cls, settings.formulation, scene)
         settings = _decided(scene, settings)
         return (ContactRun if settings.formulation == "contact" else RowsRun)(rolling_ball(scene), settings)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 import proofroll
 from proofroll.core.arrays import FloatArray
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
 from proofroll.core.integrators import INTEGRATORS, Integrator
@@ -82,6 +82,7 @@ class Projection:
         """See :class:`proofroll.core.engine.Engine`; what ``dependent`` builds is a run of a mechanism."""
         if settings.formulation == "dependent":
             return ProjectionMechanism(scene, settings)
+        require_provided(cls, settings.formulation, scene)
         follow = BallCapability.ORIENTATION in scene.requires
         if follow and settings.integrator == "taylor" and settings.formulation == "rotating_frame":
             raise Refused("the compiled series do not follow the orientation; use integrator=dop853")

@@ -10,7 +10,7 @@ import numpy as np
 from annotated_types import Gt
 
 import proofroll
-from proofroll.core.engine_abilities import Level, Term
+from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.errors import refuse_first
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled.library import TIGHTEST, with_heyoka
@@ -117,6 +117,7 @@ class Reduced:
     @classmethod
     def build(cls, scene: Scene, settings: ReducedSettings) -> ReducedModel:
         """See :class:`proofroll.core.engine.Engine`; what it builds is a run of one of the models."""
+        require_provided(cls, settings.formulation, scene)
         body = rolling_ball(scene)
         if settings.rtol is None:
             return ClosedFormModel(body)
