@@ -21,7 +21,7 @@ class Onset:
     """The first slip and its conditioning.
 
     Attributes:
-        time: of the first slip [s]; None: not until the end.
+        time: of the first slip [s]; 0: the ball slips from the start; None: not until the end.
         by_mu: d ln t / d ln μ [-]; None where there is no slip or it comes at once.
         by_f: d ln t / d ln f [-]; 0 without rolling resistance.
         edge_below, edge_above: next values of μ at which the time jumps [-]; None: there is none until the end.
@@ -47,6 +47,8 @@ class Onset:
 def first_slip(scene: Scene, until: float) -> float | None:
     """When the ball first slips [s]; None: not until ``until`` [s]."""
     body = rolling_ball(scene)
+    if np.any(body.slip0):
+        return 0.0
     return friction_curve(body, until).onset(body.contact.mu_static)
 
 
@@ -59,6 +61,8 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     if not 0 <= uncertainty < 1:
         raise InputError("uncertainty", uncertainty, "give a relative uncertainty of mu and f between 0 and 1")
     body = rolling_ball(scene)
+    if np.any(body.slip0):  # whatever its friction is
+        return Onset(0.0, None, None, None, None, float("inf"), uncertainty, "well-posed", 0.0, 0.0)
     mu = body.contact.mu_static
     curve = friction_curve(body, until)
     time = curve.onset(mu)

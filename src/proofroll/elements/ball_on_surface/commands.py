@@ -60,7 +60,9 @@ def _onset_table(study: OnsetStudy) -> Table:
     from rich.text import Text
 
     from proofroll.core.number_text import number
+    from proofroll.elements.ball_on_surface.onset_study import first_slip_told
     from proofroll.report.screen import numeric, plain_table, unbroken
+    from proofroll.running.case import Status
 
     table = plain_table(
         Column("engine", overflow="fold"),
@@ -70,8 +72,7 @@ def _onset_table(study: OnsetStudy) -> Table:
         Column("verdict", overflow="fold"),
     )
     for item in study.engines:
-        first = item.onset
-        told = (f"{first.time:.9g}", f"{first.time_low:.9g} … {first.time_high:.9g}") if first else ("none", "")
+        told = first_slip_told(item.onset) if item.onset or item.status is Status.DONE else ("", "")
         verdict = item.verdict + (f": {item.message}" if item.verdict in {"failed", "refused"} else "")
         label = (item.name, *(item.settings.get(key, "") for key in ("formulation", "preset")))
         table.add_row(Text(" ".join(filter(None, label))), *told, number(item.difference), Text(verdict))

@@ -8,6 +8,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.events import Event, events_of
 from proofroll.core.plugins import engine_names, parse_engine
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
     from proofroll.truth.onset import Onset
 
 _EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
+_SMALLEST = float(np.finfo(float).tiny)  # what is less is round-off of zero
 _LATER = 0.05  # an engine that slips later than the truth by more than this part is run once more, to the end [-]
 
 
@@ -98,13 +101,16 @@ def onset_study(
         progress: called with each case that is finished.
 
     Raises:
-        InputError: the scene is not one ball, its friction is unbounded, or something that does not exist.
+        InputError: the scene is not one ball that begins on its wall, its friction is unbounded, or something does not
+            exist.
     """
     from proofroll.truth.onset import onset
 
     loaded = load_scene(scene, **parameters)
     if len(loaded.elements) > 1 or not isinstance(loaded.elements[0], BallOnSurface):
         raise InputError("scene", scene, "a first slip is that of one ball on one surface; name a scene of such a one")
+    if loaded.elements[0].rolling.gap0:
+        raise InputError("scene", scene, "its ball begins in the air; name a scene whose ball begins on its wall")
     if BallCapability.BOUNDED_FRICTION not in loaded.requires:
         raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
     with ThreadPoolExecutor(1) as pool:  # engines start while the truth is worked out
@@ -177,13 +183,27 @@ def summary(study: OnsetStudy) -> str:
     truth = study.truth
     if truth.time is None:
         return f"In the truth the ball does not slip within {study.until:g} s."
-    said = f"In the truth the ball first slips at {truth.time:.9g} s; "
-    said += f"d ln t / d ln mu = {_number(truth.by_mu)}, d ln t / d ln f = {_number(truth.by_f)}. "
+    said = "In the truth the ball slips from the start. "
+    if truth.time > 0:
+        said = f"In the truth the ball first slips at {truth.time:.9g} s; "
+        said += f"d ln t / d ln mu = {_number(truth.by_mu)}, d ln t / d ln f = {_number(truth.by_f)}. "
     edges = [f"{edge:.6g}" for edge in (truth.edge_below, truth.edge_above) if edge is not None]
     if edges:
         said += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth.distance:.3g} % away; "
-    said += f"for mu and f known to {100 * truth.uncertainty:g} % the question is {truth.verdict}."
+    said += (
+        f"{'for' if edges else 'For'} mu and f known to {100 * truth.uncertainty:g} % the question is {truth.verdict}."
+    )
     return said
+
+
+def first_slip_told(first: Event | None) -> tuple[str, str]:
+    """When a ball first slips, and between which times that is known to be, for a person."""
+    if first is None:
+        return "no slip", ""
+    between = f"{first.time_low:.9g} … {first.time_high:.9g}"
+    if first.time > 0:
+        return f"{first.time:.9g}", between
+    return "from the start", between if first.time_high > _SMALLEST else ""
 
 
 def _number(value: float | None) -> str:

@@ -60,10 +60,12 @@ def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
     if onset.time is None:
         facts.append(("First slip", f"none until {until:g} s"))
     else:
-        text = f"{onset.time:.9g} s"
         early, late = (_time(value) for value in (onset.earliest, onset.latest))
-        text += f"; {early} with μ smaller and f larger by {known}, {late} the other way round"
+        text = _time(onset.time, 9)
+        if not onset.time == onset.earliest == onset.latest:
+            text += f"; {early} with μ smaller and f larger by {known}, {late} the other way round"
         facts.append(("First slip", text))
+    if onset.time:
         facts.append(("d ln t / d ln μ", number(onset.by_mu, 4)))
         facts.append(("d ln t / d ln f", number(onset.by_f, 4)))
     edges = [(onset.edge_below, "below"), (onset.edge_above, "above")]
@@ -130,8 +132,8 @@ def _cell(events: Sequence[Event], true: Sequence[Event], index: int, own: bool 
     return EventCell(event, signed(apart) if math.isfinite(apart) else "", wrong)
 
 
-def _time(value: float | None) -> str:
-    return "none" if value is None else f"{value:.6g} s"
+def _time(value: float | None, digits: int = 6) -> str:
+    return "none" if value is None else f"{value:.{digits}g} s" if value else "from the start"
 
 
 def _to_digits(value: float, event: Event, most: int) -> str:
