@@ -9,9 +9,11 @@ import typer
 
 from proofroll.cli import options
 from proofroll.cli.checking import check_text, is_text_check
+from proofroll.core.errors import InputError
 
 
 def check(
+    context: typer.Context,
     file: Annotated[Path, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")],
     engine: options.Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
@@ -26,6 +28,7 @@ def check(
     Of a robot file: exit 1 if an engine does not hold the model that the file describes. The options are for these.
     """
     if is_text_check(file):
+        _require_none_for_robots(context)
         check_text(str(file), as_json)
         return
     from proofroll.robots.check import check as checked
@@ -45,6 +48,25 @@ def check(
     if any(row.differs for row in content.engines):
         raise typer.Exit(options.CONTRADICTED)
     raise typer.Exit(options.OK if any(row.layers for row in content.engines) else options.ENGINE)
+
+
+def _require_none_for_robots(context: typer.Context) -> None:
+    """Refuses the first option of a robot's check that was given, for it would be overlooked.
+
+    Raises:
+        InputError: there is one.
+    """
+    for parameter in context.command.params:
+        if parameter.name in {"file", "as_json", "help"}:
+            continue
+        source = context.get_parameter_source(str(parameter.name))
+        if source is not None and source.name == "COMMANDLINE":
+            advice = "this is for robot files; nothing is run to check a scene or a study"
+            if parameter.name == "engine":
+                advice += ", and `proofroll compare SCENE --engine NAME` says what an engine makes of one"
+            value = context.params[str(parameter.name)]
+            shown = ", ".join(value) if isinstance(value, list) else value
+            raise InputError(parameter.opts[0], shown, advice)
 
 
 def robots(

@@ -110,3 +110,17 @@ def test_neither_scene_nor_file(proofroll: Proofroll) -> None:
     code, out, err = proofroll("check", "sphere_in_cone")
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "sphere_in_cylinder" in err
+
+
+@pytest.mark.parametrize("what", ["inclined_plane", str(COMPARISONS / "paper.toml")])
+@pytest.mark.parametrize(
+    "given",
+    [("--engine", "mujoco"), ("--base", "free"), ("--states", "20"), ("--out", "checked"), ("--time-limit", "9")],
+)
+def test_what_is_for_robots_is_not_overlooked(proofroll: Proofroll, what: str, given: tuple[str, str]) -> None:
+    """An option that would do nothing is refused in one line, also with the value that it has anyway."""
+    code, out, err = proofroll("check", what, *given)
+    assert (code, out, err.count("\n")) == (2, "", 1)
+    assert given[0] in err
+    assert "this is for robot files" in err
+    assert ("compare SCENE --engine" in err) == (given[0] == "--engine")
