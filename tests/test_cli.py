@@ -75,7 +75,7 @@ BAD = {
     "endless time limit": (with_option("--time-limit", "inf"), 2, ["time_limit = inf", "finite"]),
     "NaN for the time limit": (with_option("--time-limit", "nan"), 2, ["time_limit = nan", "finite"]),
     "output in a file": (with_option("--out", "/dev/null/run.nc"), 2, ["/dev/null", "cannot be written"]),
-    "output is a folder": (with_option("--out", "/tmp"), 2, ["file = '/tmp'", "folder"]),
+    "output is a folder": (with_option("--out", "/tmp"), 2, ["--out = '/tmp'", "folder"]),
     "unknown option": ([*RUN, "--colour", "red"], 2, ["--colour"]),
     "unknown command": (["simulate"], 2, ["simulate"]),
     "no engine": (["run", "sphere_in_cylinder"], 2, ["--engine"]),
@@ -88,7 +88,22 @@ BAD = {
     "engine that commands": (with_option("--engine", "commands"), 3, ["commands diverged", "owned2J it stopped"]),
     "engine that refuses": (with_option("--engine", "refuses"), 3, ["refuses refused", "no wheel, no ball"]),
     "capability that is lacking": (with_option("--set", "rolling_resistance=1e-4"), 3, ["needs rolling resistance"]),
-    "something else asked": (with_option("--ask", "colour"), 2, ["asks = 'colour'", "choose orientation"]),
+    "something else asked": (with_option("--ask", "colour"), 2, ["--ask = 'colour'", "choose orientation"]),
+    "nothing to ask for": (
+        ["run", "pendulum", "--engine", "truth", "--ask", "colour"], 2, ["--ask = 'colour'", "besides its motion"]
+    ),
+    "formulation of another scene": (
+        ["run", "pendulum", "--engine", "mujoco[formulation=free]"], 3, ["revolute joints; choose formulation=joints"]
+    ),
+    "nothing for a value": (with_option("--out", ""), 2, ["argument = ''", "this is empty"]),
+    "picture in a file": (with_option("--plot", "/dev/null/run.svg"), 2, ["--plot = '/dev/null/run.svg'", "cannot be"]),
+    "picture of another kind": (with_option("--plot", "run.gif"), 2, ["--plot = 'run.gif'", ".svg"]),
+    "a model of another scene": (
+        ["export", "pendulum", "pendulum.xml", "--engine", "mujoco[formulation=free]"], 3, ["needs revolute joints"]
+    ),
+    "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
+    "no version": (["engines", "add", "mujoco"], 2, ["--requirement = 'nothing'", "mujoco==VERSION"]),
+    "a scene for a map": (["tradeoff", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
     "orientation of an engine without": (with_option("--ask", "orientation"), 3, ["needs the ball's orientation"]),
     "ladder of nothing": (["ladder", "sphere_in_cylinder", "--quantity", "height"], 2, ["quantity = 'height'"]),
     "ladder of no length": (["ladder", "sphere_in_cylinder", "--until", "0"], 2, ["until = 0", "positive"]),
@@ -537,6 +552,7 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     assert code == 0
     for command in ("scenes", "engines", "run", "compare", "report", "onset", "regimes", "stability"):
         assert command in out
+    assert "..." not in out.partition("Commands:")[2]  # no summary is cut
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
 
@@ -592,9 +608,10 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
 
     arguments = with_option("--engine", "projection[formulation=rotating_frame]")
     for asked in ([], ["--ask", "orientation"]):
-        code, _, err = proofroll(*arguments, *asked, "--out", str(tmp_path / "run.nc"))
+        code, out, err = proofroll(*arguments, *asked, "--out", str(tmp_path / "run.nc"))
         assert (code, err) == (0, "")
         assert ("q_WB" in read(tmp_path / "run.nc")) == bool(asked)
+        assert ("\nq_WB.w " in out) == bool(asked)
 
 
 def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -147,6 +147,15 @@ def test_bad_options(proofroll: Proofroll, arm: Path, arguments: list[str], said
     assert err.count("\n") == 1
 
 
+def test_what_cannot_be(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A file with an inertia that no body has is compared, and not called right though an engine holds it."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf(tip=inertial(ixx="0.01", iyy="0.01", izz="0.9")))
+    code, out, _ = proofroll("check", str(path), "--engine", "pinocchio", "--states", "1")
+    assert code == 1
+    assert "error: link tip: its inertia breaks the triangle inequality" in out
+
+
 def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
     """A robot without moving joints is no question; a free base makes it one."""
     path = tmp_path / "robot.urdf"

@@ -35,6 +35,8 @@ HOSTILE = {
     "same name": ('<robot name="r"><link name="a"/><link name="a"/></robot>', "2 links have this name"),
     "loop": (LOOP, "form a loop"),
     "loop beside": (ISLAND, "form a loop"),
+    "negative mass": (urdf(tip=inertial(mass="-1")), "<link tip> mass = -1.0: no body has a negative mass"),
+    "negative mass of what stands still": (urdf().replace('value="4"', 'value="-4"'), "<link base> mass = -4.0"),
     "NaN mass": (urdf(tip=inertial(mass="nan")), "finite"),
     "infinite inertia": (urdf(tip=inertial(ixx="1e999")), "finite"),
     "words for numbers": (urdf(tip=inertial(com="a b c")), "write numbers"),
@@ -72,6 +74,7 @@ def test_one_line(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=said) as caught:
         read_urdf(open_robot(path))
     assert "\n" not in str(caught.value)
+    assert "folder" in str(caught.value)  # of the file
 
 
 def test_unreadable(tmp_path: Path) -> None:

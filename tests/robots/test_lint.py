@@ -16,6 +16,7 @@ BOX = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
 NOT_POSITIVE = inertial(ixx="-0.01")
 FLAT = inertial(ixx="0.01", iyy="0.01", izz="0.9")
 MASSLESS = inertial(mass="0")
+ROD = inertial(ixx="0", iyy="0.01", izz="0.01", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 EMPTY = inertial(mass="0", ixx="0", iyy="0", izz="0", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 PLANTED = {
     "without inertial": (urdf(), "warning", "links", "1 without <inertial>: tool"),
@@ -23,6 +24,7 @@ PLANTED = {
     "mesh without inertial": (urdf(tool=MESH), "warning", "link tool", "collision mesh was left out"),
     "not positive": (urdf(tip=NOT_POSITIVE), "error", "link tip", "not positive definite"),
     "triangle": (urdf(tip=FLAT), "error", "link tip", "breaks the triangle inequality (0.9 > 0.00699"),
+    "flat to nothing": (urdf(tip=ROD), "warning", "link tip", "a principal moment of zero"),
     "inertia without mass": (urdf(tip=MASSLESS), "error", "link tip", "it has inertia but no mass"),
     "nothing to move": (urdf(tip=EMPTY), "error", "joint j3", "it moves no mass"),
     "turned inertial": (urdf(tip=inertial(rpy="0.1 0 0")), "note", "link tip", "rpy together with products"),

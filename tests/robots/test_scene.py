@@ -129,12 +129,14 @@ def test_what_no_scene_has_is_refused_by_name(robot):
         (
             "broken.urdf",
             urdf(tip=spherical("1", "0.1").replace('izz="0.1"', 'izz="0.9"')),
-            "bodies.tip.inertia.*triangle",
+            "link tip> inertia.*triangle.*possible=0",
         ),
+        ("carried.urdf", urdf(tool=inertial(ixx="-0.01")), "link tool> inertia.*not positive definite.*correct it"),
         ("still.urdf", urdf(kinds=("fixed", "fixed", "fixed")), "nothing in it moves; try --set free_base=1"),
     ):
         with pytest.raises(InputError, match=said):
             load_scene(robot(name, text))
+    assert load_scene(robot("carried.urdf", urdf(tool=inertial(ixx="-0.01"))), possible=0)
 
 
 def test_what_an_mjcf_disables_or_has_beyond_a_scene(robot):

@@ -82,7 +82,15 @@ def _interrupt(number: int, _: FrameType | None) -> None:
 
 
 # A call of ``app`` makes all of them again, which takes longer than many a command.
-_commands = cache(lambda: typer.main.get_command(app))
+@cache
+def _commands() -> Any:
+    made: Any = typer.main.get_command(app)
+    groups = [made]
+    for group in groups:  # which grows
+        for command in group.commands.values():
+            command.short_help = (command.help or "").partition("\n\n")[0]  # else it is cut
+            groups += [command] if hasattr(command, "commands") else []
+    return made
 
 
 def main() -> None:
@@ -93,6 +101,8 @@ def main() -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
         signal.signal(signal.SIGINT, _interrupt)
     try:
+        if not all(map(str.strip, sys.argv[1:])):
+            raise InputError("argument", "", "this is empty; give a value, or leave the option out")
         code = _commands()(standalone_mode=False)
         sys.stdout.flush()  # a full disk shows here, or nowhere
     except typer.TyperException as error:

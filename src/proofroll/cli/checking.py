@@ -10,6 +10,7 @@ from pathlib import Path
 from proofroll.cli import options
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, choices, require_known
+from proofroll.core.number_text import counted
 
 # What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
 READERS = "proofroll.study_readers"
@@ -30,9 +31,7 @@ def check_text(name: str, as_json: bool) -> None:
     if as_json:
         options.write_json(found)
         return
-    counts = ", ".join(
-        f"{count} {what.removesuffix('s') if count == 1 else what}" for what, count in found.counts.items()
-    )
+    counts = ", ".join(counted(count, what) for what, count in found.counts.items())
     needs = f"; engines must provide: {', '.join(found.requires)}" if found.requires else ""
     about = f"{found.scene}, " if found.kind != "scene" and found.scene else ""
     sys.stdout.write(f"{found.name} is sound: {found.kind}, {about}{counts}{needs}\n")
@@ -60,13 +59,11 @@ def checked(name: str) -> SoundFile:
     from proofroll.files.scene_file import scene_folder, scene_names
     from proofroll.files.toml import named_file, study_of
 
-    path = Path(name)
-    scene = str(path.parent) if path.name == "scene.toml" and path.is_file() else name
     try:
-        scene_folder(scene)
+        scene_folder(name)
     except InputError as error:
         file = named_file(name)
-        if path.is_dir():
+        if Path(name).is_dir():
             raise error from None
         if file is None:
             advice = (
@@ -75,7 +72,7 @@ def checked(name: str) -> SoundFile:
             )
             raise InputError("check", name, advice) from None
         return _comparison(file) if study_of(file) is None else _study(file, str(study_of(file)))
-    return _scene(scene)
+    return _scene(name)
 
 
 def _scene(name: str) -> SoundFile:

@@ -57,11 +57,9 @@ def asked(name: str, parameters: Mapping[str, str], workers: Workers) -> Compari
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import load_comparison
-    from proofroll.files.scene_file import is_scene
-    from proofroll.files.scene_sources import source_of
-    from proofroll.files.toml import named_file
+    from proofroll.files.scene_file import means_scene
 
-    if source_of(name) is not None or (named_file(name) is None and (is_scene(name) or Path(name).is_dir())):
+    if means_scene(name):
         from proofroll.studies.first_look import compared
 
         return compared(name, parameters, workers)

@@ -59,7 +59,9 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
 @engines.command()
 def add(
     name: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
-    requirement: Annotated[list[str], typer.Option(help="What is installed, as pip reads it, e.g. mujoco==3.8.1.")],
+    requirement: Annotated[
+        list[str] | None, typer.Option(help="What is installed, as pip reads it, e.g. mujoco==3.8.1.")
+    ] = None,
     label: Annotated[str, typer.Option(help="Remember it as NAME@LABEL; by default the version that is pinned.")] = "",
     python: Annotated[str, typer.Option(help="Its Python, e.g. python3.12; by default the one that runs this.")] = "",
 ) -> None:
@@ -70,7 +72,7 @@ def add(
     from proofroll.running.make_environment import add as made
 
     with options.spinner(f"{name}: making an environment") as say:
-        found = made(name, requirement, label, python, lambda text: say(f"{name}: {text}"))
+        found = made(name, requirement or (), label, python, lambda text: say(f"{name}: {text}"))
     sys.stdout.write(f"{name}@{found.label}: {name} {found.version}, Python {found.interpreter}, in {found.folder}\n")
 
 

@@ -22,7 +22,7 @@ def export(
     from proofroll.running.store import write_text
     from proofroll.studies.cases import single_case
 
-    options.require_writable(file)
+    options.require_writable(file, "file")
     case = single_case(scene, options.assignments(settings), engine, until=1.0, every=1.0, time_limit=60.0)
     with options.spinner(f"{scene} in {case.engine.name}"):
         text = model_file(case)

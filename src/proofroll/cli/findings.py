@@ -7,6 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from proofroll.cli import options
+from proofroll.core.number_text import counted
 
 
 def findings(
@@ -39,4 +40,4 @@ def findings(
     ]
     shares = ", ".join(f"{name} {count}" for name, count in counts.items() if count)
     content = {"counts": counts, "findings": told}
-    options.show(content, as_json, lambda: [findings_table(rows), f"Of {len(rows)} findings: {shares}."])
+    options.show(content, as_json, lambda: [findings_table(rows), f"Of {counted(len(rows), 'findings')}: {shares}."])

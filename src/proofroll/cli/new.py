@@ -20,6 +20,7 @@ new = typer.Typer(help="Write a working start: a scene, a comparison, or an engi
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
 _UNTIL, _EVERY = 1.0, 0.02
+_ANOTHER = "choose another name"
 
 
 @new.command()
@@ -29,7 +30,9 @@ def scene(name: Name) -> None:
 
     folder = _fresh(name, name)
     if name in scene_names():
-        raise InputError("name", name, "a scene of the package is called so, and commands would take that one")
+        raise InputError(
+            "name", name, f"a scene of the package is called so, and commands would take that one; {_ANOTHER}"
+        )
     _write(folder / "scene.toml", _filled(_TEMPLATES / "scene.toml", {"name": name}))
     _say(folder, f"proofroll check {folder}", f"proofroll run {folder} --engine truth")
 
@@ -38,8 +41,13 @@ def scene(name: Name) -> None:
 def comparison(name: Name, scene: Annotated[str, typer.Option(help="The scene, or the path of its folder.")]) -> None:
     """Write NAME.toml: every installed engine that can, held against the truth of a scene."""
     from proofroll.files.scene_file import load_scene
+    from proofroll.files.toml import named_file
 
     file = _fresh(name, f"{name}.toml")
+    if named_file(name) is not None:
+        raise InputError(
+            "name", name, f"a study of the package is called so, and commands would take that one; {_ANOTHER}"
+        )
     _write(file, _comparison(name, scene, load_scene(scene)))
     _say(file, f"proofroll check {file}", f"proofroll compare {file}")
 
@@ -53,8 +61,8 @@ def engine(name: Name) -> None:
     from proofroll.files.data_folders import data_folder
 
     folder = _fresh(name, name)
-    if name in engine_names() or find_spec(name):
-        raise InputError("name", name, "an engine or a package that is installed is called so; choose another name")
+    if name in {*engine_names(), "truth"} or find_spec(name):
+        raise InputError("name", name, f"an engine or a package that is installed is called so; {_ANOTHER}")
     names = {"name": name, "Class": "".join(part.capitalize() for part in name.split("_")) or name}
     for template in sorted((_TEMPLATES / "engine").rglob("*")):
         if template.is_file():  # those end in .txt of which tools would think that they are files of this project
@@ -72,10 +80,12 @@ def _fresh(name: str, path: str) -> Path:
     Raises:
         InputError: the name is none, or something of that name is there.
     """
-    if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError("name", name, "write small letters, digits and _, a letter first")
+    if keyword.iskeyword(name):
+        raise InputError("name", name, f"a word of Python's is written so; {_ANOTHER}")
     if Path(path).exists():
-        raise InputError("name", path, "this is there already; choose another name or folder")
+        raise InputError("name", path, f"this is there already; {_ANOTHER} or folder")
     return Path(path)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, ProofrollError
 
 if TYPE_CHECKING:
     from rich.console import Console, RenderableType
@@ -119,13 +119,16 @@ def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str
     return found
 
 
-def require_writable(path: Path) -> None:
+def require_writable(path: Path, option: str = "--out") -> None:
     """Fails before the run rather than after it."""
     from proofroll.running.store import Store
 
     if path.is_dir():
-        raise InputError("file", str(path), "this is a folder; name a file in it")
-    Store(path.parent)
+        raise InputError(option, path, "this is a folder; name a file in it")
+    try:
+        Store(path.parent)
+    except ProofrollError as error:
+        raise InputError(option, path, str(error).removesuffix(" with --out")) from None
 
 
 @contextmanager

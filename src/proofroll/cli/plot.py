@@ -44,7 +44,7 @@ def replay(
 
     target = trajectory.parent / f"{trajectory.stem}-replay.html" if out is None else out
     if target.suffix.lower() != ".html":
-        raise InputError("--out", str(target), "a replay is a page: end the name of the file in .html")
+        raise InputError("--out", target, "a replay is a page: end the name of the file in .html")
     options.require_writable(target)
     options.require_pages()
     run = read_run(trajectory)

@@ -54,13 +54,13 @@ def run(
 
     if until is not None:
         time_grid(until, EVERY if every is None else every)
-    for file in (out, plot):
+    for option, file in (("--out", out), ("--plot", plot)):
         if file is not None:
-            options.require_writable(file)
+            options.require_writable(file, option)
     if out is not None and out.suffix not in (NETCDF, STORED):  # a scene.toml would be written over
-        raise InputError("--out", str(out), f"end the name of the file in {NETCDF} or {STORED}")
+        raise InputError("--out", out, f"end the name of the file in {NETCDF} or {STORED}")
     if plot is not None:
-        require_ending(plot)
+        require_ending(plot, "--plot")
     preparing.join()
     case = single_case(
         scene,

@@ -65,12 +65,12 @@ def question_of(
 ) -> tuple[TradeoffClaims | None, Question]:
     """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
     from proofroll.core.time_grid import time_grid
-    from proofroll.files.scene_file import load_scene
+    from proofroll.files.scene_file import is_scene, load_scene
     from proofroll.studies.claims import claims_for, load_claims
     from proofroll.studies.curve import Question
 
     path = Path(scene)
-    claims = load_claims(path) if path.suffix == ".toml" else claims_for(scene)
+    claims = load_claims(path) if path.suffix == ".toml" and not is_scene(scene) else claims_for(scene)
     name = claims.scene if claims else scene
     given = options.assignments(settings)
     if claims and not given and until is None:

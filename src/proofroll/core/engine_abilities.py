@@ -198,6 +198,9 @@ def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
     reasons = engine.lacking.get(formulation, {}) if isinstance(engine, SaysWhyNot) else {}
     missing = sorted(scene.requires - engine.provides[formulation])
     if missing:
-        raise Refused(
-            "needs " + ", ".join(f"{name}, and {reasons[name]}" if name in reasons else name for name in missing)
+        able = [name for name, given in engine.provides.items() if scene.requires <= given]
+        instead = (
+            f"choose formulation={' or '.join(able)}" if able else f"no formulation of {engine.name} has all of that"
         )
+        needs = ", ".join(f"{name}, and {reasons[name]}" if name in reasons else name for name in missing)
+        raise Refused(f"needs {needs}; {instead}")

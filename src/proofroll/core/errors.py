@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
@@ -48,6 +49,15 @@ class Missing(ProofrollError):  # noqa: N818 -- likewise: the engine is not inst
 
 class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
     """The engine gave up or produced a state that is not finite; the text says when."""
+
+
+@contextmanager
+def told_of(place: str) -> Iterator[None]:
+    """Problems that are found in the block are told with the name of a file, see :meth:`InputError.of`."""
+    try:
+        yield
+    except InputError as error:
+        raise error.of(place) from None
 
 
 def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:

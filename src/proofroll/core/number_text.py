@@ -22,3 +22,9 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
 def error(value: float | None, digits: int = 2) -> str:
     """An error; infinite where there is none that is finite."""
     return number(value, digits, none="∞")
+
+
+def counted(count: int, many: str) -> str:
+    """How many, with the noun that is given for many of them: ``1 velocity``, ``2 velocities``."""
+    one = f"{many.removesuffix('ies')}y" if many.endswith("ies") else many.removesuffix("s")
+    return f"{count} {one if count == 1 else many}"

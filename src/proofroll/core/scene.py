@@ -57,8 +57,8 @@ class Scene:
                 raise InputError("scene", name, "a dot parts a quantity from its element; name the element without")
         for name in self.asks:
             if not any(name in element.askable for element in self.elements):
-                known = choices(dict.fromkeys(known for element in self.elements for known in element.askable))
-                advice = f"no element of the scene has that to ask for; choose {known}" if known else _NOTHING
+                known = dict.fromkeys(known for element in self.elements for known in element.askable)
+                advice = f"no element of the scene has that to ask for; choose {choices(known)}" if known else _NOTHING
                 raise InputError("asks", name, advice)
 
     @property

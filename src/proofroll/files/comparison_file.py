@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError, require_known, told_of
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
 from proofroll.core.time_grid import time_grid
@@ -58,10 +58,8 @@ def load_comparison(name: str) -> Comparison:
 
 
 def _comparison(path: Path, content: dict[str, Any]) -> Comparison:
-    try:
+    with told_of(path.name):
         return _checked(path, content)
-    except InputError as error:
-        raise error.of(path.name) from None
 
 
 def _checked(path: Path, content: dict[str, Any]) -> Comparison:

@@ -24,7 +24,7 @@ from proofroll.core.validation import strict, units_of, validated
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_parameters import Parameter, check_parameters, values_of
 from proofroll.files.scene_sources import source_of
-from proofroll.files.toml import read_toml
+from proofroll.files.toml import named_file, read_toml
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,8 @@ def scene_folder(name: str) -> Path:
         InputError: there is no such scene.
     """
     missing = "there is no such scene"
-    for folder in (data_folder("models") / name, Path(name)):
+    own = Path(name).parent if Path(name).name == "scene.toml" else Path(name)
+    for folder in (data_folder("models") / name, own):
         try:
             if name and (folder / "scene.toml").is_file():
                 return folder
@@ -117,6 +118,11 @@ def scene_folder(name: str) -> Path:
         except (OSError, ValueError):  # too long for a file system, or a zero byte
             break
     raise InputError("scene", name, f"{missing}; choose one of {', '.join(scene_names())}")
+
+
+def means_scene(name: str) -> bool:
+    """Whether a scene is meant by a name that a comparison may have too; the comparison is meant where both have it."""
+    return source_of(name) is not None or (named_file(name) is None and (is_scene(name) or Path(name).is_dir()))
 
 
 def is_scene(name: str) -> bool:

@@ -73,15 +73,16 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
         InputError: it is broken, or for something else.
     """
     content = read_toml(path)
-    if content.pop("study", None) != study:
-        raise InputError(str(path), "study", f'only a file with study = "{study}" can be used here')
+    given = content.pop("study", "nothing")
+    if given != study:
+        raise InputError(f"{path}: study", given, f'only a file with study = "{study}" can be used here')
     return content
 
 
 def named_file(name: str) -> Path | None:
-    """The file at a path, or the one of this name, with or without ``.toml``, in a folder of studies."""
+    """The file at a path, but a scene's, or the one of this name, with or without ``.toml``, in a folder of studies."""
     places = [Path(name), *(folder / file for folder in study_folders() for file in (f"{name}.toml", name))]
-    return next((place for place in places if place.is_file()), None)
+    return next((place for place in places if place.is_file() and place.name != "scene.toml"), None)
 
 
 def study_file(name: str, study: str) -> tuple[Path, dict[str, Any]]:

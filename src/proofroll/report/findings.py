@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.events import EVENT_ORDER
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
@@ -60,10 +60,10 @@ def _answer(content: ReportedComparison, found: list[Score]) -> str:
         if count:
             parts.append(f"{count} {one if count == 1 else many} {rest}")
     unexpected = len(content.contradictions)
-    expected = f"Not expected: {unexpected} findings."
+    expected = f"Not expected: {counted(unexpected, 'findings')}."
     if content.as_expected:
         expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
-    text = f"Of {len(rows)} engine settings, {_joined(parts)}. {expected}"
+    text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
     best = cheapest(found, "worst", EVERYDAY)
     if best:
         cost = number(best.seconds_per_second)

@@ -75,6 +75,9 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         return content
     columns = read_columns(trajectory)
     curves = {key: item for key, item in columns.variables.items() if item.dims == ("time",) and key != "time"}
+    turned = {key: item for key, item in columns.variables.items() if case.asks and item.dims == ("time", "wxyz")}
+    for key, item in turned.items():
+        curves |= {f"{key}.{part}": item._replace(values=item.values[:, i]) for i, part in enumerate("wxyz")}
     smallest = {name: float(value) for key, value in columns.attrs.items() if (name := _after(SMALLEST, key))}
     return replace(
         content,

@@ -16,9 +16,9 @@ ENDINGS = (".html", ".svg", ".png", ".pdf")
 _COLUMNS = 2
 
 
-def require_ending(path: Path) -> None:
+def require_ending(path: Path, option: str = "--out") -> None:
     """Raises InputError if the ending of a file names no kind of picture."""
-    require_known("plot", path.suffix.lower(), ENDINGS, "end the name of the file in one of", str(path))
+    require_known(option, path.suffix.lower(), ENDINGS, "end the name of the file in one of", path)
 
 
 def read_run(path: Path) -> xr.Dataset:
@@ -32,11 +32,11 @@ def read_run(path: Path) -> xr.Dataset:
     try:
         dataset = read(path)
     except FileNotFoundError:
-        raise InputError("run", str(path), "there is no such file; proofroll run … --out writes one") from None
+        raise InputError("run", path, "there is no such file; proofroll run … --out writes one") from None
     except (OSError, ValueError, TypeError, KeyError):
-        raise InputError("run", str(path), "no run in netCDF or npz; proofroll run … --out writes one") from None
+        raise InputError("run", path, "no run in netCDF or npz; proofroll run … --out writes one") from None
     if not curves(dataset):
-        raise InputError("run", str(path), "it has no variable over time; proofroll run … --out writes such a file")
+        raise InputError("run", path, "it has no variable over time; proofroll run … --out writes such a file")
     return dataset
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.files.scene_file import is_scene, load_scene
+from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.files.trajectory_file import STORED, write
 from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
@@ -44,9 +44,9 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     scene = _scene(path, run, name)
     kind = kind_of(scene)
     if kind is None or not kind.replay_script:
-        raise InputError("run", str(path), f"nothing that is installed draws the scene {scene.title}")
+        raise InputError("run", path, f"nothing that is installed draws the scene {scene.title}")
     if "p_WB" not in run:
-        raise InputError("run", str(path), f"it has no poses of bodies (p_WB); {_WRITES}")
+        raise InputError("run", path, f"it has no poses of bodies (p_WB); {_WRITES}")
     usual = load_scene(name).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
     with tempfile.TemporaryDirectory() as folder:
@@ -81,12 +81,16 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     except (KeyError, ValueError):
         name = ""
     if not name:
-        raise InputError("run", str(path), f"it does not say which scene it is of; {_WRITES}")
+        raise InputError("run", path, f"it does not say which scene it is of; {_WRITES}")
     if not is_scene(name):
         raise InputError("scene", name, "the scene of this run is not there; say where it lies by --scene PATH")
+    ran, here = str(run.attrs.get("scene")), read_scene_file(name).parameters
+    if lacking := sorted(parameters.keys() - here):
+        raise InputError("scene", name, f"the run is one of {ran}, and this scene has no {', '.join(lacking)}")
     scene = load_scene(name, **parameters)
     if digest not in {scene.digest, scene.fully_asked.digest}:
-        raise InputError("run", str(path), f"the scene {name} has changed since this run; run it again")
+        advice = f"the scene {name} has changed since this run of {ran}, or is another; run it, or say which by --scene"
+        raise InputError("run", path, advice)
     return scene.fully_asked
 
 

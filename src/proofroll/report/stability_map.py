@@ -9,7 +9,7 @@ import textwrap
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import name_of, step
 from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL
@@ -61,8 +61,9 @@ def letters(study: StabilityStudy) -> dict[str, str]:
 def legend(study: StabilityStudy) -> list[str]:
     """What the cells say, as sentences."""
     kinds = ", ".join(f"{letter} {kind}" for kind, letter in letters(study).items())
+    sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
     return [
-        f"{study.scene}: {len(study.points)} points, {study.boundaries} boundaries, {study.silent} silent.",
+        f"{study.scene}: {sizes}, {study.silent} silent.",
         "Steps per natural time (or tolerance) that 1 % of the range needs; – no affordable one does; ? no truth.",
         f"Letter: what is beyond the boundary of stability, or else of 1 % ({kinds}); ! the engine did not say so.",
     ]

@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.report.labels import name_of, step, with_caveat
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts
@@ -33,10 +33,8 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
 def headline(study: StabilityStudy) -> str:
     """How many points, boundaries, and silent ones among them."""
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
-    said = (
-        f"{len(study.points)} points, {study.boundaries} boundaries of which {study.silent} are silent "
-        f"({study.runs} runs)."
-    )
+    sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
+    said = f"{sizes}, {study.silent} of them silent ({counted(study.runs, 'runs')})."
     if counts:
         said += f" Beyond: {counts}."
     if study.refused:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import log
 from typing import Any
 
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.report.comparison_records import ReportedComparison
 from proofroll.report.labels import name_of, off_by, step, symbol, unit, with_caveat
 from proofroll.report.scores import EVERYDAY, cheapest, closest, furthest_off, scores
@@ -35,7 +35,7 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
     counts = Counter(row.verdict.value for row in rows)
     agree = "agrees" if counts["agrees"] == 1 else "agree"
     where = "one comparison" if len(comparisons) == 1 else f"{len(comparisons)} comparisons"
-    said = f"Of {len(rows)} settings in {where}, {counts['agrees']} {agree} with the truth everywhere"
+    said = f"Of {counted(len(rows), 'settings')} in {where}, {counts['agrees']} {agree} with the truth everywhere"
     rest = {
         "unconfirmed": "at this step, with a limit that is not confirmed",
         "incomplete": "without reporting all that is judged",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.core.verdict import Verdict
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
 from proofroll.report.screen import Screen, numeric, plain_table, unbroken
@@ -106,7 +106,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     rows = content.rows
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
-    lines = [f"{len(rows)} engine settings, {len(content.runs)} runs in all: {said}."]
+    lines = [f"{counted(len(rows), 'engine settings')}, {counted(len(content.runs), 'runs')} in all: {said}."]
     for name, row, _ in content.lines():
         lines += [f"{SYMBOLS[row.verdict]} {name}: {row.reason}"] if row.reason else []
         lines += [f"  {told.cause.sentence}" for told in row.diagnosis]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
+from proofroll.core.number_text import counted
 from proofroll.files.json_data import MERGED
 from proofroll.report import tradeoff_tables
 from proofroll.report.pages import element
@@ -72,7 +73,7 @@ class TradeoffPart(Part):
     @staticmethod
     def line(entry: TradeoffEntry) -> str:
         """How much was measured, and what holds of what was claimed."""
-        return f"{len(entry.study.points)} points{held(entry.claims)}"
+        return f"{counted(len(entry.study.points), 'points')}{held(entry.claims)}"
 
     def keeps(self, out: Path) -> bool:
         """The whole study, or else a brief one."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from proofroll.core.number_text import counted as told
 from proofroll.core.number_text import error, number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison_records import Cost, ReportedComparison, ReportedRow, ReportedRun
@@ -81,7 +82,7 @@ def counted(content: ReportedComparison) -> str:
     verdicts = [row.verdict.value for row in content.rows]
     said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
     found = "nothing is contradicted" if unjudged(content) else "as expected"
-    return f"{len(verdicts)} settings: {said}; {found if content.as_expected else 'not as expected'}"
+    return f"{told(len(verdicts), 'settings')}: {said}; {found if content.as_expected else 'not as expected'}"
 
 
 def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:

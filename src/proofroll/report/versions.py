@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import environment, rendered
 from proofroll.report.screen import plain_table, unbroken
@@ -27,7 +27,7 @@ def heading(content: VersionsStudy) -> str:
 def answer(content: VersionsStudy) -> str:
     """What changed, in one sentence."""
     if content.robot is not None:
-        said = f"{len(content.changed)} changes in how they hold {content.robot.file}"
+        said = f"{counted(len(content.changed), 'changes')} in how they hold {content.robot.file}"
         return said if content.changed else f"Both hold {content.robot.file} alike."
     cases = content.cases
     changed = sum(bool(case.changed) for case in cases)
@@ -39,7 +39,7 @@ def answer(content: VersionsStudy) -> str:
         ("no numbers in one or both", len(cases) - len(kinds)),
     ) if count]  # fmt: skip
     verdicts = f"{changed} of {len(cases)} cases have another verdict" if changed else "no verdict changed"
-    return f"{len(cases)} cases: {', '.join(parts)}; {verdicts}."
+    return f"{counted(len(cases), 'cases')}: {', '.join(parts)}; {verdicts}."
 
 
 def cells(row: SettingDifference) -> list[str]:

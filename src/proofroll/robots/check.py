@@ -67,7 +67,7 @@ def check(
         robot, compiler = meaning(file, written, time_limit, lent)
         by = f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
         if not robot.moving:
-            raise InputError("file", str(path), "nothing in it moves" + _fixed_hint(file))
+            raise InputError("file", path, "nothing in it moves" + _fixed_hint(file))
         sampled = random_states(robot, states, seed)
         truth = RobotTruth.of(robot, sampled)
         bar = _bar(truth)

@@ -25,7 +25,8 @@ def check(
 ) -> None:
     """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
 
-    Of a robot file: exit 1 if an engine does not hold the model that the file describes. The options are for these.
+    Of a robot file: exit 1 if an engine does not hold the model that the file describes, or if the file describes what
+    cannot be. The options are for these.
     """
     if is_text_check(file):
         _require_none_for_robots(context)
@@ -45,7 +46,7 @@ def check(
         write_text(out / "check.html", page(content))
         write_text(out / "check.json", options.json_text(content))
     options.show(content, as_json, lambda: check_parts(content), widest=WIDTH)
-    if any(row.differs for row in content.engines):
+    if any(row.differs for row in content.engines) or any(finding.level == "error" for finding in content.lint):
         raise typer.Exit(options.CONTRADICTED)
     raise typer.Exit(options.OK if any(row.layers for row in content.engines) else options.ENGINE)
 

@@ -118,7 +118,7 @@ def meaning(
             with lent.lend(asked) as worker:
                 robot, by = reading.compiled(worker, file, written, time_limit)
         except WorkerDied as error:
-            raise InputError("file", str(file.path), f"it could not be compiled: {error}") from None
+            raise InputError("file", file.path, f"it could not be compiled: {error}") from None
         _defines[file.kind] = by.engine
         lent.rename(asked, by.engine)  # which it has loaded, and is asked next what it holds
     return robot.change(name=file.root.get("model", "robot")), by

@@ -32,17 +32,14 @@ def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
     noun = "link" if file.kind == "urdf" else "body"
     for name, body in robot.bodies.items():
         where = f"{noun} {name}"
-        if body.mass < 0:
-            yield "error", where, f"negative mass {body.mass:g} kg"
         if not np.any(body.inertia):
             continue
         if not body.mass:
             yield "error", where, "it has inertia but no mass; engines invent different masses"
-        a, b, c = body.moments
-        if a <= 0:
-            yield "error", where, f"inertia is not positive definite (smallest moment {a:.3g} kg m²)"
-        elif body.breaks_triangle:
-            yield "error", where, f"inertia breaks the triangle inequality ({c:.3g} > {a:.3g} + {b:.3g} kg m²)"
+        if body.impossible:
+            yield "error", where, f"its inertia {body.impossible}; correct it, for engines replace, refuse or take it"
+        elif body.moments[0] <= 0:
+            yield "warning", where, "its inertia has a principal moment of zero; some engines refuse that"
     for joint in robot.moving:
         if joint.kind == "free" or robot.groups[joint.name].mass:
             continue

@@ -41,7 +41,7 @@ def stripped(root: Element, path: Path) -> tuple[Element, list[LintFinding]]:
     _include(root, path, path.resolve().parent, (path.resolve(),))
     for element in root.iter():
         if element.tag in _UNCOVERED:
-            raise InputError("file", str(path), f"the check does not cover <{element.tag}>")
+            raise InputError("file", path, f"the check does not cover <{element.tag}>")
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in _LOOKS or child.get("hfield"):

@@ -43,6 +43,14 @@ class RobotBody:
         return np.asarray(np.linalg.eigvalsh(self.inertia), dtype=np.float64)
 
     @property
+    def impossible(self) -> str:
+        """Why no rigid body has this inertia, by more than round-off; empty: one may."""
+        a, b, c = self.moments
+        if a < -_ROUNDING * np.abs(self.inertia).max():
+            return f"is not positive definite (smallest moment {a:.3g} kg m²)"
+        return f"breaks the triangle inequality ({c:.3g} > {a:.3g} + {b:.3g} kg m²)" if self.breaks_triangle else ""
+
+    @property
     def breaks_triangle(self) -> bool:
         """Whether the largest principal moment exceeds the sum of the others by more than round-off."""
         small, middle, large = self.moments

@@ -161,7 +161,7 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
     """
     told = worker.request(_call(compile_robot, path=str(written)), time_limit)
     if told["robot"] is None:
-        raise InputError("file", str(file.path), f"it has no meaning: {told['message']}")
+        raise InputError("file", file.path, f"it has no meaning: {told['message']}")
     return robot_from(told["robot"]), Compiler(*told["by"])
 
 

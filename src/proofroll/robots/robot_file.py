@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError, require_known, told_of
 
 # Of the XML of strangers; a robot file is a few hundred kB, the largest known is 2 MB.
 LARGEST, DEEPEST, MOST_ELEMENTS = 32 * 2**20, 400, 200_000
@@ -57,19 +57,24 @@ def open_robot(path: Path, base: str = "fixed") -> RobotFile:
     Raises:
         InputError: the file is broken, of another kind, too large, or asks for files outside its folder.
     """
+    require_known("base", base, BASES)
+    with told_of(str(path)):
+        return _opened(path, base)
+
+
+def _opened(path: Path, base: str) -> RobotFile:
     from proofroll.robots import mjcf, urdf
 
-    require_known("base", base, BASES)
     root = read_xml(path)
     if root.tag == "robot":
         kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
         kind, (root, findings), body = "mjcf", mjcf.stripped(root, path), "body"
     else:
-        raise InputError("file", str(path), f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
+        raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
     if count > MOST_BODIES:
-        raise InputError("file", str(path), f"it has {count} {body}s; at most {MOST_BODIES} are checked")
+        raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
     return RobotFile(path, kind, root, base, tuple(findings))
 
 
@@ -107,20 +112,20 @@ def read_xml(path: Path) -> Element:
     """
     try:
         if not path.is_file():
-            raise InputError("file", str(path), "there is no such file")
+            raise InputError("file", path, "there is no such file")
         if path.stat().st_size > LARGEST:
-            raise InputError("file", str(path), f"the file is larger than {LARGEST // 2**20} MB")
+            raise InputError("file", path, f"the file is larger than {LARGEST // 2**20} MB")
         text = path.read_bytes()
     except OSError as error:
-        raise InputError("file", str(path), f"the file cannot be read: {error.strerror}") from None
+        raise InputError("file", path, f"the file cannot be read: {error.strerror}") from None
     parser = XMLParser(target=_Builder())
     try:
         parser.feed(text)
         root: Element = parser.close()
     except _TooMuch as error:
-        raise InputError("file", str(path), str(error)) from None
+        raise InputError("file", path, str(error)) from None
     except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that does not exist
-        raise InputError("file", str(path), f"this is no XML: {error}") from None
+        raise InputError("file", path, f"this is no XML: {error}") from None
     return root
 
 

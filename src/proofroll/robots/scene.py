@@ -60,6 +60,9 @@ class RobotScenes:
             left_out.append("stops of joints (unless limits=1)")
         if next(_couplings(file, robot), None) is not None:
             parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", _SWITCH)
+        if any(body.impossible for body in robot.bodies.values()):
+            words = "whether each link must be a body that can be (1), or what a joint moves as a whole (0)"
+            parameters["possible"] = (1, "1", words, _SWITCH)
         return {
             "title": f"{robot.name}, released from a random pose",
             "source": f"{path.name}, {file.kind.upper()}",
@@ -81,7 +84,11 @@ class RobotScenes:
         file, robot = _robot(path, BASES[int(values.get("free_base", 0))])
         if not robot.moving:
             hint = "; try --set free_base=1" if file.kind == "urdf" and not values["free_base"] else ""
-            raise InputError("file", str(path), f"nothing in it moves{hint}")
+            raise InputError("file", path, f"nothing in it moves{hint}")
+        for link, body in robot.bodies.items() if values.get("possible") else ():
+            if body.impossible:
+                advice = f"it {body.impossible}; correct it, or take what each joint moves as a whole by possible=0"
+                raise InputError(f"{path}: <link {link}> inertia", body.moments.tolist(), advice)
         start = random_states(robot, 1, int(values["seed"]))
         names = _names(robot)
         gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])

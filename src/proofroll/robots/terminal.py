@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import error
+from proofroll.core.number_text import counted, error
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal import STYLES
@@ -66,8 +66,7 @@ def lines(content: RobotCheck) -> Iterator[str]:
     """What was read, what is wrong with the file, and every engine's causes, in lines of at most 80 characters."""
     truth = content.truth
     base = f", {content.base} base" if content.kind == "urdf" else ""
-    moves = f"{truth.velocities} {'velocity' if truth.velocities == 1 else 'velocities'}"
-    states = f"{truth.states} {'state' if truth.states == 1 else 'states'}"
+    moves, states = counted(truth.velocities, "velocities"), counted(truth.states, "states")
     said = f"{content.file}: {content.kind.upper()}{base}, {moves}, {states}"
     yield from wrapped(said)
     yield from wrapped(f"true is {truth.by}; its two formulations differ by {amount(truth.difference)}")
@@ -127,7 +126,8 @@ def gallery_lines(content: GalleryContent) -> Iterator[str]:
     named = sum(bool(item.causes) for item in checked)
     unnamed = sum("open" in item.does for item in checked)
     refused = sum(item.status == "refused" for item in checked)
+    sizes = f"{counted(len(content.robots), 'robots')}, {counted(len(checked), 'readings')}"
     yield from wrapped(
-        f"{len(content.robots)} robots, {len(checked)} readings: {named} differ for named causes, {unnamed} have an "
-        f"open one, {refused} refused; {unexpected} otherwise than expected."
+        f"{sizes}: {named} differ for named causes, {unnamed} have an open one, {refused} refused; "
+        f"{unexpected} otherwise than expected."
     )

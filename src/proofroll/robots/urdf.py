@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, told_of
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
 
@@ -60,10 +60,15 @@ def read_urdf(file: RobotFile) -> Robot:
     Raises:
         InputError: the file breaks the specification so that it has no meaning, or holds a planar or floating joint.
     """
+    with told_of(str(file.path)):
+        return _robot(file)
+
+
+def _robot(file: RobotFile) -> Robot:
     links = _named(file.root, "link")
     elements = _named(file.root, "joint")
     if not links:
-        raise InputError("file", str(file.path), "it has no links")
+        raise InputError("file", file.path, "it has no links")
     bodies, sources = {}, {}
     for name, link in links.items():
         bodies[name], sources[name] = _body(name, link)
@@ -111,6 +116,8 @@ def _body(name: str, link: Element) -> tuple[RobotBody, dict[str, Any]]:
     com, R = _origin(inertial)
     mass = inertial.find("mass")
     m = 0.0 if mass is None else numbers(mass, "value", None, 1)[0]
+    if m < 0:
+        raise InputError(f"<link {name}> mass", m, "no body has a negative mass; correct it")
     written = np.zeros((3, 3))
     moments = inertial.find("inertia")
     if moments is not None:

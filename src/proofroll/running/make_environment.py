@@ -35,6 +35,7 @@ found = sorted({f"{item.name}=={item.version}" for item in distributions()})
 print(json.dumps([platform.python_version(), found]))
 """
 _PINNED = re.compile(r"\s*([\w.-]+)(?:\[[^\]]*\])?\s*==\s*(\w[\w.+-]*)\s*")
+_VERSIONS = re.compile(r"\(from versions: (?:[^)]*, )?((?:[^,)]+, ){2}[^,)]+)\)")  # in what pip says
 _WORDS = 400  # of what pip says the end is shown [characters]
 
 
@@ -62,7 +63,13 @@ def add(
     """
     tell = tell or (lambda _: None)
     if not re.fullmatch(r"[\w-]+", name):
-        raise InputError("engine", name, "give the plain name of an engine, e.g. mujoco")
+        plain = re.split(r"\W", name.strip(), maxsplit=1)[0] or "mujoco"
+        advice = f"give the plain name of an engine: proofroll engines add {plain} --requirement {plain}==VERSION"
+        raise InputError("engine", name, advice)
+    if not requirements:
+        raise InputError(
+            "--requirement", "nothing", f"say what to install, e.g. --requirement {package_of(name) or name}==VERSION"
+        )
     for text in requirements:
         if text.lstrip().startswith("-"):
             raise InputError("--requirement", text, "give a requirement, e.g. mujoco==3.8.1, not an option of pip")
@@ -245,7 +252,8 @@ def _call(command: Sequence[str | Path]) -> str:
         raise
     if process.returncode:
         errors = [line for line in said.splitlines() if line.startswith("ERROR:")]
-        words = " ".join(" ".join(errors or said.splitlines() or printed.splitlines()).split())[-_WORDS:]
+        words = " ".join(" ".join(errors or said.splitlines() or printed.splitlines()).split())
+        words = _VERSIONS.sub(r"(the last versions are \1)", words)[-_WORDS:]
         program = Path(str(command[0])).name
         what = " ".join(str(item) for item in command[1:4] if str(item).isascii() and len(str(item)) < 20)
         raise ProofrollError(f"{program} {what} failed ({process.returncode}): {words}")

@@ -55,7 +55,10 @@ def single_case(
     if "asks" in parameters:
         raise InputError("asks", parameters["asks"], "this is no parameter; ask for it with --ask")
     spec = parse_engine(engine)
-    loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked and converted there
+    try:
+        loaded = load_scene(scene, asks=asks, **parameters)  # type: ignore[arg-type]  # text is checked there
+    except InputError as error:
+        raise InputError("--ask", error.value, error.advice) if error.field == "asks" else error from None
     facts = resolve([(spec.name, spec.options)], workers, loaded.requires)[0]
     if isinstance(facts, ProofrollError):
         raise facts

@@ -20,7 +20,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
 from proofroll.core.truth import TRUTHS, load_truths
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.scene_file import is_scene, load_scene, read_scene_file, scene_folder
+from proofroll.files.scene_file import is_scene, load_scene, means_scene, read_scene_file, scene_folder
 from proofroll.files.toml import named_file
 from proofroll.files.trajectory_file import NETCDF, STORED, read
 
@@ -102,7 +102,7 @@ def _named(subject: str) -> list[_Named]:
         if not found:
             raise InputError("result", path.name, "it names neither an engine nor a scene; name a file of proofroll's")
         return found
-    if named_file(subject) is None and is_scene(subject):
+    if means_scene(subject):
         return [("scene", subject, "")]
     if subject in engine_names():
         return [("engine", subject, "")]

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, told_of
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_content, study_files
@@ -92,7 +92,8 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
     found = validated(TradeoffClaims, given, where, name=path.stem)
-    _check(where, found)
+    with told_of(where):
+        _check(where, found)
     return found
 
 

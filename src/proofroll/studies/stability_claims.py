@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import InputError, require_known, told_of
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
-from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.files.toml import study_content, study_files
 from proofroll.studies.axes import Axis, AxisTerm
 from proofroll.studies.failure import meanings
@@ -155,7 +155,7 @@ def file_for(scene: str) -> StabilityFile:
     Raises:
         InputError: there is no such scene, or the file is broken.
     """
-    if scene.endswith(".toml"):
+    if Path(scene).suffix == ".toml" and not is_scene(scene):
         return _load(Path(scene))
     for path, content in study_files(STUDY):
         if content.get("scene") == scene:
@@ -168,7 +168,8 @@ def _load(path: Path) -> StabilityFile:
     where = path.name
     content = study_content(path, STUDY)
     found = validated(StabilityFile, content, where, name=path.stem)
-    _check(where, found)
+    with told_of(where):
+        _check(where, found)
     return found
 
 

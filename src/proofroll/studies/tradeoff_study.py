@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.number_text import number
+from proofroll.core.number_text import counted, number
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status, hosts, told_hosts
@@ -207,7 +207,8 @@ def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     ended = len(found.points) - len(done) - refused - wrong
     built = f"{wrong} of a wrong model, " if wrong else ""
     said.append(
-        f"{len(found.points)} runs: {refused} refused, {built}{ended} that did not reach the end, all with a reason; "
-        f"{len(broken)} that reached it silently with {quantity} off by more than {number(BROKEN * scale)} {unit}."
+        f"{counted(len(found.points), 'runs')}: {refused} refused, {built}{ended} that did not reach the end, "
+        f"all with a reason; {len(broken)} that reached it silently "
+        f"with {quantity} off by more than {number(BROKEN * scale)} {unit}."
     )
     return said

@@ -105,6 +105,15 @@ def test_a_folder_without_a_scene(proofroll: Proofroll, tmp_path: Path) -> None:
         assert "this folder has no scene.toml" in err
 
 
+def test_the_path_of_a_scene_file(proofroll: Proofroll) -> None:
+    """The path of a scene.toml means its scene, for every command."""
+    path = str(data_folder("models") / "pendulum" / "scene.toml")
+    for command in (["check"], ["cite"]):
+        code, out, err = proofroll(*command, path)
+        assert (code, err) == (0, "")
+        assert "pendulum" in out
+
+
 def test_neither_scene_nor_file(proofroll: Proofroll) -> None:
     """A name of nothing is told what there is."""
     code, out, err = proofroll("check", "sphere_in_cone")

@@ -72,12 +72,18 @@ def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("folder")
-@pytest.mark.parametrize(("what", "name"), [("scene", "pendulum"), ("engine", "mujoco"), ("engine", "numpy")])
+@pytest.mark.parametrize(
+    ("what", "name"),
+    [("scene", "pendulum"), ("engine", "mujoco"), ("engine", "truth"), ("engine", "numpy"), ("scene", "class"),
+     ("comparison", "paper"), ("comparison", "tradeoff")],
+)  # fmt: skip
 def test_a_name_that_stands_for_something_else(proofroll: Proofroll, what: str, name: str) -> None:
     """A scene is not called as one of the package, which commands would take, nor an engine as what is installed."""
-    code, out, err = proofroll("new", what, name)
-    assert (code, out, Path(name).exists()) == (2, "", False)
+    scene = ["--scene", "pendulum"] if what == "comparison" else []
+    code, out, err = proofroll("new", what, name, *scene)
+    assert (code, out, list(Path().iterdir())) == (2, "", [])
     assert f"name = '{name}': a" in err
+    assert err.endswith("choose another name\n")
 
 
 @pytest.mark.parametrize("what", [["scene"], ["engine"], ["comparison", "--scene", "pendulum"]])

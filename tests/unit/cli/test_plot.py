@@ -116,6 +116,7 @@ def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
     for arguments, word in (
         ([str(run), "--out", str(tmp_path / "run.svg")], ".html"),
         ([str(tmp_path / "old.nc")], "has changed since this run"),
+        ([str(run), "--scene", "inclined_plane"], "the run is one of pendulum, and this scene has no angle, length"),
         ([str(tmp_path / "none.nc")], "does not say which scene"),
         ([str(tmp_path / "still.nc")], "no poses of bodies"),
         (["."], "no run in netCDF"),

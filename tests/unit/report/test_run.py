@@ -22,7 +22,7 @@ def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
     held = {f"force.a_joint_{number}.z": nothing for number in range(9)}
     dataset = xr.Dataset(held | {"x": ("time", np.ones(2), units)}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
     write(dataset, tmp_path / "run.npz")
-    case = SimpleNamespace(scene="s", parameters={}, engine=SimpleNamespace(name="e", settings={}), until=1.0)
+    case = SimpleNamespace(scene="s", parameters={}, engine=SimpleNamespace(name="e", settings={}), until=1.0, asks=())
     result = Result(Status.DONE, "reached 1 s", trajectory="run.npz", wall_seconds=0.1)
 
     content = run_content(case, result, tmp_path / "run.npz")

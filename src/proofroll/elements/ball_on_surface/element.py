@@ -226,7 +226,7 @@ def rolling_ball(scene: Scene) -> RollingBall:
     """
     (element,) = scene.elements if len(scene.elements) == 1 else (None,)
     if not isinstance(element, BallOnSurface):
-        what = ", ".join(f"{item.name} ({type(item).__name__})" for item in scene.elements)
+        what = ", ".join(item.name for item in scene.elements)
         raise Refused(f"represents one ball on one surface, and the scene holds {what}")
     return element.rolling
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, told_of
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, validated
 from proofroll.elements.ball_on_surface.element import rolling_ball
@@ -102,8 +102,9 @@ def load_regimes(name: str) -> RegimesStudy:
     for axis, given in (("speed", found.speed), ("mu_static", found.mu_static)):
         if given.count < 1 or not 0 < given.low <= given.high < math.inf:
             raise InputError(f"{path.name}: {axis}", given, "give 0 < low <= high and a count of 1 or more")
-    for resistance in found.rolling_resistance:
-        load_scene(found.scene, rolling_resistance=resistance, speed=found.speed.low, mu_static=found.mu_static.low)
+    with told_of(path.name):
+        for resistance in found.rolling_resistance:
+            load_scene(found.scene, rolling_resistance=resistance, speed=found.speed.low, mu_static=found.mu_static.low)
     return found
 
 
