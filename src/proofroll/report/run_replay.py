@@ -7,8 +7,11 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from proofroll.core.dataset import part
+from proofroll.core.element import Element
 from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
+from proofroll.core.several import each_alone
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.files.trajectory_file import STORED, write
@@ -16,7 +19,7 @@ from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
 from proofroll.report.replay import case_content, distance
 from proofroll.report.replay_library import three
-from proofroll.report.replay_records import Ghost, Replay, Replayed
+from proofroll.report.replay_records import Ghost, Replay, ReplayCase, Replayed, ReplayKind
 from proofroll.studies.planning import point_name
 
 if TYPE_CHECKING:
@@ -27,6 +30,8 @@ _WRITES = "proofroll run … --out writes such a file"
 
 def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
     """The page of what a file holds: the truth of the run's scene, solid, and the run, translucent.
+
+    Of a scene of several elements, which no force couples, each is a case of its own.
 
     Args:
         path: of the file, for messages.
@@ -42,28 +47,49 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
 
     name = scene_of_run or str(run.attrs.get("scene_path", run.attrs.get("scene", "")))
     scene = _scene(path, run, name)
-    kind = kind_of(scene)
-    if kind is None or not kind.replay_script:
-        raise InputError("run", path, f"nothing that is installed draws the scene {scene.title}")
-    if "p_WB" not in run:
-        raise InputError("run", path, f"it has no poses of bodies (p_WB); {_WRITES}")
+    parts = list(zip(scene.elements, each_alone(scene), strict=True))
+    drawers = [_drawer(path, scene, element, alone, run) for element, alone in parts]
     usual = load_scene(name).parameters
     label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
+    true = truth(scene, run["time"].to_numpy())
+    cases: list[ReplayCase] = []
+    packed: list[str] = []
+    group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
     with tempfile.TemporaryDirectory() as folder:
         file, own = (Path(folder) / f"{name}{STORED}" for name in ("truth", "run"))
-        true = truth(scene, run["time"].to_numpy())
-        write(true, file)
-        write(run, own)
-        replayed = Replayed(scene, file, _ghosts(own, run, true), scene.title, label or scene.title)
-        case, numbers = case_content(replayed, kind.replay(), lambda _: "")
+        for (element, alone), drawer in zip(parts, drawers, strict=True):
+            true_part, run_part = (part(scene, element, whole) for whole in (true, run))
+            write(true_part, file)
+            write(run_part, own)
+            shown = element.name if len(parts) > 1 else label or scene.title
+            replayed = Replayed(alone, file, _ghosts(own, run_part, true_part), group, shown)
+            case, numbers = case_content(replayed, drawer, lambda _: "")
+            cases.append(case)
+            packed.append(numbers)
     return rendered(
         templates(),
         "run_replay.html",
         scene=scene,
-        replay=Replay(three(), 0, [case], [numbers]),
+        replay=Replay(three(), 0, cases, packed),
         said=_said(run),
         replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
     )
+
+
+def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Dataset) -> ReplayKind:
+    """What draws an element of the run of a scene; ``alone`` holds no other.
+
+    Raises:
+        InputError: nothing does, or the run has no poses of it.
+    """
+    of = f" of {element.name}" if len(scene.elements) > 1 else ""
+    kind = kind_of(alone)
+    if kind is None or not kind.replay_script:
+        what = f"the element {element.name} of " if of else ""
+        raise InputError("run", path, f"nothing that is installed draws {what}the scene {scene.title}")
+    if "p_WB" not in part(scene, element, run):
+        raise InputError("run", path, f"it has no poses of bodies (p_WB){of}; {_WRITES}")
+    return kind.replay()
 
 
 def _said(run: xr.Dataset) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from mixed_scene import BALL_AND_PENDULUM
 
 from proofroll.files.comparison_file import load_comparison
 
@@ -23,49 +24,6 @@ def test_each_engine_is_started_once(
     monkeypatch.setattr("proofroll.studies.first_look._UNTIL", 0.1)
     assert command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path))[0] == 0
     assert sorted(started_workers) == ["reduced", "truth"]
-
-
-BALL_AND_PENDULUM = """
-title = "A ball on a plane, and a pendulum"
-source = "chosen"
-duration = 0.1
-
-[gravity]
-magnitude = 9.81
-direction = [0, 0, -1]
-
-[[balls]]
-name = "ball"
-radius = 0.025
-mass = 0.5
-
-[[surfaces]]
-kind = "plane"
-name = "wall"
-tilt = 0.35
-
-[[contacts]]
-body = "ball"
-surface = "wall"
-
-[[initial]]
-body = "ball"
-velocity = [0.5, 0.2]
-
-[[bodies]]
-name = "rod"
-mass = 1.0
-com = [0, 0, -0.5]
-inertia = [0.08, 0.08, 0.001]
-
-[[joints]]
-name = "pivot"
-kind = "revolute"
-axis = [0, 1, 0]
-parent = "world"
-child = "rod"
-q0 = 1.0
-"""
 
 
 @pytest.fixture

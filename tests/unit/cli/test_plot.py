@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from mixed_scene import BALL_AND_PENDULUM
 
 from proofroll.files.trajectory_file import read, write
 from proofroll.report.run_plot import curves
@@ -102,6 +103,26 @@ def test_a_run_in_motion(proofroll: Proofroll, tmp_path: Path, words: list[str],
     (case,) = json.loads(found)
     assert [item["name"] for item in case["runs"]] == shown
     assert case["label"] == ("speed=3" if "--set" in words else case["scene"])
+
+
+def test_elements_in_motion(proofroll: Proofroll, tmp_path: Path) -> None:
+    """Of a scene of several elements each is a case of its own, with its truth and its part of the run."""
+    (tmp_path / "mixed").mkdir()
+    (tmp_path / "mixed" / "scene.toml").write_text(BALL_AND_PENDULUM, encoding="utf-8")
+    run = tmp_path / "run.nc"
+    said = proofroll("run", str(tmp_path / "mixed"), "--engine", "projection", *RUN, "--out", str(run))
+    assert said[0] == 0, said
+    assert proofroll("replay", str(run))[0] == 0
+    page = (tmp_path / "run-replay.html").read_text(encoding="utf-8")
+    (found,) = re.findall(r'data-part="cases">(.*?)</script>', page, flags=re.DOTALL)
+    cases = json.loads(found)
+    assert [(case["kind"], case["label"]) for case in cases] == [("ball", "ball"), ("mechanism", "mechanism")]
+    assert [[item["name"] for item in case["runs"]] for case in cases] == [["truth", "projection"]] * 2
+    assert len(re.findall(r"<script[^>]*data-numbers=", page)) == 2
+    write(read(run).drop_vars("p_WB.mechanism"), tmp_path / "still.nc")
+    code, _, err = proofroll("replay", str(tmp_path / "still.nc"))
+    assert (code, err.count("\n")) == (2, 1)
+    assert "no poses of bodies (p_WB) of mechanism" in err
 
 
 def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
