@@ -112,6 +112,7 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     assert "1 refuses the scene, or some case of it, with the reason" in found.answer
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
+    assert "; 1 refuses the scene or a case of it" in three_sentences([content], {})[0]
     text = page(report_content([with_runs(made[0], {number: [refused]})], made[1], ""), [[]], {}, None)
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 

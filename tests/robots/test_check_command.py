@@ -31,7 +31,7 @@ def test_json(proofroll: Proofroll, arm: Path) -> None:
     for name in names:
         row = engines[name]
         assert row["version"]
-        assert row["refused"] is None
+        assert row["message"] is None
         assert row["causes"] == []
         assert set(row["layers"]) >= {"mass", "kinematics", "bodies", "mass matrix", "gravity", "bias"}
         assert all(set(layer) == {"difference", "tolerance", "holds"} for layer in row["layers"].values())
@@ -114,7 +114,7 @@ def test_bad_readers(proofroll: Proofroll, install_readers: Install, arm: Path) 
     assert code == 1
     for row, (status, said) in zip(rows, BAD_READERS.values(), strict=True):
         assert row["status"] == status
-        assert said in row["refused"]
+        assert said in row["message"]
     assert good["status"] == "holds"
 
 
@@ -125,7 +125,7 @@ def test_a_reader_that_hangs(proofroll: Proofroll, install_readers: Install, arm
     (row,) = json.loads(out)["engines"]
     assert code == 1
     assert row["status"] == "timeout"
-    assert "no result within 1 s" in row["refused"]
+    assert "no result within 1 s" in row["message"]
 
 
 @pytest.mark.parametrize(

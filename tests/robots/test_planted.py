@@ -127,7 +127,7 @@ def test_real_engines(
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
     answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
     row = judged(file, truth, 1e-14, spec, answer)
-    assert row.refused is None
+    assert row.message is None
     assert row.unexplained is None, row.layers
     assert {cause.id for cause in row.causes} == expected
     assert row.status == ("explained" if expected else "holds")

@@ -44,6 +44,8 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
     parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
     if parts:
         said += f", {' and '.join(parts)}"
+    if counts["refused"]:
+        said += f"; {counts['refused']} {'refuses' if counts['refused'] == 1 else 'refuse'} the scene or a case of it"
     best = closest(comparisons[0])
     if best is None:
         return f"{said}; none gave motion and forces in every case of the first comparison."

@@ -84,9 +84,9 @@ def check(
             except Missing as error:
                 if engines:
                     raise
-                return ImporterRow(engine=str(spec), status="missing", refused=str(error))
+                return ImporterRow(engine=str(spec), status="missing", message=str(error))
             except WorkerDied as error:
-                return ImporterRow(engine=str(spec), status=str(error.status), refused=str(error))
+                return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
             found = judged(file, truth, bar, spec, answer, lent)
             # It defines the format, and its meaning here is that of another version of it.
             if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:

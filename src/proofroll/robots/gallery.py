@@ -116,7 +116,7 @@ def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -
     readings, unexpected = [], []
     for item in check(path, wanted, base=entry.base, workers=workers).engines:
         does = outcome(item)
-        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.refused, does))
+        readings.append(GalleryReading(item.engine, item.version, item.status, item.causes, item.message, does))
         if item.status != "missing" and set(does) != set(entry.engines[item.engine]):
             expected = ", ".join(entry.engines[item.engine]) or "to hold the file"
             unexpected.append(f"{item.named}: expected {expected}; found {', '.join(does) or 'holds the file'}")

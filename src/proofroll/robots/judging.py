@@ -48,7 +48,7 @@ def judged(
     Changed files are compiled by one of the ``workers``.
     """
     row = ImporterRow(
-        engine=str(spec), status="refused", version=answer.version, refused=answer.refused, says=answer.says
+        engine=str(spec), status="refused", version=answer.version, message=answer.refused, says=answer.says
     )
     if answer.reading is None:
         return row
@@ -64,7 +64,7 @@ def judged(
     return dataclasses.replace(
         row,
         status="holds" if holds else ("differs" if unexplained else "explained"),
-        refused=None,
+        message=None,
         remarks=answer.reading.remarks,
         layers=layers,
         causes=causes,

@@ -25,7 +25,7 @@ class ImporterRow:
     Attributes:
         engine: as the user wrote it.
         status: ``holds``, ``explained``, ``differs``, ``refused``, ``missing``, or how its process ended.
-        refused: why it holds nothing.
+        message: why it holds nothing; None where it holds something.
         says: what is told with every reading of this engine.
         remarks: of its reader, on this file.
         layers: those that it offers.
@@ -37,7 +37,7 @@ class ImporterRow:
     engine: str
     status: str
     version: str | None = None
-    refused: str | None = None
+    message: str | None = None
     says: str = ""
     remarks: Sequence[str] = ()
     layers: Mapping[str, HeldLayer] = field(default_factory=dict)
@@ -116,7 +116,7 @@ class GalleryReading:
     version: str | None
     status: str
     causes: Sequence[RobotCause]
-    refused: str | None
+    message: str | None
     does: list[str]
 
 

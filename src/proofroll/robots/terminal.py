@@ -86,8 +86,8 @@ def sentences(row: ImporterRow) -> Iterator[str]:
     name = row.named
     if row.says and row.layers:
         yield f"{name}: {row.says}"
-    if row.refused:
-        yield f"{name} {_VERBS.get(row.status, row.status)}: {row.refused}"
+    if row.message:
+        yield f"{name} {_VERBS.get(row.status, row.status)}: {row.message}"
     for cause in row.causes:
         yield (
             f"{name} differs in {cause.layer} by {amount(cause.before)}; explained by: {cause.name}; "

@@ -59,7 +59,7 @@ def between(file: str, old: str, new: str) -> VersionsStudy:
         comparisons=[Path(file).name],
         robot=RobotVersions(file, layers, *rows),
         changed=changed,
-        lost=[f"{row.engine}: {row.refused}" for row in rows if row.status == "missing"],
+        lost=[f"{row.engine}: {row.message}" for row in rows if row.status == "missing"],
     )
 
 
@@ -73,4 +73,4 @@ def _causes(row: ImporterRow) -> str:
 
 def _does(row: ImporterRow) -> str:
     by = f" by: {_causes(row)}" if row.causes else ""
-    return f"{row.status}{by}" + (f": {row.refused}" if row.refused else "")
+    return f"{row.status}{by}" + (f": {row.message}" if row.message else "")
