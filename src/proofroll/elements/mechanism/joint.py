@@ -42,7 +42,7 @@ FACTS: dict[str, Facts] = {
     "free": Facts(7, 6, (), ()),
 }
 WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
-_WITH_QUATERNION = ("spherical", "free")
+WITH_QUATERNION = ("spherical", "free")
 _O, _UNIT = np.zeros(3), np.eye(3)
 # Of each velocity: whether its axis is one of B, not of A; which; whether it turns about it; whether the child carries
 # the axis round, not the parent. Of three turns about axes of the child the sum does not turn itself: ω × ω = 0.
@@ -153,10 +153,10 @@ class Joint:
 
     def _check_start(self, field: str) -> None:
         zero = [0.0] * self.nq
-        if self.kind in _WITH_QUATERNION:
+        if self.kind in WITH_QUATERNION:
             zero[-4] = 1.0
         q0 = list(checks.numbers(f"{field}.q0", zero if _none(self.q0) else self.q0, self.nq))
-        if self.kind in _WITH_QUATERNION:
+        if self.kind in WITH_QUATERNION:
             length = float(np.linalg.norm(q0[-4:]))
             if length == 0.0:
                 raise InputError(f"{field}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")

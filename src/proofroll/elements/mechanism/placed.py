@@ -9,7 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross, on_turns
-from proofroll.elements.mechanism.joint import FACTS, Joint
+from proofroll.elements.mechanism.checks import ZERO
+from proofroll.elements.mechanism.joint import AXES, FACTS, WITH_QUATERNION, Joint
 from proofroll.elements.mechanism.model import Mechanism
 
 _TURN = 2 * np.pi
@@ -69,27 +70,45 @@ class Placed:
 
     def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Coordinate and rate of each joint with one coordinate [rad or m, and per s], angles counted in turns."""
-        return {joint.name: self.along(joint)[0] for joint in self.mechanism.joints if joint.nq == 1}
+        found = {joint.name: self.along(joint) for joint in self.mechanism.joints if joint.nq == 1}
+        return {name: (q[:, 0], v[:, 0]) for name, (q, v) in found.items()}
 
-    def along(self, joint: Joint) -> list[tuple[FloatArray, FloatArray]]:
-        """The same of each coordinate of a revolute, prismatic or universal joint."""
+    def of_tree(self) -> tuple[FloatArray, FloatArray]:
+        """Coordinates and velocities of all joints, shapes (time, nq) and (time, nv)."""
+        q, v = zip(*map(self.along, self.mechanism.joints), strict=True)
+        return np.concatenate(q, axis=1), np.concatenate(v, axis=1)
+
+    def along(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
+        """Coordinates of a joint, angles counted in turns, and its velocities, shapes (time, nq) and (time, nv)."""
         parent, child = (self.mechanism.body_index[name] for name in (joint.parent, joint.child))
         A, B = self.R_WB[:, parent] @ joint.parent_frame, self.R_WB[:, child] @ joint.child_frame
-        axis = A[..., 2]
-        if joint.kind == "prismatic":
-            on_child, on_parent = (joint.child, joint.child_position), (joint.parent, joint.position)
-            apart = self.point(*on_child) - self.point(*on_parent)
-            arm = self.point(*on_child) - self.point(joint.parent, (0.0, 0.0, 0.0))
-            carried = self.velocity(joint.parent, (0.0, 0.0, 0.0)) + cross(self.spin(joint.parent), arm)
-            return [(np.sum(apart * axis, -1), np.sum((self.velocity(*on_child) - carried) * axis, -1))]
-        turning = self.spin(joint.child) - self.spin(joint.parent)
-        cosine, sine = np.sum(A[..., 0] * B[..., 0], -1), np.sum(A[..., 1] * B[..., 0], -1)
-        found = [(np.arctan2(sine, cosine), np.sum(turning * axis, -1))]
-        if joint.kind == "universal":
-            cosine, sine = np.sum(axis * B[..., 2], -1), np.sum(axis * B[..., 1], -1)
-            found.append((np.arctan2(sine, cosine), np.sum(turning * B[..., 0], -1)))
-        turns = zip(found, joint.q0, strict=True)
-        return [(on_turns(self.time, angle, rate, start, _TURN), rate) for (angle, rate), start in turns]
+        turned, turning = A.swapaxes(1, 2) @ B, self.spin(joint.child) - self.spin(joint.parent)
+        q: list[FloatArray] = []
+        v: list[FloatArray] = []
+        for of_child, number, turns, _ in AXES[joint.kind]:
+            axis = (B if of_child else A)[..., number]
+            v.append(np.sum((turning if turns else self._apart(joint)[1]) * axis, -1))
+            if joint.kind in WITH_QUATERNION:
+                continue
+            if turns:
+                sine, cosine = (turned[:, 2, 1], turned[:, 2, 2]) if of_child else (turned[:, 1, 0], turned[:, 0, 0])
+                q.append(on_turns(self.time, np.arctan2(sine, cosine), v[-1], joint.q0[len(q)], _TURN))
+            else:
+                q.append(np.sum(self._apart(joint)[0] * axis, -1))
+        if joint.kind in WITH_QUATERNION:
+            from scipy.spatial.transform import Rotation
+
+            q = [*np.einsum("ti,tij->jt", self._apart(joint)[0], A)] if joint.kind == "free" else []
+            q += [*Rotation.from_matrix(turned).as_quat(canonical=True, scalar_first=True).T]
+        count = len(self.time)
+        return np.reshape(q, (joint.nq, count)).T, np.reshape(v, (joint.nv, count)).T
+
+    def _apart(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
+        """From the joint's point on the parent to that on the child [m], and its rate as the parent sees it [m/s]."""
+        there = self.point(joint.child, joint.child_position)
+        carried = cross(self.spin(joint.parent), there - self.point(joint.parent, ZERO))
+        rate = self.velocity(joint.child, joint.child_position) - self.velocity(joint.parent, ZERO) - carried
+        return there - self.point(joint.parent, joint.position), rate
 
     def energy(self) -> FloatArray:
         """Kinetic energy, and potential energy of gravity and of all springs [J], shape (time,)."""
@@ -104,9 +123,9 @@ class Placed:
             ends = self.point(spring.body_a, spring.position_a) - self.point(spring.body_b, spring.position_b)
             total += 0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2
         for joint in self.mechanism.joints:
-            for q, rate in self.along(joint) if joint.stiffness or joint.armature else ():
-                total += 0.5 * joint.stiffness * (q - joint.rest) ** 2
-                total += 0.5 * joint.armature * rate**2
+            if joint.stiffness or joint.armature:
+                q, v = self.along(joint)
+                total += 0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1)
         return total
 
     def drift(self) -> FloatArray:

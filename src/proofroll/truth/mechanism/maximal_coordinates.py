@@ -8,18 +8,17 @@ heyoka is absent.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow
+from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
     ConstrainedEquations,
@@ -169,7 +168,9 @@ class MaximalCoordinates:
 
     def recorded(self, times: Array, states: Array) -> Record:
         """What the states mean; reactions come from the complete rows of all bodies."""
-        return gathered(times, [self._sample(self.lean.normalised(state)) for state in states])
+        found = gathered(times, [self._sample(self.lean.normalised(state)) for state in states])
+        q, v = found.placed(self.mechanism).of_tree()
+        return replace(found, q=q, v=v)
 
     def _sample(self, state: Array) -> dict[str, Any]:
         lean = self.lean.equations
@@ -179,14 +180,13 @@ class MaximalCoordinates:
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
         n = len(self.mechanism.bodies)
         arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]
-        q, v = self._relative(views)
         return {
             "p_WB": np.array([np.array(views[i].r) - arms[i] for i in range(n)]),
             "v_WB": np.array([np.array(views[i].v) - np.cross(views[i].w, arms[i]) for i in range(n)]),
             "q_WB": whole[: 7 * n].reshape(n, 7)[:, 3:],
             "w_WB": np.array([views[i].w for i in range(n)], dtype=float),
-            "q": q,
-            "v": v,
+            "q": [],  # they follow from the poses of all times
+            "v": [],
             "wrench": self._wrenches(found),
             "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
         }
@@ -211,50 +211,3 @@ class MaximalCoordinates:
         for number, (force, moment) in enumerate(found.equations.laws):
             wrenches[number] += np.array([*force, *moment])
         return wrenches
-
-    def _relative(self, views: list[BodyInScalars]) -> tuple[Array, Array]:
-        """Coordinates (angles within half a turn) and velocities of the tree's joints, from the bodies' own."""
-        q: list[float] = []
-        v: list[float] = []
-        for joint, connection in zip(self.mechanism.joints, self.lean.equations.connections, strict=False):
-            d, slide, A, B = _between(connection, views)
-            turning = np.array(views[connection.b].w, dtype=float) - np.array(views[connection.a].w, dtype=float)
-            found = _coordinates(joint, A.T @ d, A.T @ slide, A, B, turning)
-            q += found[0]
-            v += found[1]
-        return np.array(q), np.array(v)
-
-
-def _between(c: Connection, views: list[BodyInScalars]) -> tuple[Array, Array, Array, Array]:
-    """Distance of a connection's points, its rate as seen from a, and its frames, world axes."""
-    a, b = views[c.a], views[c.b]
-    R_a, R_b = np.array(a.R, dtype=float), np.array(b.R, dtype=float)
-    w_a, w_b = np.array(a.w, dtype=float), np.array(b.w, dtype=float)
-    arm_a, arm_b = R_a @ c.place_a, R_b @ c.place_b
-    d = np.array(b.r, dtype=float) + arm_b - np.array(a.r, dtype=float) - arm_a
-    v_b = np.array(b.v, dtype=float) + np.cross(w_b, arm_b)
-    v_a = np.array(a.v, dtype=float) + np.cross(w_a, arm_a + d)
-    return d, v_b - v_a, R_a @ np.array(c.frame_a), R_b @ np.array(c.frame_b)
-
-
-def _coordinates(
-    joint: Joint, d: Array, slide: Array, A: Array, B: Array, turning: Array
-) -> tuple[list[float], list[float]]:
-    """Coordinates and velocities of one joint; d and slide in the axes of A."""
-    S = A.T @ B
-    about_z, spin_z = float(np.arctan2(S[1, 0], S[0, 0])), float(A[:, 2] @ turning)
-    q: list[float] = []
-    v: list[float] = []
-    if joint.kind == "revolute":
-        q, v = [about_z], [spin_z]
-    elif joint.kind == "prismatic":
-        q, v = [d[2]], [slide[2]]
-    elif joint.kind == "universal":
-        q, v = [about_z, float(np.arctan2(S[2, 1], S[2, 2]))], [spin_z, float(B[:, 0] @ turning)]
-    elif joint.kind == "planar":
-        q, v = [d[0], d[1], about_z], [slide[0], slide[1], spin_z]
-    elif joint.kind in {"spherical", "free"}:
-        q, v = [*Rotation.from_matrix(S).as_quat(canonical=True, scalar_first=True)], [*(B.T @ turning)]
-    if joint.kind == "free":
-        q, v = [*d, *q], [*(S.T @ slide), *v]
-    return q, v

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
-from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
@@ -55,11 +54,11 @@ class MechanismStates:
 
     def __init__(self, mechanism: Mechanism, placed: Placed, acceleration: FloatArray, which: FloatArray) -> None:
         self.mechanism, self.tree = mechanism, Tree(mechanism)
-        coordinates = placed.coordinates()
+        coordinates, _ = placed.of_tree()
         self.each: list[MechanismState] = []
         self.consistent = True
         for i in which.tolist():
-            q = np.concatenate([_coordinate(placed, coordinates, joint, i) for joint in mechanism.joints])
+            q = coordinates[i]
             still = self.tree.at(q, np.zeros(mechanism.nv))
             twists = np.concatenate([placed.v_WB[i], placed.w_WB[i]], axis=-1)
             v = np.linalg.lstsq(still.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
@@ -240,21 +239,3 @@ def of_start(evidence: Evidence) -> MechanismStates | None:
     return MechanismStates(
         element.mechanism, element.start, np.concatenate(rows, axis=-1)[None], np.zeros(1, dtype=int)
     )
-
-
-def _coordinate(placed: Placed, known: dict[str, tuple[FloatArray, FloatArray]], joint: Any, i: int) -> FloatArray:
-    """Coordinates of a joint at a sample."""
-    if joint.name in known:
-        return known[joint.name][0][i : i + 1]
-    index = placed.mechanism.body_index
-    A = placed.R_WB[i, index[joint.parent]] @ joint.parent_frame
-    S = A.T @ placed.R_WB[i, index[joint.child]] @ joint.child_frame
-    apart = placed.point(joint.child, joint.child_position)[i] - placed.point(joint.parent, joint.position)[i]
-    if joint.kind == "universal":
-        return np.array([np.arctan2(S[1, 0], S[0, 0]), np.arctan2(S[2, 1], S[2, 2])])
-    if joint.kind == "planar":
-        return np.array([*(A.T @ apart)[:2], np.arctan2(S[1, 0], S[0, 0])])
-    quaternion = Rotation.from_matrix(S).as_quat(scalar_first=True)
-    if joint.kind == "free":
-        return np.concatenate([A.T @ apart, quaternion])
-    return np.asarray(quaternion) if joint.kind == "spherical" else np.zeros(joint.nq)
