@@ -41,25 +41,3 @@ class FailedRun:
     scale: float
     allowed: float
     note: str
-
-    def lines(self, what: str, head: str) -> list[str]:
-        """The first words of a program with these lines of imports: ``what`` fails where, and what it needs."""
-        numbers = ", ".join(f"{name} = {value:g}" for name, value in self.parameters.items()) or "default parameters"
-        settings = ", ".join(f"{key}={value}" for key, value in self.settings.items())
-        needs = " and ".join(imported(head))
-        return [
-            f"{self.engine} {self.version}: {self.failure} ({self.where}).",
-            "",
-            f"{what} ({self.scene}, {numbers}).",
-            f"Beyond the largest {self.resolution} that is {self.boundary}. "
-            + ("The engine does not say so." if self.silent else "The engine says so."),
-            f"Settings: {settings}.",
-            *([f"Why proofroll: {self.note}."] if self.note else []),
-            f"Needs {needs} alone. Exit code 1: the failure shows.",
-        ]
-
-
-def imported(head: str) -> list[str]:
-    """Packages that lines of imports name."""
-    lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
-    return list(dict.fromkeys(words[1].partition(".")[0] for words in lines))

@@ -5,19 +5,12 @@ They are for :meth:`proofroll.core.engine_abilities.Reproduces.reproducer`; what
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-
-
-def assigned(**values: Any) -> str:
-    """One line ``NAME = value`` for each: plain data, or a number or an array of numpy's, with every digit."""
-    plain = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
-    return "".join(f"{name} = {value!r}\n" for name, value in plain.items())
 
 
 def wall_source(body: RollingBall) -> str:

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Refused
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, wall_source
+from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, wall_source
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.friction import slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from proofroll.elements.ball_on_surface.reproducer_source import assigned
+from proofroll.core.program_text import assigned
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 BALL = """

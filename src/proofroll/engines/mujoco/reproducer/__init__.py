@@ -11,8 +11,9 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
+from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, normal_rate_source, wall_source
 from proofroll.elements.mechanism import Mechanism
 from proofroll.engines.mujoco.contact import Resistance
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects

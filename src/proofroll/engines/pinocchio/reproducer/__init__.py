@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 from proofroll.core.errors import Refused
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import assigned, ball_numbers, normal_rate_source, wall_source
+from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, normal_rate_source, wall_source
 from proofroll.engines.pinocchio.reproducer import contact, rows, stepping
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import assigned
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.elements.ball_on_surface.reproducer_source import assigned
+from proofroll.core.program_text import assigned
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import assigned
 
 COMPOSITE = '''
 model = pin.Model()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from proofroll.elements.ball_on_surface.reproducer_source import assigned
+from proofroll.core.program_text import assigned
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.integrators import PATIENCE, SHORT
 from proofroll.engines.pinocchio.settings import PinocchioSettings

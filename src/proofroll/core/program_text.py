@@ -1,0 +1,106 @@
+"""The text of programs that show a failure by themselves: what every kind of element and every engine writes alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from proofroll.core.failed_run import FailedRun
+
+_MAIN = '''
+
+def main():
+    """Runs the model, prints what is wrong and returns 1 if the failure shows, else 0."""
+    times, rows, stopped = [EVERY * number for number in range(SAMPLES + 1)], [], ""
+    try:
+        for row in run(times):
+            if not all(np.all(np.isfinite(part)) for part in row):
+                stopped = f"the state is not finite at {times[len(rows)]:g} s, and the engine did not say so"
+                break
+            rows.append([np.array(part) for part in row])
+    except RuntimeError as error:
+        stopped = f"the engine stopped: {error}"
+    print(f"{len(rows)} of {len(times)} samples, step {STEP:g}")
+    shown = dict.fromkeys(("diverged", "solver gave up", "crashed"), bool(stopped))
+    shown |= signs(bool(stopped), *(np.array(column) for column in zip(*rows)))
+    if stopped:
+        print(stopped)
+    print(f"{FAILURE}: {'shown' if shown[FAILURE] else 'not shown'}")
+    return 1 if shown[FAILURE] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
+'''
+
+_ASKING = """SCENE = load_scene({scene!r}, **{parameters!r})
+
+
+def run(times):
+    \"\"\"What is held against the truth at each time, from a run by proofroll.\"\"\"
+    found = simulate(SCENE, {engine!r}, until=times[-1], every=times[1], **{settings!r})
+    yield from zip(*(found[name].to_numpy() for name in {names!r}))
+    if found.attrs["status"] != "done":
+        raise RuntimeError(found.attrs["message"])
+"""
+
+
+def assigned(**values: Any) -> str:
+    """One line ``NAME = value`` for each: plain data, or a number or an array of numpy's, with every digit."""
+    plain = {name: value.tolist() if hasattr(value, "tolist") else value for name, value in values.items()}
+    return "".join(f"{name} = {value!r}\n" for name, value in plain.items())
+
+
+def imported(head: str) -> list[str]:
+    """Packages that lines of imports name."""
+    lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
+    return list(dict.fromkeys(words[1].partition(".")[0] for words in lines))
+
+
+def asking(failed: FailedRun, *names: str) -> str:
+    """``SCENE``, and ``run(times)`` with these variables of a run, for a program that imports proofroll."""
+    parameters, settings = dict(failed.parameters), dict(failed.settings)
+    return _ASKING.format(
+        scene=failed.scene, parameters=parameters, engine=failed.engine, settings=settings, names=names
+    )
+
+
+def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any], signs: str) -> str:
+    """The whole file.
+
+    Args:
+        failed: what it shows.
+        what: is moved, as a sentence without its end.
+        part: of the engine: imports, and ``run(times)``, which yields what ``signs`` takes at each time.
+        numbers: that ``signs`` uses.
+        signs: function ``signs(stopped, …)`` of arrays over the samples: prints, and says of each failure whether it
+            shows.
+    """
+    head, _, rest = part.partition("\n\n")
+    own = {
+        "EVERY": failed.every,
+        "STEP": float(failed.settings[failed.resolution]),
+        "SAMPLES": round(failed.until / failed.every),
+        "FAILURE": failed.failure,
+        "RANGE": failed.scale,
+        "ALLOWED": failed.allowed,
+    }
+    against = "# What the run is held against; TRUE is what two independent routes say.\n"
+    lines = "\n".join(_said(failed, what, imported(head)))
+    return f'"""{lines}\n"""\n\nimport sys\n{head}\n\n{rest}\n{against}' + assigned(**own, **numbers) + signs + _MAIN
+
+
+def _said(failed: FailedRun, what: str, needs: list[str]) -> list[str]:
+    """The first words of a program: ``what`` fails where, and which packages it needs."""
+    numbers = ", ".join(f"{name} = {value:g}" for name, value in failed.parameters.items()) or "default parameters"
+    settings = ", ".join(f"{key}={value}" for key, value in failed.settings.items())
+    return [
+        f"{failed.engine} {failed.version}: {failed.failure} ({failed.where}).",
+        "",
+        f"{what} ({failed.scene}, {numbers}).",
+        f"Beyond the largest {failed.resolution} that is {failed.boundary}. "
+        + ("The engine does not say so." if failed.silent else "The engine says so."),
+        f"Settings: {settings}.",
+        *([f"Why proofroll: {failed.note}."] if failed.note else []),
+        f"Needs {' and '.join(needs)} alone. Exit code 1: the failure shows.",
+    ]
