@@ -48,15 +48,19 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
     falls = pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body)
     if falls:
         events.append(("lift_off", time))
-    if falls or body.gap0 > 0:
-        came = airborne(body, route, (body.p0, body.v0, body.w0), time, until, legs, events)
-        if not isinstance(came, Landed):
-            return Path(legs, events, came)
-        time, slip, state = came.time, came.slip, touching(route, came)
-    sticking = slip is None and not _must_slip(body, route, state)
-    if not sticking:
-        events.append(("slip", time))
+    flight = (body.p0, body.v0, body.w0) if falls or body.gap0 > 0 else None
+    sticking: bool | None = None  # it has just begun to touch the wall
     while True:
+        if flight is not None:
+            came = airborne(body, route, flight, time, until, legs, events)
+            if not isinstance(came, Landed):
+                return Path(legs, events, came)
+            time, slip, state = came.time, came.slip, touching(route, came)
+            flight, sticking = None, None
+        if sticking is None:
+            sticking = slip is None and not _must_slip(body, route, state)
+            if not sticking:
+                events.append(("slip", time))
         leg = route.stick(time, state, until) if sticking else route.slip(time, state, until, slip)
         slip = None
         legs.append(leg)
@@ -68,13 +72,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
         if leg.why is End.LIFTOFF:
             events.append(("lift_off", time))
             last = leg.motion(np.array([time]))  # with the slip that a state does not tell
-            came = airborne(body, route, (last.p_WB[0], last.v_WB[0], last.w_WB[0]), time, until, legs, events)
-            if not isinstance(came, Landed):
-                return Path(legs, events, came)
-            time, slip, state = came.time, came.slip, touching(route, came)
-            sticking = slip is None and not _must_slip(body, route, state)
-            if not sticking:
-                events.append(("slip", time))
+            flight = last.p_WB[0], last.v_WB[0], last.w_WB[0]
             continue
         if _comes_to_rest(body, route, leg):
             if not sticking:
