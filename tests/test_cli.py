@@ -101,6 +101,11 @@ BAD = {
     "a model of another scene": (
         ["export", "pendulum", "pendulum.xml", "--engine", "mujoco[formulation=free]"], 3, ["needs revolute joints"]
     ),
+    "number of another kind": (["check", "arm.urdf", "--states", "1e9"], 2, ["--states = '1e9': give a whole number"]),
+    "steps without number": (rk4("1e-300"), 2, ["dt = 1e-300", "steps from 0 s", "take a longer one"]),
+    "numbers too large for numbers": (
+        ["run", "pendulum", "--engine", "truth", "--set", "speed=1e300", "--until", "0.1"], 3, ["truth crashed"]
+    ),
     "a version in a name": (["engines", "add", "mujoco==99"], 2, ["add mujoco --requirement mujoco==VERSION"]),
     "no version": (["engines", "add", "mujoco"], 2, ["--requirement = 'nothing'", "mujoco==VERSION"]),
     "a scene for a map": (["tradeoff", "/dev/null/scene.toml"], 2, ["scene.toml", "cannot be read"]),
@@ -555,6 +560,8 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     assert "..." not in out.partition("Commands:")[2]  # no summary is cut
     assert proofroll("--version") == (0, "proofroll 0.1.0\n", "")
     assert proofroll()[0] == 2
+    code, out, err = proofroll("new")
+    assert (code, err, out.startswith("Usage: ")) == (2, "", True)
 
 
 def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -128,7 +128,7 @@ def test_a_part_that_fails_does_not_take_the_report_away(
 
 def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file for another study, and a name that does not exist, are wrong usage before anything runs."""
-    for name in (*files(tmp_path, other='study = "opinion"'), "nothing"):
+    for name in (*files(tmp_path, other='study = "opinion"', list='study = ["a"]'), "nothing"):
         code, said, err = proofroll("report", name, "--out", str(tmp_path / "out"))
         assert (code, said, err.count("\n")) == (2, "", 1)
     assert not (tmp_path / "out").exists()

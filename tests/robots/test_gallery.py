@@ -32,8 +32,15 @@ def test_unknown_cause(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="choose one of"):
         read_gallery(path)
     path.write_text('[[robots]]\nname="r"\n')
-    with pytest.raises(InputError, match="is missing"):
-        read_gallery(path)
+    for text, said in (
+        ('[[robots]]\nname="r"\n', r"robots\.toml: robots\.0\.package = 'nothing': this key is required"),
+        ("robots = 3", "robots = 3: give a list"),
+        ('[[robots]]\nname="r"\npackage="p"\nfile="f"\nengines = { mujoco = 3 }', "engines.mujoco = 3: give a list"),
+        ('[[robots]]\nname="r"\npackage="p"\nfile="f"\nbase="x"\nengines = {}', "robots.0.base = 'x'"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=said):
+            read_gallery(path)
 
 
 def test_outcomes() -> None:

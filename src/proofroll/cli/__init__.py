@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
+import warnings
 from functools import cache
 from types import FrameType
 from typing import Annotated, Any
@@ -65,10 +67,16 @@ def start(
         raise typer.Exit(USAGE)
 
 
-def _given(error: typer.TyperException) -> str:
-    """The offending value, which typer's messages about numbers leave out."""
+def _told(error: typer.TyperException) -> str:
+    """What is wrong with the words of a command; of a number with the value, which typer leaves out."""
+    said = str(error.format_message())
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
-    return f" (given: {problems[0]['input']!r})" if problems else ""
+    option = re.search(r"'([^']+)'", said)
+    if not problems or option is None:
+        return said
+    from proofroll.core.validation import advice
+
+    return f"{option[1]} = {problems[0]['input']!r}: {advice(problems[0]['type'], problems[0]['msg'])}"
 
 
 def _interrupt(number: int, _: FrameType | None) -> None:
@@ -100,13 +108,17 @@ def main() -> None:
         signal.signal(signal.SIGHUP, _interrupt)
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
         signal.signal(signal.SIGINT, _interrupt)
+    warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that overflow: what comes of them is told
     try:
         if not all(map(str.strip, sys.argv[1:])):
             raise InputError("argument", "", "this is empty; give a value, or leave the option out")
         code = _commands()(standalone_mode=False)
         sys.stdout.flush()  # a full disk shows here, or nowhere
     except typer.TyperException as error:
-        complain(f"{error.format_message()}{_given(error)}")
+        if error.format_message().startswith("Usage:"):  # a group of commands without one
+            sys.stdout.write(f"{error.format_message()}\n")
+        else:
+            complain(_told(error))
         code = USAGE
     except InputError as error:
         complain(str(error))

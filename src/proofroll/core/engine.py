@@ -121,13 +121,18 @@ def fixed_step(settings: Settings) -> float | None:
     return step
 
 
+_MOST_STEPS = 2**31 - 1  # between two samples: engines count them in C
+
+
 def whole_steps(start: float, end: float, dt: float) -> int:
     """Number of steps of size ``dt`` [s] from ``start`` to ``end`` [s].
 
     Raises:
-        InputError: the interval is not a whole number of steps.
+        InputError: the interval is not a whole number of steps, or one of more than engines can count.
     """
     exact = (end - start) / dt
+    if exact > _MOST_STEPS:
+        raise InputError("dt", dt, f"that is {exact:.1e} steps from {start:.6g} s to {end:.6g} s; take a longer one")
     steps = round(exact)
     if abs(exact - steps) > 1e-6 * max(1.0, abs(steps)):
         near, less = max(1, steps) * dt, (end - start) / max(1, math.ceil(exact))

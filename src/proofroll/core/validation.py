@@ -127,11 +127,11 @@ def _first_problem(
         return InputError(
             f"{where}: {location}.{key}", problem["ctx"]["tag"], f"choose one of {problem['ctx']['expected_tags']}"
         )
-    return InputError(f"{where}: {location}", problem["input"], _advice(problem["type"], problem["msg"]))
+    return InputError(f"{where}: {location}", problem["input"], advice(problem["type"], problem["msg"]))
 
 
-def _advice(kind: str, said: str) -> str:
-    """What pydantic says of a problem in words of ours."""
+def advice(kind: str, said: str) -> str:
+    """What pydantic says of a problem, its type and its message, in words of ours."""
     words = said.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
     return _WORDS.get(kind.partition("_")[0], words[0].lower() + words[1:])
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
+from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError, require_known, told_of
 from proofroll.core.observable import Observable
 from proofroll.core.plugins import parse_engine, require_engine
@@ -53,7 +53,7 @@ def load_comparison(name: str) -> Comparison:
     content = read_toml(path)
     if "study" in content:
         advice = f"this file is for another command: proofroll {content['study']} {content.get('scene', '')}".strip()
-        raise InputError(str(path), f"study = {content['study']!r}", advice)
+        raise InputError(f"{path}: study", content["study"], advice)
     return _comparison(path, content)
 
 
@@ -74,6 +74,10 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
     comparison = validated(Comparison, content, where, name=path.stem, bands=bands, left_out=0)
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
         raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
+    for index, point in enumerate(comparison.points):
+        for name, value in point.items():
+            if isinstance(value, Edge) and not -math.inf < value.edge_between[0] < value.edge_between[1] < math.inf:
+                raise InputError(f"points.{index}.{name}", list(value.edge_between), "give the lower value first")
     known = load_scene(comparison.scene).observables
     for name, band in comparison.bands.items():
         _check_bounds(f"{where}: tolerances.{name}", known, band.bounds)

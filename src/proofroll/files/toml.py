@@ -30,7 +30,9 @@ def read_toml(path: Path) -> dict[str, Any]:
         if len(text) > _MOST_BYTES:
             raise InputError("file", path, f"the file is larger than {_MOST_BYTES >> 10} kB; shorten it")
         content = tomllib.loads(text.decode())
-    except ValueError as error:  # no TOML, no UTF-8, or an integer of thousands of digits
+    except UnicodeDecodeError:
+        raise InputError("file", path, "the file is broken: it is no text in UTF-8") from None
+    except ValueError as error:  # no TOML, or an integer of thousands of digits
         raise InputError("file", path, f"the file is broken: {error}") from None
     except RecursionError:
         raise _too_deep(path) from None

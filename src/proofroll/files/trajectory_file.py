@@ -133,7 +133,7 @@ def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
                 if names is None or name in names
             }
     except _NO_SUCH_FILE as error:
-        raise ValueError(f"{path} is no stored trajectory ({error})") from None
+        raise ValueError(f"{path} is no stored trajectory") from error
     return Columns(found, attrs)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
 from proofroll.core.announced import announced
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import ProofrollError, require_known
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
 from proofroll.running.runner import Runner
@@ -138,10 +138,9 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
         study = None if path is None else read_toml(path).get("study")
         if path is None or study is None:
             comparisons.append(name)
-        elif study in kinds:
-            found.append(kinds[study].load(path, engines))
         else:
-            raise InputError(name, f"study = {study!r}", f"a report has {', '.join(kinds)}, and comparisons")
+            require_known(f"{name}: study", str(study), kinds, "a report has comparisons and")
+            found.append(kinds[study].load(path, engines))
     return comparisons, sorted(found, key=lambda part: part.order)
 
 

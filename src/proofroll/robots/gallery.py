@@ -7,10 +7,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from importlib.metadata import PackageNotFoundError, files
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
-from proofroll.core.errors import InputError, require_known
+from proofroll.core.errors import require_known
 from proofroll.core.plugins import parse_engine
+from proofroll.core.validation import strict, validated
 from proofroll.files.data_folders import data_folder
 from proofroll.files.toml import read_toml
 from proofroll.robots import reading
@@ -35,16 +36,28 @@ class Entry:
         name: unique.
         package: distribution in which the file lies.
         file: end of its path there.
-        base: what carries the root of a URDF.
         engines: engine -> causes by which it differs; ``refuses``; ``crashed``; ``open``, also beside causes: something
             stays unexplained.
+        base: what carries the root of a URDF.
     """
 
     name: str
     package: str
     file: str
-    base: str
     engines: dict[str, tuple[str, ...]]
+    base: Literal["fixed", "free"] = "fixed"
+
+
+@dataclasses.dataclass(frozen=True)
+class _File:
+    """What ``robots.toml`` says."""
+
+    robots: list[Entry]
+    title: str = ""
+    study: str = ""
+
+
+strict(_File, Entry)
 
 
 def read_gallery(path: str | Path | None = None) -> list[Entry]:
@@ -55,16 +68,11 @@ def read_gallery(path: str | Path | None = None) -> list[Entry]:
     """
     path = Path(path or data_folder("comparisons") / "robots.toml")
     known = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
-    entries = []
-    for item in read_toml(path).get("robots", []):
-        try:
-            engines = {engine: tuple(causes) for engine, causes in item["engines"].items()}
-            entry = Entry(item["name"], item["package"], item["file"], item.get("base", "fixed"), engines)
-        except KeyError as error:
-            raise InputError(str(path), item.get("name", "robots"), f"{error.args[0]} is missing") from None
-        for cause in {cause for causes in engines.values() for cause in causes}:
-            require_known(f"{entry.name}: engines", cause, known)
-        entries.append(entry)
+    entries = validated(_File, read_toml(path), path.name).robots
+    for index, entry in enumerate(entries):
+        for engine, causes in entry.engines.items():
+            for cause in causes:
+                require_known(f"{path.name}: robots.{index}.engines.{engine}", cause, known)
     return entries
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from proofroll.core.bounds import bounded
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError, told_of
 from proofroll.core.validation import strict, validated
@@ -98,6 +99,7 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
 
 
 def _check(where: str, found: TradeoffClaims) -> None:
+    bounded("until", found.until, above=0)
     scene = load_scene(found.scene, **found.parameters)
     unit = scene.observable(found.quantity, f"{where}: quantity").unit
     if not (found.cheapest or found.holds or found.converges):

@@ -30,6 +30,8 @@ STUDY = "regimes"
 # Maps of this process by what they are made from: a report and its figures show the same ones.
 _MADE: dict[tuple[RegimesStudy, str], list[xr.Dataset]] = {}
 
+_MOST = 1000  # values of an axis: a map has the product of two such numbers of runs
+
 
 @dataclass(frozen=True)
 class EvenValues:
@@ -100,8 +102,9 @@ def load_regimes(name: str) -> RegimesStudy:
     if not found.rolling_resistance:
         raise InputError(f"{path.name}: rolling_resistance", [], "give at least one value in m")
     for axis, given in (("speed", found.speed), ("mu_static", found.mu_static)):
-        if given.count < 1 or not 0 < given.low <= given.high < math.inf:
-            raise InputError(f"{path.name}: {axis}", given, "give 0 < low <= high and a count of 1 or more")
+        if not 1 <= given.count <= _MOST or not 0 < given.low <= given.high < math.inf:
+            shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
+            raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
     with told_of(path.name):
         for resistance in found.rolling_resistance:
             load_scene(found.scene, rolling_resistance=resistance, speed=found.speed.low, mu_static=found.mu_static.low)

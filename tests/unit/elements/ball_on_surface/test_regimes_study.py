@@ -59,7 +59,7 @@ def test_ours_is_found_by_its_name_and_by_its_scene(name: str) -> None:
         ("[0.0, 5e-4]", "[-1]", "rolling_resistance = -1"),
         ("low = 2", "low = 0", "speed.*0 < low <= high"),
         ("low = 2", "low = 5", "speed.*0 < low <= high"),
-        ("count = 1", "count = 0", "mu_static.*count of 1 or more"),
+        ("count = 1", "count = 0", "mu_static.*count of 1 to 1000"),
         ("count = 1", "count = 1.5", "mu_static.count"),
         ("count = 1", "counts = 1", "mu_static.count"),
         ('"sphere_in_cylinder"', '"sphere_in_nowhere"', "sphere_in_nowhere"),
