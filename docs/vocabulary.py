@@ -158,7 +158,7 @@ def _type(annotation: Any) -> str:
         "Tolerance": '"1e-3 m" or "1 %"',
     }
     text = re.sub(r"Literal\[([^]]*)\]", lambda found: found[1].replace(", ", " or "), text)
-    text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text))
+    text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text)).replace("FloatOrInf", "float")
     return known.get(text, text.replace(" | None", "").replace("Tolerance", '"1e-3 m"').replace("|", "or"))
 
 

@@ -21,7 +21,6 @@ class Settings:
     formulation: Literal["newton_euler"] = "newton_euler"
     preset: Literal["default"] = "default"
     dt: Annotated[float, Gt(0)] = 1e-4  # step [s]
-
     resolution = "dt"
     order = 1
 
@@ -57,5 +56,5 @@ class SemiImplicit:
         return BallSample(self.p, self.v, self.w, force=newton_euler(self.body, self.p, self.v, self.w)[2])
 
     def built(self) -> BallBuilt:
-        resistance = self.body.contact.rolling_resistance
-        return BallBuilt(rolling_resistance=resistance, acceleration=newton_euler(self.body, self.p, self.v, self.w)[0])
+        acceleration, *_ = newton_euler(self.body, self.p, self.v, self.w)
+        return BallBuilt(rolling_resistance=self.body.contact.rolling_resistance, acceleration=acceleration)

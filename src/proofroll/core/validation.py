@@ -15,7 +15,7 @@ from proofroll.core.errors import InputError, no_such_key
 
 _T = TypeVar("_T")
 # JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
-Parameter = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
+FloatOrInf = Annotated[float, BeforeValidator(lambda value: math.inf if value is None else value)]
 # The beginning of a type of error in pydantic -> what a person is told, where pydantic's own words say less.
 _WORDS = {
     "int": "give a whole number",

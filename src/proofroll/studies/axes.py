@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from proofroll.core.errors import require_known
 from proofroll.core.scene import Scene
-from proofroll.core.validation import Parameter
+from proofroll.core.validation import FloatOrInf
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Axis:
     name: str
     unit: str
     meaning: str
-    values: list[Parameter]
+    values: list[FloatOrInf]
     parameters: dict[str, AxisTerm] = field(default_factory=dict)
     horizon: bool = False
     scale_free: bool = False

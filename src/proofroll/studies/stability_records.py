@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from proofroll.core.number_text import number
-from proofroll.core.validation import Parameter
+from proofroll.core.validation import FloatOrInf
 from proofroll.studies.axes import Axis, Effort
 from proofroll.studies.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
@@ -74,8 +74,8 @@ class BoundaryPoint:
     caveat: str
     resolution: str | None
     axis: str
-    value: Parameter
-    parameters: dict[str, Parameter]
+    value: FloatOrInf
+    parameters: dict[str, FloatOrInf]
     until: float
     period: float
     largest_stable: float | None
@@ -120,8 +120,8 @@ class MappedPlace:
     """A value of an axis, the scene's parameters there, and why there is no truth."""
 
     axis: str
-    value: Parameter
-    parameters: dict[str, Parameter]
+    value: FloatOrInf
+    parameters: dict[str, FloatOrInf]
     problem: str | None
 
 

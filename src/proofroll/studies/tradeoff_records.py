@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from proofroll.core.validation import Parameter
+from proofroll.core.validation import FloatOrInf
 from proofroll.running.case import Status
 from proofroll.studies.study_store import Measured
 
@@ -63,7 +63,7 @@ class Corner:
         message: how the run ended.
     """
 
-    parameters: dict[str, Parameter]
+    parameters: dict[str, FloatOrInf]
     errors: dict[str, float]
     relative: dict[str, float]
     message: str
@@ -218,7 +218,7 @@ class TradeoffStudy:
 
     study: str = "tradeoff"
     scene: str
-    parameters: dict[str, Parameter]
+    parameters: dict[str, FloatOrInf]
     until: float
     every: float
     quantity: str
@@ -230,7 +230,7 @@ class TradeoffStudy:
     pareto: dict[str, list[int]]
     pareto_engines: dict[str, list[int]]
     truth: TruthCost
-    over: dict[str, list[Parameter]]
+    over: dict[str, list[FloatOrInf]]
     findings: list[str]
     brief: bool
     measured: Measured
