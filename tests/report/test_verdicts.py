@@ -123,7 +123,7 @@ def test_another_limit_and_no_limit_are_two_answers_on_the_terminal(outcome: Out
     (other,) = (line for line in lines if "another limit" in line)
     (none,) = (line for line in lines if "no limit shown" in line)
     assert other.startswith("✗ alpha fine matched (dt 1e-3 s): z at speed=")
-    assert other.endswith("another limit: off by 0.05 ± 0.0002 m, order 1")
+    assert other.endswith("another limit: off by 0.05 ± 2e-4 m, order 1")
     assert none.endswith("no limit shown: off by 0.06 ± 0.1 m, no order")
 
 
@@ -146,7 +146,7 @@ def test_a_wrong_limit_within_tolerance_is_marked(outcome: Outcome) -> None:
     assert "✓ agrees*" in printed(content, 100)
     assert "agrees*" in [line.verdict_text for lines in overview(content, 0).groups.values() for line in lines]
     (remark,) = row.remarks
-    assert "shown not to be the truth: off by 0.0004 ± 1e-07 m, order 2" in remark
+    assert "shown not to be the truth: off by 4e-4 ± 1e-7 m, order 2" in remark
     assert f"* beta only: {remark}" in [line.replace(" (dt 1e-3 s)", "") for line in closing_lines(content)]
     assert content.runs_of(2)[0].judgements[0].remarks
 
@@ -188,7 +188,7 @@ def test_the_page_says_all_of_it(outcome: Outcome, made: tuple[Outcome, Store], 
     for words in (
         "✗ differs another limit",
         "✗ differs no limit shown",
-        "another limit: off by 0.05 ± 0.0002 m, order 1",
+        "another limit: off by 0.05 ± 2e-4 m, order 1",
         "no limit shown: off by 0.06 ± 0.1 m, no order",
         "within tolerance, but the limit of small steps is shown not to be the truth",
         "◐ incomplete does not report F2, N",

@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import Limit
+from proofroll.core.number_text import number
 
 # A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
 # shrink, twenty further halvings, a step a million times finer, would move the curve by the tolerance at most.
@@ -184,7 +185,8 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
     elif leaves and (limit.shown or flat or error - bar / _FLAT > tolerance):
         finding = LimitFinding.ANOTHER
     wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + round_off
-    text = f"off by {error:.2g} ± {bar:.1g}{unit}, {'no order' if order is None else f'order {order:.3g}'}"
+    told = "no order" if order is None else f"order {order:.3g}"
+    text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
     return _Ladder(finding, error, bar, order, leaves, wrong, text)
 
 
@@ -205,13 +207,13 @@ def _reason(
 ) -> str:
     """Why the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
     truth_error_bar, own_bar = bars
-    found, allowed, bar = *_told_apart(error, tolerance), f"{truth_error_bar:.2g}{unit}"
+    found, allowed, bar = *_told_apart(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if truth_error_bar > tolerance:
         return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}"
     if verdict == Verdict.NOT_JUDGED:
         whose = "the truth's error bar"
         if own_bar > truth_error_bar:
-            bar, whose = f"{own_bar:.2g}{unit}", "for the run shows it only between two times"
+            bar, whose = f"{number(own_bar)}{unit}", "for the run shows it only between two times"
         return f"not judged: error {found}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
     text = f"error {found}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
@@ -227,5 +229,5 @@ def _reason(
 
 def _told_apart(one: float, other: float) -> tuple[str, str]:
     """Two numbers with two digits, or as many as show that they are not the same."""
-    texts = ((f"{one:.{digits}g}", f"{other:.{digits}g}") for digits in range(2, 18))
+    texts = ((number(one, digits), number(other, digits)) for digits in range(2, 18))
     return next((pair for pair in texts if one == other or pair[0] != pair[1]), (repr(one), repr(other)))

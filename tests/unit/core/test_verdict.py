@@ -47,7 +47,7 @@ def test_an_error_that_vanishes_by_luck_at_one_step_is_no_agreement(declared: in
     found = verdict_of(off[0], errors(*off, declared=declared))
     assert found.error < 1e-15
     assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
-    assert "within 0.001 m" in found.reason
+    assert "within 1e-3 m" in found.reason
     assert "another limit: off by" in found.reason
 
 
@@ -203,7 +203,7 @@ def test_another_limit_and_no_limit_are_two_answers() -> None:
     """Both differ, and say which of the two it is, with order, limit error and bar."""
     other = verdict_of(0.061, ladder(1, offset=0.05))
     assert (other.verdict, other.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
-    assert other.reason.startswith("error 0.061 m beyond 0.001 m; another limit: off by 0.05 ± ")
+    assert other.reason.startswith("error 0.061 m beyond 1e-3 m; another limit: off by 0.05 ± ")
     assert other.reason.endswith("order 1.04")
     scattered = verdict_of(0.05, errors(0.05, -0.04, 0.06))
     assert (scattered.verdict, scattered.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
@@ -254,7 +254,7 @@ def test_an_error_that_the_truth_cannot_place_is_not_judged(error: float) -> Non
     """Where the truth's own error bar reaches across the tolerance nobody is said to agree or to differ."""
     found = verdict_of(error, bar=0.9e-3)
     assert found.verdict is Verdict.NOT_JUDGED
-    assert found.reason.endswith("m ± 0.0009 m, the truth's error bar, may be within 0.001 m or beyond")
+    assert found.reason.endswith("m ± 9e-4 m, the truth's error bar, may be within 1e-3 m or beyond")
     assert verdict_of(0.05e-3, bar=0.9e-3).verdict is Verdict.AGREES
     assert verdict_of(1.95e-3, bar=0.9e-3).verdict is Verdict.DIFFERS
 
@@ -265,15 +265,15 @@ def test_a_difference_that_may_be_the_sampling_alone_is_not_judged() -> None:
     times = np.array([0.2727])
     found = judge("first_slip", "s", times + 7e-3, times, own_bar=25e-3, **late)
     assert found.verdict is Verdict.NOT_JUDGED
-    assert "error 0.007 s ± 0.025 s, for the run shows it only between two times" in found.reason
+    assert "error 7e-3 s ± 0.025 s, for the run shows it only between two times" in found.reason
     assert judge("first_slip", "s", times + 7e-3, times, own_bar=1e-3, **late).verdict is Verdict.DIFFERS
     assert judge("first_slip", "s", times + 1e-3, times, own_bar=25e-3, **late).verdict is Verdict.AGREES
 
 
 def test_a_reason_never_sets_a_number_against_itself() -> None:
     """An error a millionth beyond the tolerance is written with as many digits as show it."""
-    assert verdict_of(1.000001e-3).reason.startswith("error 0.001000001 m beyond 0.001 m")
-    assert verdict_of(2e-3).reason.startswith("error 0.002 m beyond 0.001 m")
+    assert verdict_of(1.000001e-3).reason.startswith("error 1.000001e-3 m beyond 1e-3 m")
+    assert verdict_of(2e-3).reason.startswith("error 2e-3 m beyond 1e-3 m")
 
 
 @pytest.mark.parametrize(

@@ -104,7 +104,7 @@ def test_a_claim_that_holds(tmp_path: Path) -> None:
     """An engine that gives the truth contradicts nothing, and one that is off contradicts once, by its observable."""
     assert judged(tmp_path / "right", claim([ROW], [4.0]), the_truth).contradictions == []
     (said,) = judged(tmp_path / "wrong", claim([ROW], [4.0]), off).contradictions
-    assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 0.001 m beyond 1e-09 m")
+    assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 1e-3 m beyond 1e-9 m")
 
 
 @pytest.mark.parametrize(
