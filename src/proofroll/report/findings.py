@@ -150,10 +150,10 @@ def _surprises(content: ReportedComparison) -> str:
     if found:
         more = f" (and {len(found) - 1} more, listed below)" if len(found) > 1 else ""
         return f"Not expected: {found[0]}{more}."
-    known = [row for row in content.rows if row.verdict not in {"agrees"}]
+    known = [row for row in content.rows if row.verdict != "agrees"]
     if not known:
         return "Nothing contradicts what the comparison expects, and nothing disagrees with the truth."
     return (
-        f"Nothing contradicts what the comparison expects: where a setting does not agree ({len(known)} of "
-        f"{len(content.rows)}), the comparison says why."
+        f"Nothing contradicts what the comparison expects; {len(known)} of {counted(len(content.rows), 'settings')} do "
+        "not agree, each for the reason that its row tells."
     )
