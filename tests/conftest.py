@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 from no_skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 -- hooks, which pytest finds here
 from warm_workers import WarmWorkers
 from xdist.remote import Producer
@@ -32,13 +32,20 @@ from proofroll.studies import tradeoff
 PLUGINS = Path(__file__).parent / "plugins"
 _METADATA = "Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\nRequires-Dist: no-such-library>=2\n"
 
-# The same examples on every machine: a red test stays red when it is run again.
+# The same examples on every machine: a red test stays red when it is run again. It ends with the first example that
+# fails: to look for the smallest one takes hundreds of runs, minutes where each is a simulation, and is left to who
+# asks for it (--hypothesis-profile=shrinking).
 settings.register_profile(
-    "repeatable",
+    "shrinking",
     derandomize=True,
     deadline=None,
     max_examples=5,
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture],
+)
+settings.register_profile(
+    "repeatable",
+    settings.get_profile("shrinking"),
+    phases=[phase for phase in Phase if phase not in {Phase.shrink, Phase.explain}],
 )
 settings.load_profile("repeatable")
 
