@@ -189,6 +189,24 @@ def test_findings_are_written_from_the_data(written: tuple[dict[str, Any], Path]
     assert found["sentences"][2].startswith("Not expected: gamma at this point missing")
 
 
+def test_where_runs_were_made_is_told(made: tuple[Outcome, Store], html: str, tmp_path: Path) -> None:
+    """Who ran on machines of a cluster is told once for the comparison, with each run, and nowhere where nobody did."""
+    outcome, store = made
+    away = [
+        dataclasses.replace(run, result=dataclasses.replace(run.result, host="node<7>"))
+        for run in outcome.runs
+        if run.row.engine == "beta"
+    ]
+    runs = [run for run in outcome.runs if run.row.engine != "beta"] + away
+    write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
+    shown = (tmp_path / "report.html").read_text(encoding="utf-8")
+    line = "Made on machines of a cluster: 2 on node&lt;7&gt;. No speed is measured there."
+    assert f"<dt>Elsewhere</dt><dd>An invented comparison: {line}</dd>" in shown
+    assert shown.count("<dt>Ran on</dt><dd>node&lt;7&gt;, a machine of a cluster") == len(away) == 2
+    assert "<dt>Elsewhere</dt>" not in html
+    assert "<dt>Ran on</dt>" not in html
+
+
 def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """Every engine missing: the page says so, and what cannot be said."""
     outcome, store = made

@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.robots.check import check
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.gallery import locate, outcome, read_gallery
 from proofroll.robots.records import HeldLayer, ImporterRow
+from proofroll.running.asking import lent_workers
 
 Proofroll = Callable[..., tuple[int, str, str]]
 
@@ -71,3 +73,27 @@ def test_as_expected(proofroll: Proofroll, name: str) -> None:
     assert row["unexpected"] == []
     assert code == 0
     assert {"pinocchio", "mujoco"} <= {item["engine"] for item in row["engines"]}
+
+
+@pytest.mark.own_workers
+def test_what_was_read_before_changes_nothing() -> None:
+    """A gallery reads all robots in one process of an engine: each is found alike, to the last digit, first or last."""
+    entries = [entry for entry in read_gallery() if entry.name in {"half_cheetah", "swimmer"}]
+    files = {entry.name: locate(entry) for entry in entries}
+    if len(entries) < 2 or None in files.values():
+        pytest.skip("gymnasium is not installed: pip install 'proofroll[robots]'")
+    found: list[dict[str, list[ImporterRow]]] = []
+    for order in (entries, entries[::-1]):
+        with lent_workers(None) as workers:
+            asked = {entry.name: (files[entry.name], entry.base) for entry in order}
+            found.append(
+                {
+                    name: check(path, ["mujoco", "pinocchio", "exudyn"], base=base, workers=workers).engines
+                    for name, (path, base) in asked.items()
+                    if path is not None
+                }
+            )
+    assert list(found[0]) == list(found[1])[::-1]
+    for name, rows in found[0].items():
+        assert {row.status for row in rows} <= {"holds", "explained"}
+        assert rows == found[1][name]

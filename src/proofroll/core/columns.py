@@ -14,6 +14,9 @@ if TYPE_CHECKING:
 
 # Beginning of an attribute of all: the least value of the variable named after it, where that tells something.
 SMALLEST = "smallest_"
+# Attribute of a variable whose values may be off for a reason that is no engine's: the reason, in a clause. Those of an
+# angle may be off by whole turns, each as large as the attribute PERIOD says, in its unit.
+UNCERTAIN, PERIOD = "uncertain", "period"
 
 
 class Variable(NamedTuple):
@@ -76,6 +79,16 @@ class Columns:
     def assign(self, **said: Any) -> Columns:
         """With more said of all."""
         return Columns(self.variables, {**self.attrs, **said})
+
+    def at(self, dim: str, chosen: npt.NDArray[np.bool_]) -> Columns:
+        """Those places along one dimension alone that are chosen."""
+        found = {
+            name: item._replace(values=np.compress(chosen, item.values, item.dims.index(dim)))
+            if dim in item.dims
+            else item
+            for name, item in self.variables.items()
+        }
+        return Columns(found, self.attrs)
 
     def dataset(self) -> xr.Dataset:
         """As what everybody else reads."""

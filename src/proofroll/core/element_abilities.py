@@ -59,6 +59,18 @@ class WatchesRuns(Protocol):
 
 
 @runtime_checkable
+class CountsTurns(Protocol):
+    """What an element has besides, if it has angles that go on beyond a turn."""
+
+    @property
+    def turn_interval(self) -> float | None:
+        """Longest interval between two samples over which their rates tell the turns between them [s].
+
+        None: it has no such angle.
+        """
+
+
+@runtime_checkable
 class HasOptionalCapabilities(Protocol):
     """What an element has besides, if scenes of its kind may do without some of what a formulation can provide."""
 

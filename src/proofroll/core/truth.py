@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+import numpy as np
+
 from proofroll.core.announced import announced
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
@@ -71,20 +73,24 @@ def load_truths() -> tuple[type[ElementTruth], ...]:
     return tuple(point.load() for point in announced(TRUTHS))
 
 
-def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
+def truth(scene: Scene, asked: FloatArray, counting: FloatArray | None = None) -> xr.Dataset:
     """The true run of a scene, see :class:`ElementTruth`. No force couples its elements, so each is solved alone.
+
+    It is given at the times that are ``asked`` [s]; turns are counted at those for ``counting`` too
+    (:func:`proofroll.core.turns.samples_between`).
 
     Raises:
         Refused: an element that nothing covers.
         Diverged: two routes disagree.
     """
+    times = asked if counting is None or not len(counting) else np.union1d(asked, counting)
     parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
     whole = joined(scene, {name: Columns.of(part) for name, part in parts.items()}).dataset()
     for name in ("route", "second_route", "ill_posed"):
         said = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
         if said:
             whole.attrs[name] = "; ".join(said)
-    return whole
+    return whole if times is asked else whole.isel(time=np.isin(times, asked))
 
 
 def edge_between(scene: Scene, parameter: str, low: float, high: float, until: float) -> float | None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.columns import SMALLEST
+from proofroll.core.columns import SMALLEST, UNCERTAIN
 from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.events import Event, events_of
 from proofroll.core.number_text import number
@@ -27,6 +27,7 @@ class RunContent:
         final: variable -> value at the last sample; empty if there is none.
         units: of these.
         absent: variable without a value -> why.
+        uncertain: variable whose value may be off for a reason that is no engine's -> why.
         smallest: variable -> least value on the way, of those whose least value tells something, as of a normal force.
         error_bars: of the truth, by variable.
         trajectory, plot: files that were written.
@@ -49,6 +50,7 @@ class RunContent:
     events: list[Event] = field(default_factory=list)
     smallest: dict[str, float] | None = field(default=None, metadata=OPTIONAL)
     error_bars: dict[str, float] | None = field(default=None, metadata=OPTIONAL)
+    uncertain: dict[str, str] | None = field(default=None, metadata=OPTIONAL)
     trajectory: str | None = field(default=None, metadata=OPTIONAL)
     plot: str | None = field(default=None, metadata=OPTIONAL)
 
@@ -84,6 +86,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         final={"time": float(columns["time"].values[-1])} | {name: float(c.values[-1]) for name, c in curves.items()},
         units={"time": "s"} | {name: curve.attrs["units"] for name, curve in curves.items()},
         absent={name: str(curve.attrs["absent"]) for name, curve in curves.items() if "absent" in curve.attrs},
+        uncertain={name: str(c.attrs[UNCERTAIN]) for name, c in curves.items() if UNCERTAIN in c.attrs} or None,
         events=events_of(columns),
         smallest=smallest or None,
         error_bars={name: float(c.attrs["error_bar"]) for name, c in curves.items() if "error_bar" in c.attrs} or None,
@@ -123,9 +126,9 @@ def run_lines(content: RunContent) -> list[Any]:
         bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []
         table.add_row(name, f"{value:.12g}", content.units[name], *bar)
     lines.append(table)
-    for reason in dict.fromkeys(content.absent.values()):
-        without = [name for name, why in content.absent.items() if why == reason]
-        lines.append(Text(f"{reason}: {', '.join(without)}"))
+    for told in (content.absent, content.uncertain or {}):
+        for reason in dict.fromkeys(told.values()):
+            lines.append(Text(f"{reason}: {', '.join(name for name, why in told.items() if why == reason)}"))
     for name, value in (content.smallest or {}).items():
         lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:

@@ -120,6 +120,8 @@ class Case:
         timed: whether a second, clean run that only advances is timed.
         time_limit: seconds after which the case is ended, but for those in which others had the processor [s].
         asks: what is wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
+        turns: whether samples are taken between those every ``every`` where turns of angles have to be counted
+            (:func:`proofroll.core.turns.samples_between`); no study needs that, and an adaptive step ends at each.
     """
 
     scene: str
@@ -131,11 +133,12 @@ class Case:
     timed: bool = False
     time_limit: float = 120.0
     asks: tuple[str, ...] = ()
+    turns: bool = False
 
     @cached_property
     def key(self) -> str:
         """Hash of all that decides the result; where an interpreter lies does not, what it has does."""
-        left_out = {"time_limit"} | (set() if self.asks else {"asks"})
+        left_out = {"time_limit", *(name for name in ("asks", "turns") if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]

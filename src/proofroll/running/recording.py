@@ -84,10 +84,13 @@ class Recording:
         return self.failure or self.ended or "; ".join([f"reached {until:g} s", *self.remarks])
 
 
-def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float] = ()) -> Recording:
-    """Advances an engine freshly built of a scene over ``times`` [s] and samples it at each, and at ``probes`` [s].
+def record(
+    engine: Any, scene: Scene, asked: FloatArray, probes: Iterable[float] = (), counting: Iterable[float] = ()
+) -> Recording:
+    """Advances an engine freshly built of a scene and samples it at the times that are ``asked`` [s].
 
-    Probes are a few times off that grid, from :func:`off_grid`.
+    Probes are a few times off that grid [s], from :func:`off_grid`; what is sampled at times for ``counting`` turns
+    [s], from :func:`proofroll.core.turns.samples_between`, is left out of the result.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
@@ -96,6 +99,7 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
     wall = 0.0
     between: dict[float, AnySample] = {}
     off = set(map(float, probes))
+    times = np.array(sorted({*asked.tolist(), *(set(map(float, counting)) - off)}))
     watches = [(element, element.watch(scene.asks)) for element in scene.elements if isinstance(element, WatchesRuns)]
     for t in sorted({*times[1:].tolist(), *off}):
         before, start = time.process_time(), time.perf_counter()
@@ -132,8 +136,10 @@ def record(engine: Any, scene: Scene, times: FloatArray, probes: Iterable[float]
         for element in scene.elements
     )
     failure = failure or next(filter(None, lacking), None)
-    last = times[len(samples) - 1]
+    shown = np.isin(times[: len(samples)], asked)
+    last = times[: len(samples)][shown][-1]
     columns = columns_of(scene, times, samples, {at: sample for at, sample in between.items() if at < last})
+    columns = columns if np.all(shown) else columns.at("time", shown)
     for owner, found in events:
         columns = add_events(scene, owner, columns, found)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()

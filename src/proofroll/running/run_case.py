@@ -36,6 +36,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.first_steps import certificate
     from proofroll.core.several import build, step_of
     from proofroll.core.time_grid import time_grid
+    from proofroll.core.turns import samples_between
     from proofroll.files.trajectory_file import write
     from proofroll.running.loading import loaded, scene_of
     from proofroll.running.recording import off_grid, record
@@ -44,7 +45,8 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         spent.on("loading")
-        return _run_truth(scene, times, out, made_with("truth", case.engine.version))
+        counting = samples_between(scene, times) if case.turns else times[:0]
+        return _run_truth(scene, times, counting, out, made_with("truth", case.engine.version))
     kind, settings = loaded(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
@@ -57,7 +59,9 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         lines = [line.as_dict() for line in found]
         if difference is not None:
             return Result(Status.WRONG_MODEL, difference, certificate=lines, versions=versions)
-        recording = record(engine, scene, times, off_grid(times, step_of(engine, settings)))
+        step = step_of(engine, settings)
+        counting = samples_between(scene, times, step) if case.turns else times[:0]
+        recording = record(engine, scene, times, off_grid(times, step), counting)
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)
         del engine
     except (Refused, Diverged) as error:
@@ -92,7 +96,7 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
     return Result(status, str(error), versions=versions)
 
 
-def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(scene: Any, times: Any, counting: Any, out: Path, versions: dict[str, str]) -> Result:
     from proofroll.core.truth import truth
     from proofroll.files.trajectory_file import import_xarray, write
 
@@ -100,7 +104,7 @@ def _run_truth(scene: Any, times: Any, out: Path, versions: dict[str, str]) -> R
 
     start = time.perf_counter()
     try:
-        dataset = truth(scene, times)
+        dataset = truth(scene, times, counting)
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     wall = time.perf_counter() - start

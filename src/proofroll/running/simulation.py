@@ -13,6 +13,7 @@ from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY, sampling_interval, time_grid
+from proofroll.core.turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import truth_version
 from proofroll.running.manifest import manifest, versions
@@ -95,7 +96,8 @@ def simulate(
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         from proofroll.core.truth import truth
 
-        found = truth(scene, time_grid(until, EVERY if every is None else every))
+        times = time_grid(until, EVERY if every is None else every)
+        found = truth(scene, times, samples_between(scene, times))
         message = found.attrs.get("ill_posed", "two independent routes agree")
         found = found.assign_attrs(status="done", message=message)
         return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
@@ -106,7 +108,8 @@ def simulate(
     difference = first_difference(lines)
     if difference is not None:
         raise Refused(difference)
-    recording = record(built, scene, times, off_grid(times, several.step_of(built, resolved)))
+    step = several.step_of(built, resolved)
+    recording = record(built, scene, times, off_grid(times, step), samples_between(scene, times, step))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",
         message=recording.message(until),

@@ -66,4 +66,4 @@ def single_case(
         until = min(USUAL, read_scene_file(scene).duration or USUAL)
     if every is None:
         every = sampling_interval(facts.step)
-    return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit)
+    return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit, turns=True)

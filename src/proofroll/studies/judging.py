@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Doubt, Judgement, Verdict
 from proofroll.core.verdict import judge as judge_curve
 from proofroll.files.scene_file import load_scene
@@ -129,10 +131,12 @@ def judge(
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
         dataset, observed = cut[0], reference.observed(cut[0])
-    bounds = _bounds(tolerance, reference, observed, [str(name) for name in dataset.data_vars])
+    sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
+    bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
-    return Judged(scene.name, tuple(compared), because, _unjudged(given, reference, bounds))
+    unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
+    return Judged(scene.name, tuple(compared), because, unjudged)
 
 
 def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
@@ -146,12 +150,22 @@ def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolera
     return found
 
 
+def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
+    """What of a whole run is not judged, for its samples do not tell it -> why."""
+    found = {}
+    for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
+        if name in dataset and UNCERTAIN in dataset[name].attrs:
+            found[f"turns of {name}" if name in judged else name] = str(dataset[name].attrs[UNCERTAIN])
+    return dict(sorted(found.items()))
+
+
 def _truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     """The truth at these times, which tests ask for again and again."""
     key = scene.digest, times.tobytes()
     if key not in _truths:
         late = times[0] > 0
-        found = truth(scene, np.concatenate([[0.0], times]) if late else times)
+        asked = np.concatenate([[0.0], times]) if late else times
+        found = truth(scene, asked, samples_between(scene, asked))
         _truths[key] = found.isel(time=slice(1, None)) if late else found
         while len(_truths) > _MOST_TRUTHS:
             del _truths[next(iter(_truths))]

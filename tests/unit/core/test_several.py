@@ -28,10 +28,10 @@ def balls() -> Scene:
 @pytest.mark.parametrize("engine", ["projection", "reduced", "exudyn", "pinocchio"])
 def test_each_element_moves_as_it_does_alone(balls: Scene, engine: str) -> None:
     """In a scene of two elements each follows, digit for digit, the path of a scene that holds it alone."""
-    both = observe(balls, simulate(balls, engine, until=0.1, every=0.05))
+    both = observe(balls, simulate(balls, engine, until=0.1, every=0.01))
     for element in balls.elements:
         alone = dataclasses.replace(balls, elements=(element,))
-        seen = observe(alone, simulate(alone, engine, until=0.1, every=0.05))
+        seen = observe(alone, simulate(alone, engine, until=0.1, every=0.01))
         for name in alone.observables:
             if name in seen:
                 assert np.array_equal(both[balls.label(element, name)], seen[name]), name
@@ -47,9 +47,9 @@ def mixed(balls: Scene) -> Scene:
 @pytest.mark.parametrize("engine", ["projection", "exudyn", "pinocchio", "mujoco"])
 def test_elements_of_two_kinds_take_the_formulation_that_each_needs(mixed: Scene, engine: str) -> None:
     """Beside a mechanism a ball moves as alone, and the run says in which formulation the mechanism is."""
-    both = simulate(mixed, engine, until=0.1, every=0.05)
+    both = simulate(mixed, engine, until=0.1, every=0.01)
     alone = dataclasses.replace(mixed, elements=mixed.elements[:1])
-    ball, seen = mixed.elements[0], observe(alone, simulate(alone, engine, until=0.1, every=0.05))
+    ball, seen = mixed.elements[0], observe(alone, simulate(alone, engine, until=0.1, every=0.01))
     found = observe(mixed, both)
     for name in alone.observables:
         if name in seen:

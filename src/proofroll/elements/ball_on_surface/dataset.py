@@ -8,8 +8,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, on_turns
 from proofroll.core.columns import SMALLEST, Columns, Variable, axes
+from proofroll.core.turns import doubt
 from proofroll.elements.ball_on_surface.mechanics import energy, slip_velocity, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.natural import turn_interval
 from proofroll.elements.ball_on_surface.sampling import BallSample
 
 
@@ -95,6 +97,10 @@ def columns(
         put("q_WB", q_WB, "1", "orientation, quaternion scalar first", "wxyz")
     for index, (name, unit) in enumerate(zip(surface.coordinates, surface.units, strict=True)):
         put(name, u[:, index], unit, f"surface coordinate {name}")
+        period = surface.periods[index]
+        if period is not None:
+            said = doubt(times, u[:, index], rates[:, index], period, turn_interval(body))
+            found[name] = found[name]._replace(attrs={**found[name].attrs, **said})
         put(f"{name}_rate", rates[:, index], f"{unit}/s", f"rate of {name}")
     for index in range(3):
         put(f"omega{index + 1}", spin[:, index], "rad/s", f"angular velocity about e{index + 1}")

@@ -151,6 +151,11 @@ class BallOnSurface:
         """See the protocol."""
         return natural.natural_time(self.rolling)
 
+    @property
+    def turn_interval(self) -> float | None:
+        """See :class:`proofroll.core.element_abilities.CountsTurns`."""
+        return natural.turn_interval(self.rolling)
+
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:
         """See the protocol."""
         return natural.step_numbers(self.rolling, h, truth)

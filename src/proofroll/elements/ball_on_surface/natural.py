@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.element import FirstMotion, StepNumber
+from proofroll.core.time_grid import EVERY
+from proofroll.core.turns import PART as PART_OF_TURNS
 from proofroll.elements.ball_on_surface.mechanics import (
     initial_angular_acceleration,
     initial_response,
@@ -44,6 +46,16 @@ def natural_time(body: RollingBall) -> float:
     times = [a / speed] if speed else []
     times += [math.sqrt(a / gravity)] if gravity else []
     return 2 * math.pi * max(times, default=1.0)
+
+
+def turn_interval(body: RollingBall) -> float | None:
+    """See :class:`proofroll.core.element_abilities.CountsTurns`: by how the ball goes round, and how it would swing."""
+    if not any(body.surface.periods):
+        return None
+    gravity, bend = float(np.linalg.norm(body.gravity)), float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
+    swing = 2 * math.pi / math.sqrt(gravity * bend) if gravity * bend else math.inf
+    # Round a cylinder a ball goes as evenly as it began, however fast.
+    return max(EVERY, PART_OF_TURNS * min(natural_time(body), swing))
 
 
 def step_numbers(body: RollingBall, h: float, truth: xr.Dataset | None) -> tuple[StepNumber, ...]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import Columns, Variable, axes
+from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism.placed import Placed
+from proofroll.core.turns import doubt
+from proofroll.elements.mechanism.joint import TURNING
+from proofroll.elements.mechanism.placed import TURN, Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
 
 if TYPE_CHECKING:
@@ -66,8 +68,8 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
     placed = replace(placed, q_WB=_continuous(placed.q_WB, element.start.q_WB[0]))
     found: dict[str, Variable] = {}
 
-    def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, absent: str = "") -> None:
-        attributes = {"units": unit, "long_name": meaning} | ({"absent": absent} if absent else {})
+    def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, **more: Any) -> None:
+        attributes = {"units": unit, "long_name": meaning} | {key: said for key, said in more.items() if said}
         found[name] = Variable(("time", *dims), values, attributes)
 
     put("p_WB", placed.p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
@@ -76,9 +78,10 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
     put("q_WB", placed.q_WB, "1", "orientation, quaternion scalar first", "body", "wxyz")
     put("attitudes", placed.q_WB, "1", "quaternions of the bodies", "body", "wxyz")
     put("positions", placed.points, "m", "tracked points, or origins of the bodies", "point", "xyz")
+    doubts = _doubts(placed, element.turn_interval)
     for name, (q, rate) in placed.coordinates().items():
         unit = "rad" if next(j for j in mechanism.joints if j.name == name).kind == "revolute" else "m"
-        put(f"q.{name}", q, unit, f"coordinate of {name}")
+        put(f"q.{name}", q, unit, f"coordinate of {name}", **doubts.get(name, {}))
         put(f"v.{name}", rate, f"{unit}/s", f"rate of {name}")
     for index, point in enumerate(mechanism.points):
         for axis, letter in enumerate("xyz"):
@@ -97,10 +100,23 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
     energy = placed.energy()
-    put("energy", energy, "J", "kinetic and potential energy")
-    put("energy_error", energy - energy[0], "J", "energy now minus energy at the start")
+    wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
+    unsure = {UNCERTAIN: wound[0]} if wound else {}
+    put("energy", energy, "J", "kinetic and potential energy", **unsure)
+    put("energy_error", energy - energy[0], "J", "energy now minus energy at the start", **unsure)
     put("drift", placed.drift(), "m", "how far joints and loops are open")
     return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
+
+
+def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:
+    """Joint whose angles may be off by whole turns -> what is to be said, see :func:`proofroll.core.turns.doubt`."""
+    found = {}
+    for joint in placed.mechanism.joints:
+        if joint.kind in TURNING:
+            for angle, rate in zip(*(values.T for values in placed.along(joint)), strict=True):
+                if said := doubt(placed.time, angle, rate, TURN, interval):
+                    found[joint.name] = said
+    return found
 
 
 def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:

@@ -14,11 +14,14 @@ from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
+from proofroll.core.time_grid import EVERY
+from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
+from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -121,6 +124,17 @@ class MechanismElement:
             return float(2 * np.pi * np.sqrt(mass / stiffest))
         spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
         return 2 * np.pi / spin if spin else 1.0
+
+    @cached_property
+    def turn_interval(self) -> float | None:
+        """See :class:`proofroll.core.element_abilities.CountsTurns`; None without a revolute or universal joint."""
+        if not any(joint.kind in TURNING for joint in self.mechanism.joints):
+            return None
+        spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
+        # What turns alone does so evenly, however fast; samples no rarer than usual then tell its turns.
+        fast = max(EVERY, PART * 2 * np.pi / spin) if spin else np.inf
+        loaded = np.any(self.mechanism.gravity) or self.mechanism.springs
+        return float(min(fast, PART * self.natural_time if loaded or not spin else np.inf))
 
     @cached_property
     def _speed(self) -> float:

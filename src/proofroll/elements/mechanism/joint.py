@@ -41,6 +41,7 @@ FACTS: dict[str, Facts] = {
     "planar": Facts(3, 3, (2,), _PARALLEL),
     "free": Facts(7, 6, (), ()),
 }
+TURNING = ("revolute", "universal")  # whose coordinates are angles that go on beyond a turn
 WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
 WITH_QUATERNION = ("spherical", "free")
 _O, _UNIT = np.zeros(3), np.eye(3)

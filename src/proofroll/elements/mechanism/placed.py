@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.checks import ZERO
 from proofroll.elements.mechanism.joint import AXES, FACTS, WITH_QUATERNION, Joint
 from proofroll.elements.mechanism.model import Mechanism
 
-_TURN = 2 * np.pi
+TURN = 2 * np.pi
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ class Placed:
                 continue
             if turns:
                 sine, cosine = (turned[:, 2, 1], turned[:, 2, 2]) if of_child else (turned[:, 1, 0], turned[:, 0, 0])
-                q.append(on_turns(self.time, np.arctan2(sine, cosine), v[-1], joint.q0[len(q)], _TURN))
+                q.append(on_turns(self.time, np.arctan2(sine, cosine), v[-1], joint.q0[len(q)], TURN))
             else:
                 q.append(np.sum(self._apart(joint)[0] * axis, -1))
         if joint.kind in WITH_QUATERNION:

@@ -117,11 +117,11 @@ class Mujoco(SteppedModel):
         """See :class:`proofroll.core.engine.Engine`; what ``joints`` builds is a run of a mechanism."""
         if settings.formulation == "joints":
             return MujocoMechanism(scene, settings)
-        require_provided(cls, settings.formulation, scene)
         return cls._build_ball(scene, settings)
 
     @classmethod
     def _build_ball(cls, scene: Scene, settings: MujocoSettings) -> Self:
+        require_provided(cls, settings.formulation, scene)
         body = rolling_ball(scene)
         bounded = math.isfinite(body.contact.mu_static)
         check(settings, bounded=bounded)

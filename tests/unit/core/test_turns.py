@@ -1,0 +1,100 @@
+"""Turns of angles, which no orientation has: counted by samples that are near enough, or told not to be known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import proofroll
+from proofroll.core.columns import PERIOD, UNCERTAIN
+from proofroll.core.plugins import engine_names
+from proofroll.core.time_grid import EVERY, time_grid
+from proofroll.core.turns import doubt, samples_between
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import build, recorded
+from proofroll.studies.reference import Reference
+
+UNTIL = 2.0
+
+
+@pytest.fixture(scope="module")
+def fine() -> dict[str, float]:
+    """Where angles are at the end, from samples that are as near as they usually are."""
+    ends = {name: proofroll.simulate(name, until=UNTIL) for name in ("pendulum", "tilted_cylinder")}
+    return {"q.pivot": float(ends["pendulum"]["q.pivot"][-1]), "gamma": float(ends["tilted_cylinder"]["gamma"][-1])}
+
+
+@pytest.mark.parametrize("engine", ["truth", *(name for name in engine_names() if name != "reduced")])
+@pytest.mark.parametrize(("scene", "angle"), [("pendulum", "q.pivot"), ("tilted_cylinder", "gamma")])
+def test_two_samples_are_enough_for_an_engine(engine: str, scene: str, angle: str, fine: dict[str, float]) -> None:
+    """Who asks for start and end alone is given the angle that others are given, by the truth and by every engine."""
+    run = proofroll.simulate(scene, engine, until=UNTIL, every=5.0)
+    assert run["time"].to_numpy().tolist() == [0.0, UNTIL]
+    assert float(run[angle][-1]) == pytest.approx(fine[angle], abs=1e-2)
+    assert UNCERTAIN not in run[angle].attrs
+
+
+def test_the_command_counts_them_too(fine: dict[str, float], proofroll: object) -> None:
+    """So does a run in a worker, and the trajectory has the times that were asked for and no others."""
+    import json
+
+    code, out, err = proofroll("run", "pendulum", "--engine", "mujoco", "--every", "5", "--json")  # type: ignore[operator]
+    assert code == 0, err
+    assert json.loads(out)["final"]["q.pivot"] == pytest.approx(fine["q.pivot"], abs=1e-3)
+    assert "uncertain" not in json.loads(out)
+    code, out, _ = proofroll("run", "pendulum", "--engine", "mujoco[dt=0.5]", "--every", "1")  # type: ignore[operator]
+    assert code == 0
+    assert "turns show in samples that are 0.05 s apart or less, and these are 0.5 s apart: q.pivot" in out
+
+
+def test_whole_steps_between_samples() -> None:
+    """Times for counting lie between samples, in whole steps, as near as an angle needs; none without one."""
+    pendulum = load_scene("pendulum")
+    longest = pendulum.elements[0].turn_interval  # type: ignore[attr-defined]  # a mechanism has it
+    times = np.array([0.0, 0.7, 0.73, 2.0])
+    for step in (None, 0.01, 0.005):
+        between = samples_between(pendulum, times, step)
+        everything = np.union1d(times, between)
+        assert len(everything) == len(times) + len(between)
+        assert np.diff(everything).max() <= longest * (1 + 1e-9)
+        if step is not None:
+            assert np.allclose(between / step, np.round(between / step), atol=1e-9)
+    assert not len(samples_between(pendulum, times, 0.7))
+    assert not len(samples_between(load_scene("inclined_plane"), times))
+    assert not len(samples_between(load_scene("free_body"), times))
+
+
+@pytest.mark.parametrize("scene", ["pendulum", "double_pendulum", "sphere_in_cylinder", "tilted_cylinder", "chain"])
+def test_a_usual_run_has_no_more_samples(scene: str) -> None:
+    """Where nobody says how often a run is sampled it costs what it did."""
+    assert not len(samples_between(load_scene(scene), time_grid(UNTIL, EVERY), 1e-3))
+
+
+def test_a_small_mechanism_has_no_more_than_a_run_can_bear() -> None:
+    """A pendulum as fast as one of a millimetre needs more than usual, and has at most a thousand in a short run."""
+    small = load_scene("pendulum", gravity=9.81e3)
+    between = samples_between(small, time_grid(UNTIL, EVERY))
+    assert 200 < len(between) <= 1_000
+
+
+def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
+    """An engine whose steps nobody knows is sampled as asked: its angle is held against the truth up to whole turns."""
+    scene = load_scene("pendulum")
+    run = recorded(build(scene, "projection"), scene, until=UNTIL, every=5.0)
+    assert abs(float(run["q.pivot"][-1]) - fine["q.pivot"]) > 1  # a turn off
+    assert run["q.pivot"].attrs[PERIOD] == pytest.approx(2 * np.pi)
+    found = proofroll.judge(run, scene, {"q.pivot": "1e-6 rad"})
+    assert found.agrees
+    assert list(found.unjudged) == ["turns of q.pivot"]
+    reference = Reference.of(scene, proofroll.simulate(scene, until=UNTIL, every=5.0))
+    off = run.assign({"q.pivot": run["q.pivot"] + 0.1})
+    assert reference.observed(off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
+
+
+def test_a_rate_that_does_not_fit_is_told() -> None:
+    """Near samples of an angle that jumps by a third of a turn against its rate leave its turns open."""
+    time = np.linspace(0, 1, 11)
+    assert not doubt(time, 3 * time, np.full(11, 3.0), 2 * np.pi, 0.2)
+    jumping = 3 * time + 2.1 * (time > 0.5)
+    assert doubt(time, jumping, np.full(11, 3.0), 2 * np.pi, 0.2)[UNCERTAIN].startswith("turns are not sure from 0.5 s")
+    assert doubt(time, 3 * time, np.full(11, 3.0), 2 * np.pi, 0.04)[UNCERTAIN].startswith("turns show in samples")
