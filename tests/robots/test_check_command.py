@@ -156,6 +156,15 @@ def test_what_cannot_be(proofroll: Proofroll, tmp_path: Path) -> None:
     assert "error: link tip: its inertia breaks the triangle inequality" in out
 
 
+def test_what_is_no_number(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A number that MuJoCo compiles though it is none is refused by name."""
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf(joint='armature="nan"'))
+    code, out, err = proofroll("check", str(path), "--engine", "mujoco", "--states", "1")
+    assert (code, out) == (2, "")
+    assert "robot.xml: armature of k1 = 'nan': numbers must be finite" in err
+
+
 def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:
     """A robot without moving joints is no question; a free base makes it one."""
     path = tmp_path / "robot.urdf"

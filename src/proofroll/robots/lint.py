@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
@@ -103,7 +104,7 @@ def _urdf_joint(joint: Element) -> Iterator[_Noticed]:
     where, kind = f"joint {joint.get('name')}", joint.get("type")
     axis, limit = joint.find("axis"), joint.find("limit")
     if axis is not None and kind != "fixed":
-        length = float(np.linalg.norm(numbers(axis, "xyz", "1 0 0", 3)))
+        length = math.hypot(*numbers(axis, "xyz", "1 0 0", 3))
         if abs(length - 1) > _UNIT:
             yield "warning", where, f"its axis has length {length:.6g}, not 1"
     if kind in {"revolute", "prismatic"} and limit is None:

@@ -162,7 +162,13 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
     told = worker.request(_call(compile_robot, path=str(written)), time_limit)
     if told["robot"] is None:
         raise InputError("file", file.path, f"it has no meaning: {told['message']}")
-    return robot_from(told["robot"]), Compiler(*told["by"])
+    robot = robot_from(told["robot"])
+    for name, part in (*robot.bodies.items(), *((joint.name, joint) for joint in robot.joints)):
+        for key, value in vars(part).items():
+            endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
+            if endless and key not in {"lower", "upper"}:  # which most joints have not
+                raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
+    return robot, Compiler(*told["by"])
 
 
 def write(file: RobotFile, folder: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections import Counter
 from typing import Any
 from xml.etree.ElementTree import Element
@@ -142,9 +143,9 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
     axis = np.array([1.0, 0.0, 0.0])
     if kind != "fixed" and (found := element.find("axis")) is not None:
         axis = np.array(numbers(found, "xyz", "1 0 0", 3))
-    length = float(np.linalg.norm(axis))
+    length = math.hypot(*axis)
     if not length:
-        raise InputError(f"<joint {name} axis>", "0 0 0", "an axis needs a direction")
+        raise InputError(f"<joint {name} axis>", axis.tolist(), "an axis needs a direction; give one of length 1")
     dynamics = element.find("dynamics")
     limit = element.find("limit")
     bounded = limit is not None and element.get("type") in {"revolute", "prismatic"}

@@ -66,8 +66,8 @@ def _repeated(field: str, repeat: Any, values: Mapping[str, float]) -> list[tupl
     bounds = {}
     for key, default in (("from", 0), ("count", None)):
         bounds[key] = checks.number(f"{field}.{key}", substituted(f"{field}.{key}", repeat.get(key, default), values))
-        if bounds[key] != round(bounds[key]) or bounds[key] > _MOST:
-            raise InputError(f"{field}.{key}", bounds[key], f"must be a whole number, at most {_MOST}")
+        if bounds[key] != round(bounds[key]) or not (key == "from" or bounds[key] >= 0) or bounds[key] > _MOST:
+            raise InputError(f"{field}.{key}", bounds[key], f"must be a whole number, at most {_MOST}; a count from 0")
     first, count = int(bounds["from"]), int(bounds["count"])
     return [
         (kind, f"{field}.{kind}.{place}", substituted(f"{field}.{kind}.{place}", table, {**values, index: i}))
