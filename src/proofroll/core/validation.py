@@ -58,18 +58,14 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
     return found
 
 
-def _turned(content: object, found: object) -> Iterator[tuple[list[str], bool]]:
+def _turned(content: Any, found: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
     """Every true and false that was taken for a number, with its place."""
-    if isinstance(content, bool):
-        if not isinstance(found, bool):
-            yield [], content
-    elif isinstance(content, Mapping):
-        for name, item in content.items():
-            inside = found.get(name) if isinstance(found, Mapping) else getattr(found, name, item)
-            yield from (([str(name), *place], given) for place, given in _turned(item, inside))
-    elif isinstance(content, (list, tuple)) and isinstance(found, (list, tuple)):
-        for index, (item, inside) in enumerate(zip(content, found, strict=False)):
-            yield from (([str(index), *place], given) for place, given in _turned(item, inside))
+    if isinstance(content, bool) and not isinstance(found, bool):
+        yield place, content
+    parts = content if isinstance(content, Mapping) else dict(enumerate(content if isinstance(content, list) else ()))
+    for name, item in parts.items():
+        inside = found[name] if isinstance(found, (Mapping, list, tuple)) else getattr(found, str(name), item)
+        yield from _turned(item, inside, (*place, str(name)))
 
 
 @cache

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from proofroll.core.bounds import bounded
 from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError, require_known, told_of
 from proofroll.core.observable import Observable
@@ -83,7 +84,7 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
         _check_bounds(f"{where}: tolerances.{name}", known, band.bounds)
     for index, row in enumerate(comparison.rows):
         _check(f"{where}: rows.{index}", row, comparison, known)
-    _check_times(where, comparison)
+    _check_times(comparison)
     _check_brief(where, comparison)
     return comparison
 
@@ -96,13 +97,12 @@ def _check_brief(where: str, comparison: Comparison) -> None:
         raise InputError(f"{where}: brief", comparison.brief, "no combination has these values; keep at least one")
 
 
-def _check_times(where: str, comparison: Comparison) -> None:
+def _check_times(comparison: Comparison) -> None:
     time_grid(comparison.until, comparison.every)
     if comparison.every > comparison.until:
         advice = f"samples lie further apart than the run is long, {comparison.until:g} s; sample more often"
         raise InputError("every", comparison.every, advice)
-    if not (math.isfinite(comparison.time_limit) and comparison.time_limit > 0):
-        raise InputError(f"{where}: time_limit", comparison.time_limit, "give a positive, finite time in s")
+    bounded("time_limit", comparison.time_limit, above=0)
 
 
 def _table(where: str, value: object) -> dict[str, Any]:

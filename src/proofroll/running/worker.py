@@ -72,12 +72,11 @@ def _answer(request: dict[str, Any]) -> dict[str, Any]:
 
 def write(case: dict[str, Any], what: str) -> dict[str, Any]:
     """The text that an engine writes of a case, its ``reproducer`` or ``model_file``; or why it writes none."""
-    from proofroll.core.engine_abilities import Reproduces, WritesModels, require_provided
+    from proofroll.core.engine_abilities import Reproduces, WritesModels
     from proofroll.running.loading import loaded, scene_of
 
     wanted = Case.from_dict(case)
     kind, settings = loaded(wanted)
-    scene = scene_of(wanted)
     ability, lacking = {
         "reproducer": (Reproduces, f"{wanted.engine.name} offers no program of its own"),
         "model_file": (WritesModels, "it writes no file of its model"),
@@ -85,9 +84,7 @@ def write(case: dict[str, Any], what: str) -> dict[str, Any]:
     if not isinstance(kind, ability):
         return {"message": lacking}
     try:
-        if len(scene.elements) == 1:
-            require_provided(kind, settings.formulation, scene)
-        return {"text": getattr(kind, what)(scene, settings)}
+        return {"text": getattr(kind, what)(scene_of(wanted), settings)}
     except (Refused, Diverged) as error:
         return {"message": str(error)}
 

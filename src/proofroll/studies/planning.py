@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
 
 from proofroll.core.comparison import Comparison, Edge, Row
-from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.errors import InputError, ProofrollError, told_of
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
+from proofroll.core.several import represents
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import described, resolve, resolve_with_truth
-from proofroll.running.case import Case, EngineDescription, EngineFacts
+from proofroll.running.case import Case, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
 
@@ -98,11 +100,8 @@ def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
     Raises:
         InputError: it has no such parameter, or not with this value; with the name of the file.
     """
-    try:
+    with told_of(f"{comparison.name}.toml"):
         return load_scene(comparison.scene, **point)
-    except InputError as error:
-        table = "vary" if error.field in comparison.vary else "points"
-        raise error.of(f"{comparison.name}.toml: {table}") if error.field in point else error from None
 
 
 def _moved(row: Row, name: str) -> Row | None:
@@ -137,21 +136,19 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
     """
     known = described([item.name for item in facts if isinstance(item, EngineFacts)], workers)
     for point in comparison.combinations():
-        ends = [{key: value for key, value in point.items() if isinstance(value, float)}]
-        for name, value in point.items():
-            if isinstance(value, Edge):
-                ends = [{**end, name: limit} for end in ends for limit in value.edge_between]
-        requires, *_ = [scene_at(comparison, end).requires for end in ends]
+        ends = product(*(value.edge_between if isinstance(value, Edge) else (value,) for value in point.values()))
+        numbers, *others = [dict(zip(point, values, strict=True)) for values in ends]
+        scene, *_ = [scene_at(comparison, end) for end in (numbers, *others)]
         for index, (row, item) in enumerate(zip(comparison.rows, facts, strict=True)):
             if not isinstance(item, EngineFacts) or point not in comparison.combinations(row.only):
                 continue
             told = known[item.name]
-            provided = told.provides[item.settings["formulation"]] if isinstance(told, EngineDescription) else requires
-            lacking = sorted(requires - set(provided))
-            if lacking and not _UNFIT & set(row.expected(ends[0])):
-                advice = (
-                    f"it does not have {', '.join(lacking)}{at_point(ends[0])}; expect failed there, or leave it out"
-                )
+            if isinstance(told, ProofrollError):
+                continue
+            formulation = item.settings["formulation"]
+            if not _UNFIT & set(row.expected(numbers)) and not represents(scene, formulation, told.provides):
+                lacking = ", ".join(sorted(scene.requires - set(told.provides[formulation])))
+                advice = f"it does not have {lacking}{at_point(numbers)}; expect refused there, or leave it out"
                 raise InputError(f"{comparison.name}.toml: rows.{index}.engine", row.engine, advice)
 
 

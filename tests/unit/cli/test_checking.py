@@ -72,9 +72,9 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
             "inclined_plane.toml",
             "tilt = [0.35]",
             "tlt = [0.35]",
-            ["inclined_plane.toml: vary: tlt = 0.35", "choose from"],
+            ["inclined_plane.toml: tlt = 0.35", "choose from"],
         ),
-        ("inclined_plane.toml", "tilt = [0.35]", "tilt = [9.0]", ["vary: tilt = 9", "must be below"]),
+        ("inclined_plane.toml", "tilt = [0.35]", "tilt = [9.0]", ["inclined_plane.toml: tilt = 9", "must be below"]),
         (
             "inclined_plane.toml",
             "=euler]",

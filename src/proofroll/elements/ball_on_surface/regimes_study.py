@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import bounded
 from proofroll.core.errors import InputError, told_of
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, validated
@@ -97,8 +98,6 @@ def load_regimes(name: str) -> RegimesStudy:
     """
     path, content = study_file(name, STUDY)
     found = validated(RegimesStudy, content, path.name, name=path.stem)
-    if not (math.isfinite(found.until) and found.until > 0):
-        raise InputError(f"{path.name}: until", found.until, "give a positive, finite time in s")
     if not found.rolling_resistance:
         raise InputError(f"{path.name}: rolling_resistance", [], "give at least one value in m")
     for axis, given in (("speed", found.speed), ("mu_static", found.mu_static)):
@@ -106,6 +105,7 @@ def load_regimes(name: str) -> RegimesStudy:
             shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
             raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
     with told_of(path.name):
+        bounded("until", found.until, above=0)
         for resistance in found.rolling_resistance:
             load_scene(found.scene, rolling_resistance=resistance, speed=found.speed.low, mu_static=found.mu_static.low)
     return found

@@ -53,8 +53,8 @@ def test_ours_is_found_by_its_name_and_by_its_scene(name: str) -> None:
     ("old", "new", "words"),
     [
         ('"regimes"', '"tradeoff"', 'only a file with study = "regimes"'),
-        ("until = 0.2", "until = -4", "until = -4.*positive, finite time"),
-        ("until = 0.2", "until = nan", "until = nan.*positive, finite time"),
+        ("until = 0.2", "until = -4", "until = -4.*above 0"),
+        ("until = 0.2", "until = nan", "until = nan.*finite"),
         ("[0.0, 5e-4]", "[]", "rolling_resistance.*at least one"),
         ("[0.0, 5e-4]", "[-1]", "rolling_resistance = -1"),
         ("low = 2", "low = 0", "speed.*0 < low <= high"),
