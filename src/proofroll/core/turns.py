@@ -6,7 +6,8 @@ may be half a turn off, samples between them count; where there are none, the nu
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.element_abilities import CountsTurns
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Intervals between samples, in parts of a natural time: over a double pendulum and a chain of ten rods the prediction
 # is then 0.4 rad off at most, over an eighth of it up to three.
@@ -78,3 +82,20 @@ def doubt(
         return {}
     why = f"turns are not sure from {time[worst]:.6g} s on, where the rate does not fit; sample more often"
     return {UNCERTAIN: why, PERIOD: period}
+
+
+def on_turns_of(
+    other: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset]
+) -> FloatArray | None:
+    """The values of an observable without what is no engine's: an angle on the turns of another run of the same.
+
+    Only where the samples of one of the runs do not tell them (``UNCERTAIN``). None: nothing is left, as of the energy
+    of a spring that turns wind up.
+    """
+    said = [run[name].attrs for run in datasets if name in run and UNCERTAIN in run[name].attrs]
+    if not said or other is None or values.shape != other.shape:
+        return values
+    if PERIOD not in said[0]:
+        return None
+    period = float(said[0][PERIOD])
+    return np.asarray(values + period * np.round((other - values) / period))

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.dataset import Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
+from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import Doubt
 from proofroll.files.trajectory_file import read
 
@@ -102,20 +102,9 @@ class Reference:
             own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
             if "event_kind" in own or "event_kind" in true:
                 found[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
-        return {name: sure for name, values in found.items() if (sure := self._sure(name, values, dataset)) is not None}
-
-    def _sure(self, name: str, values: FloatArray, dataset: xr.Dataset) -> FloatArray | None:
-        """The values without what is no engine's: an angle is put on the truth's turns; None: there are none.
-
-        Only where the samples of the run, or of the truth, do not tell the turns (``UNCERTAIN``).
-        """
-        said = [part[name].attrs for part in (dataset, self.dataset) if name in part and UNCERTAIN in part[name].attrs]
-        if not said:
-            return values
-        if PERIOD not in said[0] or values.shape != self.curves[name].shape:
-            return None
-        period = float(said[0][PERIOD])
-        return np.asarray(values + period * np.round((self.curves[name] - values) / period))
+        both = (dataset, self.dataset)
+        sure = {name: on_turns_of(self.curves.get(name), values, name, both) for name, values in found.items()}
+        return {name: values for name, values in sure.items() if values is not None}
 
     def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
         """The true values of an observable of which an engine gave ``values``, and their error bar."""

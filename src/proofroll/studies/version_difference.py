@@ -13,6 +13,7 @@ from proofroll.core.dataset import observe, scales
 from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
+from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -178,6 +179,9 @@ def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str,
     for name, mine in values.items():
         item, theirs = scene.observables[name], others.get(name)
         if theirs is None or item.role not in {Role.MOTION, Role.REACTION} or mine.ndim != theirs.ndim:
+            continue
+        theirs = on_turns_of(mine, theirs, name, (one, other))
+        if theirs is None:
             continue
         count = min(len(mine), len(theirs))
         if mine[:count].shape != theirs[:count].shape or np.array_equal(mine[:count], theirs[:count], equal_nan=True):

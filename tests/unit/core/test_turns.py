@@ -9,10 +9,11 @@ import proofroll
 from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.plugins import engine_names
 from proofroll.core.time_grid import EVERY, time_grid
-from proofroll.core.turns import doubt, samples_between
+from proofroll.core.turns import doubt, on_turns_of, samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, recorded
 from proofroll.studies.reference import Reference
+from proofroll.studies.version_difference import _apart
 
 UNTIL = 2.0
 
@@ -89,6 +90,21 @@ def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
     reference = Reference.of(scene, proofroll.simulate(scene, until=UNTIL, every=5.0))
     off = run.assign({"q.pivot": run["q.pivot"] + 0.1})
     assert reference.observed(off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
+
+
+def test_turns_that_nobody_knows_are_no_difference() -> None:
+    """Of two runs whose samples do not tell turns an angle is apart by less than a turn; what is sure is not turned."""
+    scene = load_scene("pendulum")
+    run = recorded(build(scene, "projection"), scene, until=UNTIL, every=1.0)
+    other = run.assign({"q.pivot": (run["q.pivot"] + 2 * np.pi + 1e-3).assign_attrs(run["q.pivot"].attrs)})
+    mine, theirs = (found["q.pivot"].to_numpy() for found in (run, other))
+    turned = on_turns_of(mine, theirs, "q.pivot", (run, other))
+    assert turned == pytest.approx(mine + 1e-3, abs=1e-9)
+    assert _apart(scene, run, other, {}).difference == pytest.approx(1e-3)
+    near = recorded(build(scene, "projection"), scene, until=0.1, every=0.05)
+    assert on_turns_of(near["q.pivot"].to_numpy(), near["q.pivot"].to_numpy() + 7, "q.pivot", (near, near))[0] > 9  # type: ignore[index]
+    wound = run.assign({"energy_error": run["energy_error"].assign_attrs({UNCERTAIN: "a spring"})})
+    assert on_turns_of(mine, mine, "energy_error", (wound, wound)) is None
 
 
 def test_a_rate_that_does_not_fit_is_told() -> None:
