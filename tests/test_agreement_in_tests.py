@@ -68,7 +68,7 @@ def test_what_differs_is_told_with_numbers() -> None:
         assert_agrees(scene, Drifting, tolerance={"z": "1e-3 m", "gamma": "1 %"}, because=BECAUSE, until=0.2)
     head, first, second = str(caught.value).splitlines()
     assert head == "tiny differs from the truth of sphere_in_cylinder (tolerance: a first look)"
-    assert first.startswith("  !! z is off by 0.002 m at 0.2 s, allowed 0.001 m; the truth is known to ")
+    assert first.startswith("  !! z is off by 2e-3 m at 0.2 s, allowed 1e-3 m; the truth is known to ")
     assert second.startswith("  ok gamma is off by")
 
 

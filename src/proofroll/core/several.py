@@ -22,7 +22,7 @@ AnySample = Sample | Mapping[str, Sample]
 """What an engine samples: of a scene of several elements one sample for each, by its name."""
 
 # Arrays of a sample that every engine gives.
-REQUIRED = frozenset({"p_WB", "v_WB", "w_WB"})
+REQUIRED = ("p_WB", "v_WB", "w_WB")
 
 
 class EachAlone:

@@ -154,7 +154,7 @@ class Program:
         """The sample that came with the last answer."""
         said = self._last.get("sample")
         names = [item.name for item in dataclasses.fields(self._sample_type)]
-        if not isinstance(said, dict) or not REQUIRED <= said.keys() <= set(names):
+        if not isinstance(said, dict) or not set(REQUIRED) <= said.keys() <= set(names):
             raise ProofrollError(
                 f"{self.path.name} gave no sample with p_WB, v_WB, w_WB, and of {', '.join(names)} only"
             )

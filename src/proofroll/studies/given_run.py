@@ -13,13 +13,13 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import from_samples
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
+from proofroll.core.several import REQUIRED
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Run = Any
 """An ``xarray.Dataset``, the path of a netCDF file, or arrays by name, ``time`` [s] among them."""
-_STATE = ("p_WB", "v_WB", "w_WB")
 # Other ways to write a unit of the truth, as in files of other programs.
 _SPELT = {
     "sec": "s", "second": "s", "seconds": "s", "radian": "rad", "radians": "rad", "m s-1": "m/s", "rad s-1": "rad/s",
@@ -86,7 +86,7 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
         return GivenRun(dataset, units, {})
     names = [str(name) for name in dataset.data_vars]
     # a scene of several elements is judged by variables
-    if not all(name in dataset for name in _STATE) or len(scene.elements) > 1 or times[0] > 0:
+    if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
         return GivenRun(dataset, units, dict.fromkeys(names))
     state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
     besides = dict.fromkeys([name for name in names if name not in state], FROM_STATE)

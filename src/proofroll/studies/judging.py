@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.errors import InputError, require_known
+from proofroll.core.number_text import number
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
@@ -52,10 +53,11 @@ class Compared:
         found = self.judgement
         unit = "" if found.unit == "1" else f" {found.unit}"
         when = "" if self.at is None else f" at {self.at:.4g} s"
-        said = f"{found.observable} is off by {found.error:.3g}{unit}{when}, allowed {found.tolerance:.3g}{unit}"
+        error, allowed = number(found.error, 3), number(found.tolerance, 3)
+        said = f"{found.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
         if not np.isfinite(found.error):
             said = f"{found.observable} is not finite, or has not as many values as the truth"
-        bar = f"the truth is known to {found.truth_error_bar:.2g}{unit}"
+        bar = f"the truth is known to {number(found.truth_error_bar)}{unit}"
         if found.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
         return f"{said}; {bar}" + ("; the question is ill-posed here" if found.verdict is Verdict.ILL_POSED else "")

@@ -15,11 +15,11 @@ from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, above_round_of
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
 from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.several import REQUIRED
 
 if TYPE_CHECKING:
     import xarray as xr
 
-TWIST = ("p_WB", "v_WB", "w_WB")
 # In this order: a state that is wrong makes all that follows wrong, and not the other way round.
 _STATE = (("velocity", "the velocity", "m/s"), ("spin", "the angular velocity", "rad/s"))
 _RATES = (
@@ -47,11 +47,11 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     run, truth = evidence.run, evidence.truth
     if run is None or truth is None:
         return
-    told = [run[name].to_numpy() for name in TWIST]
+    told = [run[name].to_numpy() for name in REQUIRED]
     if all(np.any(said % 1) and np.array_equal(said, said.astype(np.float32)) for said in told):
-        true, says = truth[TWIST[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
+        true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
         before = apart(told[0], true) if told[0].shape == true.shape else np.inf
-        yield Cause("float32", says, TWIST[0], "m", before, 0.0, "compute and report in double precision")
+        yield Cause("float32", says, REQUIRED[0], "m", before, 0.0, "compute and report in double precision")
 
 
 def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[str, ...]) -> Hypothesis:
