@@ -73,7 +73,7 @@ def doubt(
     if len(time) < 2:
         return {}
     apart = float(np.max(np.diff(time)))
-    if interval is not None and apart > _FARTHEST * interval:
+    if interval is not None and apart > _FARTHEST * interval * (1 + 1e-9):  # times on a grid are rounded
         why = f"turns show in samples that are {interval:.2g} s apart or less, and these are {apart:.3g} s apart"
         return {UNCERTAIN: why, PERIOD: period}
     off = np.abs(np.diff(time) * (rate[1:] + rate[:-1]) / 2 - np.diff(angle)) / period

@@ -107,6 +107,14 @@ def test_turns_that_nobody_knows_are_no_difference() -> None:
     assert on_turns_of(mine, mine, "energy_error", (wound, wound)) is None
 
 
+def test_times_that_are_rounded_leave_nothing_open() -> None:
+    """Samples as far apart as turns may be counted are not too far where the last digit of a time is up."""
+    time = time_grid(UNTIL, 2 * EVERY)
+    assert np.diff(time).max() > 2 * EVERY
+    assert not doubt(time, 3 * time, np.full(len(time), 3.0), 2 * np.pi, EVERY)
+    assert doubt(time, 3 * time, np.full(len(time), 3.0), 2 * np.pi, 0.99 * EVERY)
+
+
 def test_a_rate_that_does_not_fit_is_told() -> None:
     """Near samples of an angle that jumps by a third of a turn against its rate leave its turns open."""
     time = np.linspace(0, 1, 11)
