@@ -1,8 +1,12 @@
+from dataclasses import replace
+
 import mechanism_examples as examples
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from proofroll.elements.mechanism import Tree
+from proofroll.elements.mechanism.placed import Placed
 
 STEP = 1e-6  # of central differences: their error, STEP² and round-off over STEP, stays below 1e-8
 
@@ -29,6 +33,23 @@ def test_velocities_are_the_rates_of_positions(tree):
         turning = (after.R_WB[i] - before.R_WB[i]) / (2 * STEP) @ motion.R_WB[i].T
         w = np.array([turning[2, 1], turning[0, 2], turning[1, 0]])
         assert np.abs(w - motion.w_WB[i]).max() < 1e-8
+
+
+def test_poses_tell_the_coordinates_of_every_kind_of_joint():
+    """Coordinates and velocities come back from the poses of the bodies, of which no quaternion's sign is known."""
+    tree = examples.every_kind()
+    of_free, of_revolute, *others = tree.joints
+    of_free = replace(of_free, position=(0.3, -0.2, 0.5), orientation=(0.4, 0.5, -0.6), child_position=(0.1, 0.2, 0.3))
+    of_revolute = replace(of_revolute, q0=(7.5,))  # more than a turn
+    mechanism = replace(tree, joints=(of_free, of_revolute, *others), loops=())
+    q, v = mechanism.start()
+    motion, count = Tree(mechanism).at(q, v), len(mechanism.bodies)
+    signs = np.where(np.arange(count) % 2, 1.0, -1.0)[:, None]
+    attitudes = signs * Rotation.from_matrix(motion.R_WB[:count]).as_quat(scalar_first=True)
+    vectors = (vector[None, :count] for vector in (motion.p_WB, motion.v_WB, motion.w_WB))
+    found = Placed(mechanism, np.zeros(1), *vectors, attitudes[None]).of_tree()
+    assert found[0][0] == pytest.approx(q, abs=1e-13)
+    assert found[1][0] == pytest.approx(v, abs=1e-13)
 
 
 def test_accelerations_are_the_rates_of_velocities(tree):
