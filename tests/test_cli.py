@@ -99,7 +99,7 @@ BAD = {
     "picture in a file": (with_option("--plot", "/dev/null/run.svg"), 2, ["--plot = '/dev/null/run.svg'", "cannot be"]),
     "picture of another kind": (with_option("--plot", "run.gif"), 2, ["--plot = 'run.gif'", ".svg"]),
     "a model of another scene": (
-        ["export", "pendulum", "x.xml", "--engine", "mujoco[formulation=free]"], 3, ["the scene holds mechanism"]
+        ["export", "pendulum", "x.xml", "--engine", "mujoco[formulation=free]"], 3, ["needs revolute joints"]
     ),
     "number of another kind": (["check", "arm.urdf", "--states", "1e9"], 2, ["--states = '1e9': give a whole number"]),
     "steps without number": (rk4("1e-300"), 2, ["dt = 1e-300", "steps from 0 s", "take a longer one"]),
