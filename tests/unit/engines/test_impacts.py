@@ -41,10 +41,10 @@ def test_height_after_each_impact(engine: str, off: float, true: xr.Dataset) -> 
     ("engine", "said"),
     [
         ("projection", "impacts on the wall"),
-        ("exudyn[formulation=generic]", "use contact"),
-        ("mujoco[formulation=chart]", "use free"),
+        ("exudyn[formulation=generic]", "choose formulation=contact"),
+        ("mujoco[formulation=chart]", "choose formulation=free"),
         ("mujoco[formulation=free,preset=tuned]", "integrator=Euler"),
-        ("pinocchio[formulation=free_flyer]", "use contact"),
+        ("pinocchio[formulation=free_flyer]", "choose formulation=contact"),
     ],
 )
 def test_who_cannot_let_a_ball_land_says_so(engine: str, said: str) -> None:

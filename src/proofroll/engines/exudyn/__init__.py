@@ -41,11 +41,11 @@ OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "contact": PenaltyContact,
 }
 OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {"redundant": Redundant, "tree": KinematicTree}
-_HELD = "its constraint holds the ball on the wall; use contact"
+_HELD = "its constraint holds the ball on the wall"
 _ROLLS_AT_REST: Mapping[str, str] = {
     BallCapability.IMPACTS: _HELD,
-    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip; use generic or contact",
-    BallCapability.MOVING_WALL: "its joint rolls on what is at rest; use generic",
+    BallCapability.BOUNDED_FRICTION: "its joint rolls without slip",
+    BallCapability.MOVING_WALL: "its joint rolls on what is at rest",
 }
 # Formulations whose joints are given by whole frames (exudyn.HT).
 _WITH_FRAMES = {"carrier", *OF_MECHANISMS}
@@ -71,7 +71,7 @@ class Exudyn:
         },
         "contact": {
             BallCapability.TANGENTIAL_RESTITUTION: "its friction stops the contact point, and has no restitution",
-            BallCapability.MOVING_WALL: "its hollow sphere has no velocity; use generic",
+            BallCapability.MOVING_WALL: "its hollow sphere has no velocity",
         },
         "carrier": _ROLLS_AT_REST,
         "rolling_disc": _ROLLS_AT_REST,

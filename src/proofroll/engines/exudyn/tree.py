@@ -25,7 +25,7 @@ _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
 PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES)
 LACKING: Mapping[str, str] = {
     **dict.fromkeys(ALL_JOINTS - _KNOWN, "a joint of Exudyn's kinematic tree has exactly one coordinate"),
-    **dict.fromkeys(ALL_LOOPS, "Exudyn's explicit integrators take no constraints; use redundant"),
+    **dict.fromkeys(ALL_LOOPS, "Exudyn's explicit integrators take no constraints"),
     MechanismCapability.JOINT_FRICTION: "this model has no friction in joints",
     MechanismCapability.ARMATURE: "Exudyn's kinematic tree has no inertia of drives",
 }

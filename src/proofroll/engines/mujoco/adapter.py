@@ -36,7 +36,7 @@ _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, 
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
-_STANDS = "its wall is a fixed body, which has no velocity in MuJoCo; use free with preset=tuned"
+_STANDS = "its wall is a fixed body, which has no velocity in MuJoCo (free gives it one with preset=tuned)"
 
 
 class Mujoco(SteppedModel):
@@ -57,11 +57,11 @@ class Mujoco(SteppedModel):
         "facets": {
             BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
             "cannot tell when it slips",
-            BallCapability.IMPACTS: "each edge between two boxes is an impact of its own; use free",
+            BallCapability.IMPACTS: "each edge between two boxes is an impact of its own",
             BallCapability.MOVING_WALL: _STANDS,
         },
         "chart": {
-            BallCapability.IMPACTS: "an impact is one step of damping, which RK4 spreads over stages; use free",
+            BallCapability.IMPACTS: "an impact is one step of damping, which RK4 spreads over stages",
             BallCapability.MOVING_WALL: _STANDS,
         },
         "joints": mechanism.LACKING,

@@ -39,8 +39,8 @@ class Pinocchio:
         "constraint_dynamics": constraint_dynamics.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
-        "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall; use contact"},
-        "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall; use contact"},
+        "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
+        "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
         "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
