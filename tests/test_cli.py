@@ -99,7 +99,7 @@ BAD = {
     "picture in a file": (with_option("--plot", "/dev/null/run.svg"), 2, ["--plot = '/dev/null/run.svg'", "cannot be"]),
     "picture of another kind": (with_option("--plot", "run.gif"), 2, ["--plot = 'run.gif'", ".svg"]),
     "a model of another scene": (
-        ["export", "pendulum", "x.xml", "--engine", "mujoco[formulation=free]"], 3, ["needs revolute joints"]
+        ["export", "pendulum", "x.xml", "--engine", "mujoco[formulation=free]"], 3, ["needs revolute joints; choose"]
     ),
     "number of another kind": (["check", "arm.urdf", "--states", "1e9"], 2, ["--states = '1e9': give a whole number"]),
     "steps without number": (rk4("1e-300"), 2, ["dt = 1e-300", "steps from 0 s", "take a longer one"]),
@@ -562,6 +562,21 @@ def test_help_and_version(proofroll: Proofroll) -> None:
     assert proofroll()[0] == 2
     code, out, err = proofroll("new")
     assert (code, err, out.startswith("Usage: ")) == (2, "", True)
+
+
+@pytest.mark.parametrize(
+    ("shell", "shown"),
+    [
+        ("PYTHONIOENCODING=ascii", "N?rsett"),
+        ("", ""),
+    ],
+)
+def test_a_poor_output(shell: str, shown: str) -> None:
+    """A terminal that has not our signs shows others, and a closed output shows nothing; neither ends the command."""
+    command = f"{shell} {sys.executable} -m proofroll cite {'' if shell else '>&-'}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert shown in done.stdout
 
 
 def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
 import signal
@@ -89,6 +90,13 @@ def _interrupt(number: int, _: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
+def _prepare_output() -> None:
+    """Standard output is there where a shell closed it (``>&-``), and one without our signs shows ? for them."""
+    sys.stdout = sys.stdout or open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 -- open to the end
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+
+
 # A call of ``app`` makes all of them again, which takes longer than many a command.
 @cache
 def _commands() -> Any:
@@ -103,6 +111,7 @@ def _commands() -> Any:
 
 def main() -> None:
     """Entry point: every problem is one line on standard error and an exit code."""
+    _prepare_output()
     signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # so does the end of the terminal, but for nohup
         signal.signal(signal.SIGHUP, _interrupt)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numbers import Real
+
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
@@ -24,6 +26,9 @@ def time_grid(until: float, every: float) -> FloatArray:
     Raises:
         InputError: ``until`` is negative, or ``every`` is not positive.
     """
+    for name, value in (("until", until), ("every", every)):
+        if not isinstance(value, Real):
+            raise InputError(name, value, "give a number in s")
     if not np.isfinite(until) or until < 0:
         raise InputError("until", until, "give a finite time in s that is not negative")
     if not np.isfinite(every) or every <= 0:

@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from proofroll.core.dataset import part
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError
@@ -87,8 +89,11 @@ def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Da
     if kind is None or not kind.replay_script:
         what = f"the element {element.name} of " if of else ""
         raise InputError("run", path, f"nothing that is installed draws {what}the scene {scene.title}")
-    if "p_WB" not in part(scene, element, run):
+    own = part(scene, element, run)
+    if "p_WB" not in own:
         raise InputError("run", path, f"it has no poses of bodies (p_WB){of}; {_WRITES}")
+    if not (np.diff(own["time"]) > 0).all() or not np.isfinite(own["p_WB"]).all():
+        raise InputError("run", path, f"its times have to rise, and its poses{of} to be numbers; {_WRITES}")
     return kind.replay()
 
 
@@ -103,11 +108,12 @@ def _said(run: xr.Dataset) -> str:
 def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     """The scene of a run, with all that can be asked of its truth."""
     try:
-        digest, parameters = str(run.attrs["scene_digest"]), dict(json.loads(run.attrs["parameters"]))
-    except (KeyError, ValueError):
+        digest, *_ = [str(run.attrs[key]) for key in ("scene_digest", "engine", "status")]
+        parameters, _ = [dict(json.loads(run.attrs[key])) for key in ("parameters", "settings")]
+    except (KeyError, ValueError, TypeError):
         name = ""
     if not name:
-        raise InputError("run", path, f"it does not say which scene it is of; {_WRITES}")
+        raise InputError("run", path, f"it does not say which scene it is of, in which engine; {_WRITES}")
     if not is_scene(name):
         raise InputError("scene", name, "the scene of this run is not there; say where it lies by --scene PATH")
     ran, here = str(run.attrs.get("scene")), read_scene_file(name).parameters

@@ -132,6 +132,9 @@ def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
     dataset = read(run)
     write(dataset.assign_attrs(scene_digest="another"), tmp_path / "old.nc")
     write(dataset.drop_vars("p_WB"), tmp_path / "still.nc")
+    write(dataset.assign_coords(time=dataset["time"][::-1]), tmp_path / "back.nc")
+    write(dataset.assign_attrs(settings="{"), tmp_path / "unset.nc")
+    write(dataset.assign(p_WB=dataset["p_WB"] * float("nan")), tmp_path / "nan.nc")
     del dataset.attrs["scene"]
     write(dataset, tmp_path / "none.nc")
     for arguments, word in (
@@ -140,6 +143,9 @@ def test_what_cannot_be_replayed(proofroll: Proofroll, tmp_path: Path) -> None:
         ([str(run), "--scene", "inclined_plane"], "the run is one of pendulum, and this scene has no angle, length"),
         ([str(tmp_path / "none.nc")], "does not say which scene"),
         ([str(tmp_path / "still.nc")], "no poses of bodies"),
+        ([str(tmp_path / "back.nc")], "its times have to rise"),
+        ([str(tmp_path / "nan.nc")], "its poses to be numbers"),
+        ([str(tmp_path / "unset.nc")], "does not say which scene"),
         (["."], "no run in netCDF"),
     ):
         code, out, err = proofroll("replay", *arguments)

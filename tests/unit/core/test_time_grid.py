@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -24,6 +26,13 @@ def test_time_grid(until: float, every: float, times: list[float]) -> None:
     grid = time_grid(until, every)
     assert grid == pytest.approx(times, abs=1e-15)
     assert grid[-1] == until
+
+
+@pytest.mark.parametrize("given", [("1", 0.1), (None, 0.1), (1.0, "x"), (1.0, [1])])
+def test_what_is_no_time(given: Any) -> None:
+    """A text or a list is told by its name, not by an error of numpy's."""
+    with pytest.raises(InputError, match="give a number in s"):
+        time_grid(*given)
 
 
 @pytest.mark.parametrize(("step", "every"), [(None, 0.01), (1e-3, 0.01), (1 / 240, 2 / 240), (0.03, 0.03)])
