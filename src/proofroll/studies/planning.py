@@ -9,10 +9,12 @@ from itertools import product
 import numpy as np
 
 from proofroll.core.comparison import Comparison, Edge, Row
+from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError, told_of
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.several import represents
+from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import described, resolve, resolve_with_truth
@@ -129,12 +131,14 @@ def row_facts(
 
 
 def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollError], workers: Workers) -> None:
-    """Every point is one of the scene, and of every row, where nothing else is expected, one of its formulation.
+    """Every point is one of the scene, and of a row that is expected to run one of its formulation and in its steps.
 
     Raises:
         InputError: the first that is not.
     """
     known = described([item.name for item in facts if isinstance(item, EngineFacts)], workers)
+    times = time_grid(comparison.until, comparison.every)
+    intervals = [times[:2].tolist(), times[-2:].tolist()]  # the last may be shorter
     for point in comparison.combinations():
         ends = product(*(value.edge_between if isinstance(value, Edge) else (value,) for value in point.values()))
         numbers, *others = [dict(zip(point, values, strict=True)) for values in ends]
@@ -143,13 +147,20 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
             if not isinstance(item, EngineFacts) or point not in comparison.combinations(row.only):
                 continue
             told = known[item.name]
-            if isinstance(told, ProofrollError):
+            if isinstance(told, ProofrollError) or _UNFIT & set(row.expected(numbers)):
                 continue
-            formulation = item.settings["formulation"]
-            if not _UNFIT & set(row.expected(numbers)) and not represents(scene, formulation, told.provides):
+            formulation, place = item.settings["formulation"], f"{comparison.name}.toml: rows.{index}.engine"
+            if not represents(scene, formulation, told.provides):
                 lacking = ", ".join(sorted(scene.requires - set(told.provides[formulation])))
                 advice = f"it does not have {lacking}{at_point(numbers)}; expect refused there, or leave it out"
-                raise InputError(f"{comparison.name}.toml: rows.{index}.engine", row.engine, advice)
+                raise InputError(place, row.engine, advice)
+            if (step := item.step) is None:
+                continue
+            try:
+                for start, end in intervals:
+                    whole_steps(start, end, step)
+            except InputError as error:
+                raise error.within(place, row.engine) from None
 
 
 def _rungs(

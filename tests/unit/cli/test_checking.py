@@ -81,6 +81,7 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
             "=dependent]",
             ["rows.0.engine", "not have rolling without slip at tilt=0.35"],
         ),
+        ("inclined_plane.toml", "=chart]", "=chart,dt=0.003]", ["rows.7.engine", "no whole number of steps"]),
         ("tradeoff.toml", 'quantity = "z"', 'quantity = "height"', ["quantity = 'height'"]),
         ("tradeoff.toml", "until = ", "until = nan #", ["tradeoff.toml: until = nan", "finite"]),
         ("tradeoff.toml", "until = ", "until = -1 #", ["tradeoff.toml: until = -1", "above 0"]),
