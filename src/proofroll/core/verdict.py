@@ -33,7 +33,7 @@ class Verdict(StrEnum):
     ILL_POSED = "ill-posed"  # here the answer hangs on less than the parameters are known to; nobody can be judged
     NOT_JUDGED = "not-judged"  # there is no truth, or its own error bar exceeds the tolerance; nobody can be judged
     ANOTHER_SCENE = "another-scene"  # what was run is of another kind than the scene; it is shown and not judged
-    REFUSED = "refused"  # the engine says that it cannot represent the scene: it was not run, and has not failed
+    REFUSED = "refused"  # the engine says that it cannot do this scene, or not with these settings: it has not failed
     DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitFinding
     FAILED = "failed"  # there is no result
 

@@ -34,7 +34,7 @@ MEANINGS = {
     "ill-posed": "here the answer hangs on less than the parameters are known to: nobody is judged by it",
     "another-scene": "the model is of another kind than the scene: it is shown, and not judged",
     "not-judged": "there is no truth here, or its own error bar exceeds the tolerance: nobody is judged by it",
-    "refused": "the engine says that it cannot represent the scene: it was not run, and has not failed",
+    "refused": "the engine says that it cannot represent the scene, or run it with these settings: it has not failed",
     "differs": "not within tolerance: another limit, no limit shown, or one step only; each says which",
     "failed": "there is no result; the row says why",
 }
