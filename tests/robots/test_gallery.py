@@ -79,9 +79,11 @@ def test_as_expected(proofroll: Proofroll, name: str) -> None:
 def test_what_was_read_before_changes_nothing() -> None:
     """A gallery reads all robots in one process of an engine: each is found alike, to the last digit, first or last."""
     entries = [entry for entry in read_gallery() if entry.name in {"half_cheetah", "swimmer"}]
+    assert len(entries) == 2
     files = {entry.name: locate(entry) for entry in entries}
-    if len(entries) < 2 or None in files.values():
-        pytest.skip("gymnasium is not installed: pip install 'proofroll[robots]'")
+    for entry in entries:
+        if files[entry.name] is None:
+            pytest.skip(f"{entry.package} is not installed: pip install 'proofroll[robots]'")
     found: list[dict[str, list[ImporterRow]]] = []
     for order in (entries, entries[::-1]):
         with lent_workers(None) as workers:

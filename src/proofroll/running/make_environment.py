@@ -63,7 +63,7 @@ def add(
     """
     tell = tell or (lambda _: None)
     if not re.fullmatch(r"[\w-]+", name):
-        plain = re.split(r"\W", name.strip(), maxsplit=1)[0] or "mujoco"
+        plain = re.split(r"\W", name.strip(), maxsplit=1)[0] or "NAME"
         advice = f"give the plain name of an engine: proofroll engines add {plain} --requirement {plain}==VERSION"
         raise InputError("engine", name, advice)
     if not requirements:
