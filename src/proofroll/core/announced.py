@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import sys
-from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
 
 def announced(group: str) -> tuple[EntryPoint, ...]:
     """The entry points of a group, by name; nothing is loaded."""
-    return tuple(sorted(_everything(tuple(sys.path)).select(group=group), key=lambda point: point.name))
+    return tuple(sorted(_everything().select(group=group), key=lambda point: point.name))
 
 
-@cache
-def _everything(_path: tuple[str, ...]) -> Any:  # until Python 3.11 SelectableGroups, since then EntryPoints
-    """Looked up once for each ``sys.path``: a file of every installed package is read for it."""
-    return entry_points()
+# Entry points by the ``sys.path`` that they were looked up for: a file of every installed package is read for them.
+_known: dict[tuple[str, ...], Any] = {}
+
+
+def _everything() -> Any:  # until Python 3.11 SelectableGroups, since then EntryPoints
+    path = tuple(sys.path)
+    if path not in _known:
+        found = entry_points()
+        if tuple(sys.path) != path:  # another thread changed it meanwhile: what was found is of neither
+            return found
+        _known[path] = found
+    return _known[path]

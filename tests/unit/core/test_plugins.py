@@ -4,6 +4,7 @@ import dataclasses
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -176,3 +177,21 @@ def test_a_misspelt_name_is_not_a_library_that_is_missing(
     assert type(caught.value) is kind
     for text in words:
         assert text in str(caught.value)
+
+
+def test_what_is_found_while_the_path_changes_is_not_kept(
+    site_of: Callable[[Mapping[str, str]], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Engines that another thread takes off the path while all are looked up are there again with the path."""
+    site = str(site_of({"late": "tiny:Tiny"}))
+    monkeypatch.syspath_prepend(site)
+
+    def torn() -> Any:
+        sys.path.remove(site)
+        return entry_points()
+
+    with monkeypatch.context() as other:
+        other.setattr("proofroll.core.announced.entry_points", torn)
+        assert "late" not in engine_names()
+    sys.path.insert(0, site)
+    assert "late" in engine_names()
