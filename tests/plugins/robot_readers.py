@@ -7,6 +7,8 @@ import time
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
+import numpy as np
+
 
 class Raising:
     """Refuses with an error of its own."""
@@ -39,6 +41,33 @@ class Hanging(Raising):
     def read(self, _: Any) -> Any:
         """Sleeps."""
         time.sleep(1000)
+
+
+class Odd(Raising):
+    """Answers with two joints of one name."""
+
+    def read(self, request: Any) -> Any:
+        """A reading whose second joint is called as the first."""
+        from proofroll.robots.protocol import Reading
+
+        count = request.states.count
+        zero = np.zeros((count, 2))
+        return Reading(("j1", "j1"), (1, 1), {}, {}, {}, {}, {}, np.zeros((count, 2, 2)), zero, zero)
+
+
+class Misshapen(Raising):
+    """Answers with arrays of another number of states."""
+
+    def read(self, request: Any) -> Any:
+        """A reading with poses of twice as many states as were asked."""
+        from proofroll.robots.protocol import Reading
+
+        count = request.states.count
+        zero = np.zeros((count, 1))
+        place = {"j1": np.zeros((2 * count, 3))}
+        one = {"j1": 1.0}, {"j1": np.zeros(3)}, {"j1": np.eye(3)}
+        turned = {"j1": np.zeros((2 * count, 3, 3))}
+        return Reading(("j1",), (1,), *one, place, turned, np.zeros((count, 1, 1)), zero, zero)
 
 
 class Broken(Raising):

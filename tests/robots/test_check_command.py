@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from robot_templates import inertial, mjcf, urdf
 
 from proofroll.report.terminal import console
+from proofroll.robots import check
 from proofroll.robots.layers import LAYERS
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.terminal import SHORT, WIDTH, lines, table
@@ -102,6 +104,8 @@ BAD_READERS = {
     "Crashing": ("crashed", "SIGABRT"),
     "Raising": ("refused", "RuntimeError: cannot <b>read</b> [bold]this[/bold]"),
     "Broken": ("crashed", "the reader of broken failed"),
+    "Odd": ("crashed", "two joints are called 'j1'"),
+    "Misshapen": ("crashed", "position j1 has shape (4, 3), not (2, 3)"),
 }
 
 
@@ -183,3 +187,19 @@ def test_who_compiles_a_file_also_reads_it(proofroll: Proofroll, tmp_path: Path,
     path.write_text(mjcf())
     assert proofroll("check", str(path), "--engine", "mujoco", "--states", "2")[0] == 0
     assert len(started_workers) == 1
+
+
+def test_an_answer_that_cannot_be_judged(monkeypatch: pytest.MonkeyPatch, arm: Path) -> None:
+    """A mistake while one engine's answer is judged is that engine's row; the other rows arrive."""
+    honest = check.judged
+
+    def judged(*given: Any) -> ImporterRow:
+        if given[3].name == "exudyn":
+            raise ZeroDivisionError("planted")
+        return honest(*given)
+
+    monkeypatch.setattr(check, "judged", judged)
+    odd, other = check.check(arm, ["exudyn", "pinocchio"], states=2).engines
+    assert odd.status == "crashed"
+    assert "ZeroDivisionError: planted" in str(odd.message)
+    assert other.status == "holds"

@@ -44,6 +44,7 @@ OTHER = '<body name="other" pos="1 0 0"><joint name="far" type="slide" axis="0 0
 LOOSE = '<body name="loose"><freejoint/><geom size="0.1 0.2 0.3" type="box"/></body>'
 FLYING = """<mujoco model="f"><worldbody><body name="b" pos="0.2 0.3 1" euler="90 20 0"><freejoint name="f"/>
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/></body></worldbody></mujoco>"""
+FLOOR = '<worldbody><geom type="plane" size="0 0 0.05"/></worldbody><actuator>'
 HIDDEN = 'contype="0" conaffinity="0"'
 
 # What a file holds, the engine that reads it, and the causes that must be named.
@@ -77,6 +78,21 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("total mass", mjcf(compiler='settotalmass="7"'), "pinocchio", {"total_mass_ignored"}),
     ("gravity", mjcf(option='gravity="0 1 -3"'), "pinocchio", {"default_gravity"}),
     ("two trees", mjcf(extra=OTHER), "pinocchio", {"first_tree_only"}),
+    ("two worlds", mjcf().replace("<actuator>", FLOOR), "pinocchio", {"tree_read_again"}),
+    (
+        "two worlds",
+        mjcf(second=TWO).replace("<actuator>", FLOOR.replace("<actuator>", FLOOR)),
+        "pinocchio",
+        {"tree_read_again"},
+    ),
+    (
+        "two worlds",
+        FLYING.replace("</mujoco>", f"{FLOOR}</actuator></mujoco>").replace("90 20 0", "0 0 0"),
+        "pinocchio",
+        {"tree_read_again"},
+    ),
+    ("two worlds", mjcf().replace("<actuator>", FLOOR), "mujoco", set()),
+    ("two worlds", mjcf().replace("<actuator>", FLOOR), "exudyn", set()),
     ("hidden shape", mjcf(shape=HIDDEN), "pinocchio", {"noncolliding_shapes_weightless"}),
     ("two joints", mjcf(second=TWO), "pinocchio", set()),
     ("two joints", mjcf(second=TWO), "mujoco", set()),

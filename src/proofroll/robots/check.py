@@ -87,7 +87,11 @@ def check(
                 return ImporterRow(engine=str(spec), status="missing", message=str(error))
             except WorkerDied as error:
                 return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
-            found = judged(file, truth, bar, spec, answer, lent)
+            try:
+                found = judged(file, truth, bar, spec, answer, lent)
+            except Exception as error:  # one engine's odd answer must not end the rows of the others
+                said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
+                return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
             # It defines the format, and its meaning here is that of another version of it.
             if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
                 found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))

@@ -46,7 +46,11 @@ class RobotTruth:
 
     @classmethod
     def of(cls, robot: Robot, states: RobotStates, like: RobotTruth | None = None) -> RobotTruth:
-        """Evaluated by the first formulation; differences are relative to the sizes of ``like``, or its own."""
+        """Evaluated by the first formulation; differences are relative to the sizes of ``like``, or its own.
+
+        Joints that the states do not have are at rest.
+        """
+        states = states.completed(robot)
         return cls(robot, states, world_jacobians(robot, states), passive(robot, states), like)
 
     @cached_property
@@ -91,10 +95,15 @@ class RobotTruth:
     def torques(self) -> dict[str, Array]:
         """Those that engines are asked the forward dynamics for: what gives the accelerations of the states, by joint.
 
-        Of a robot as an engine would hold it they are those of ``like``, which engines were asked for.
+        Of a robot as an engine would hold it they are those of ``like``, which engines were asked for; of a joint that
+        the file does not have none.
         """
         if self.like is not None:
-            return self.like.torques
+            count = self.states.count
+            return {
+                joint.name: self.like.torques.get(joint.name, np.zeros((count, joint.dofs)))
+                for joint in self.robot.moving
+            }
         found = self.inverse + self.passive
         return {name: found[:, columns] for name, columns in self.robot.columns.items()}
 

@@ -120,10 +120,13 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
     try:
         reading = reader.read(request)
+        _require_whole(reading, request.states.count)
     except Refused as error:
         return told | {"refused": str(error)}
     except _OF_A_READER as error:
         return {"error": "crashed", "message": f"the reader of {engine} failed: {one_line(error)}"}
+    except _Flawed as error:
+        return {"error": "crashed", "message": f"the answer of {engine} has no meaning: {error}"}
     except Exception as error:  # whatever an importer raises is its refusal
         return told | {"refused": one_line(error)}
     parts: dict[str, Any] = {name: np.array(list(getattr(reading, name).values()), dtype=float) for name in _BY_JOINT}
@@ -131,6 +134,24 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     np.savez(arrays, **parts)
     names = {name: list(getattr(reading, name)) for name in (*_BY_JOINT, "joints", "dofs", "coupled", "remarks")}
     return told | {"refused": ""} | names
+
+
+class _Flawed(Exception):  # noqa: N818 -- becomes the row of the engine
+    pass
+
+
+def _require_whole(reading: Reading, states: int) -> None:
+    """Raises unless names are unique and every array has the shape that :class:`Reading` says."""
+    if repeated := [name for name in reading.joints if reading.joints.count(name) > 1]:
+        raise _Flawed(f"two joints are called {repeated[0]!r}")
+    n = sum(reading.dofs)
+    shapes: dict[str, tuple[int, ...]] = {"com": (3,), "inertia": (3, 3), "position": (states, 3)}
+    shapes |= {"mass": (), "rotation": (states, 3, 3), "M": (states, n, n)}
+    for name in (*_BY_JOINT, *_ARRAYS):
+        value, shape = getattr(reading, name), shapes.get(name, (states, n))
+        for joint, array in value.items() if isinstance(value, dict) else [("", value)]:
+            if array is not None and np.shape(array) != shape:
+                raise _Flawed(f"{name} {joint}".strip() + f" has shape {np.shape(array)}, not {shape}")
 
 
 def compile_robot(path: str) -> dict[str, Any]:

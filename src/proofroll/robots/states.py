@@ -45,6 +45,22 @@ class RobotStates:
         """Velocities or accelerations in the order of a robot's joints, shape (states, velocities)."""
         return np.concatenate([rates[joint.name] for joint in robot.moving], axis=1)
 
+    def completed(self, robot: Robot) -> RobotStates:
+        """States in which the joints of a robot that these do not have are at rest at coordinates 0."""
+        added = [joint for joint in robot.moving if joint.name not in self.velocity]
+        if not added:
+            return self
+        count = self.count
+        turning = [joint for joint in added if joint.dofs > 1]
+        still = {joint.name: np.zeros((count, joint.dofs)) for joint in added}
+        return RobotStates(
+            self.angle | {joint.name: np.zeros(count) for joint in added if joint.dofs == 1},
+            self.rotation | {joint.name: np.tile(np.eye(3), (count, 1, 1)) for joint in turning},
+            self.position | {joint.name: np.zeros((count, 3)) for joint in turning if joint.kind == "free"},
+            self.velocity | still,
+            self.acceleration | still,
+        )
+
 
 def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
     """States within the limits of the joints (or ±π, ±1 m), of moderate velocities, which obey the mimics."""

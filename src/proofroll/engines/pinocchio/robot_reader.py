@@ -37,6 +37,7 @@ class PinocchioRobots:
         joints = tuple(name for name, _, _ in columns)
         dofs = tuple(dof for _, _, dof in columns)
         last = {index: name for name, index, _ in columns}  # of several joints in one body the last carries it
+        last = {index: name for index, name in last.items() if index not in _twins(model)}
         frames: dict[str, list[Any]] = {name: [] for name in last.values()}
 
         def at(k: int) -> AtState:
@@ -90,8 +91,13 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
     Several joints in one body of an MJCF are one composite joint of the model.
     """
     found: list[tuple[str, int, int]] = []
+    twins = _twins(model)
     for index in range(1, model.njoints):
         joint, name = model.joints[index], str(model.names[index])
+        if index in twins:
+            first, number = twins[index]
+            found += [(f"{part} ({number})", index, dof) for part, other, dof in list(found) if other == first]
+            continue
         if request.kind == "urdf" and name == "root_joint":
             name = request.base_joint
         if joint.shortname() == "JointModelComposite":
@@ -99,6 +105,17 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
             found += [(part, index, nv) for part, nv in zip(_composite(request, model, index), parts, strict=True)]
         elif joint.nv:
             found.append((name, index, int(joint.nv)))
+    return found
+
+
+def _twins(model: Any) -> dict[int, tuple[int, int]]:
+    """Joints whose name an earlier joint has: index -> index of the first, and which of them it is, from 2."""
+    first: dict[str, int] = {}
+    found: dict[int, tuple[int, int]] = {}
+    for index, name in enumerate(map(str, model.names)):
+        if name in first:
+            found[index] = (first[name], 2 + sum(other == first[name] for other, _ in found.values()))
+        first.setdefault(name, index)
     return found
 
 

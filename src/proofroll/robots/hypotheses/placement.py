@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from proofroll.robots.hypotheses import RobotEvidence, hypothesis
-from proofroll.robots.model import WORLD, Robot, RobotJoint
+from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
 
 
 @hypothesis({"drake": "1.51.1"}, "give each further joint a body of its own without mass")
@@ -62,6 +62,25 @@ def first_tree_only(evidence: RobotEvidence) -> Robot | None:
     mimics = tuple(mimic for mimic in robot.mimics if {mimic.joint, mimic.other} <= moving)
     bodies = {name: body for name, body in robot.bodies.items() if name in kept}
     return robot.change(joints=tuple(joints), bodies=bodies, mimics=mimics)
+
+
+@hypothesis({"pinocchio": "4.1.0"}, "write one <worldbody>; of a scene.xml read the robot's own file")
+def tree_read_again(evidence: RobotEvidence) -> Robot | None:
+    """The first tree is read once for every <worldbody>: its masses are added again, with joints that carry nothing."""
+    robot, file = evidence.robot, evidence.file
+    times = sum(1 for _ in file.root.iter("worldbody"))
+    if file.kind != "mjcf" or times < 2:
+        return None
+    heavier = (
+        dataclasses.replace(body, mass=times * body.mass, inertia=times * body.inertia)
+        for body in robot.bodies.values()
+    )
+    bodies, joints = {body.name: body for body in heavier}, list(robot.joints)
+    for name, joint in ((joint.name, joint) for joint in robot.moving):
+        for again in (f"{name} ({number})" for number in range(2, times + 1)):
+            bodies[again] = RobotBody(again, 0.0, np.zeros(3), np.zeros((3, 3)))
+            joints.append(dataclasses.replace(joint, name=again, parent=WORLD, child=again))
+    return robot.change(bodies=bodies, joints=tuple(joints))
 
 
 @hypothesis({"pybullet": "3.2.7"}, "give the root link a mass")
