@@ -110,7 +110,9 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:
     """Joint whose angles may be off by whole turns -> what is to be said, see :func:`proofroll.core.turns.doubt`."""
-    found = {}
+    found: dict[str, dict[str, Any]] = {}
+    if placed.known_q is not None:
+        return found
     for joint in placed.mechanism.joints:
         if joint.kind in TURNING:
             for angle, rate in zip(*(values.T for values in placed.along(joint)), strict=True):

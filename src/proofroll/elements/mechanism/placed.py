@@ -25,6 +25,8 @@ class Placed:
         time: [s], shape (time,).
         p_WB, v_WB, w_WB: of each body's frame in the world [m, m/s, rad/s], shape (time, bodies, 3).
         q_WB: unit quaternions, scalar first, shape (time, bodies, 4).
+        known_q: coordinates of the tree where they were integrated, shape (time, nq); they tell how often an angle
+            turned. None: the rates at the samples tell it.
     """
 
     mechanism: Mechanism
@@ -33,6 +35,7 @@ class Placed:
     v_WB: FloatArray
     w_WB: FloatArray
     q_WB: FloatArray
+    known_q: FloatArray | None = None
 
     @cached_property
     def R_WB(self) -> FloatArray:
@@ -92,7 +95,7 @@ class Placed:
                 continue
             if turns:
                 sine, cosine = (turned[:, 2, 1], turned[:, 2, 2]) if of_child else (turned[:, 1, 0], turned[:, 0, 0])
-                q.append(on_turns(self.time, np.arctan2(sine, cosine), v[-1], joint.q0[len(q)], TURN))
+                q.append(self._on_turns(joint, len(q), np.arctan2(sine, cosine), v[-1]))
             else:
                 q.append(np.sum(self._apart(joint)[0] * axis, -1))
         if joint.kind in WITH_QUATERNION:
@@ -102,6 +105,13 @@ class Placed:
             q += [*Rotation.from_matrix(turned).as_quat(canonical=True, scalar_first=True).T]
         count = len(self.time)
         return np.reshape(q, (joint.nq, count)).T, np.reshape(v, (joint.nv, count)).T
+
+    def _on_turns(self, joint: Joint, number: int, angle: FloatArray, rate: FloatArray) -> FloatArray:
+        """An angle of a joint, counted in turns."""
+        if self.known_q is None:
+            return on_turns(self.time, angle, rate, joint.q0[number], TURN)
+        known = self.known_q[:, self.mechanism.q_slices[self.mechanism.joints.index(joint)].start + number]
+        return np.asarray(angle + TURN * np.round((known - angle) / TURN))
 
     def _apart(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
         """From the joint's point on the parent to that on the child [m], and its rate as the parent sees it [m/s]."""

@@ -46,7 +46,8 @@ class Record:
 
     def placed(self, mechanism: Mechanism) -> Placed:
         """Where everything of the mechanism is."""
-        return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB)
+        known_q = self.q if self.q.shape[1] else None  # a route that follows poses alone has none at first
+        return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB, known_q)
 
 
 def gathered(time: Array, samples: list[dict[str, Any]]) -> Record:

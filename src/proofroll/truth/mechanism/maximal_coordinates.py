@@ -166,6 +166,10 @@ class MaximalCoordinates:
         states = integrated(lean.rate, lean.equations.start(), times, tolerance, lean.eliminated)
         return self.recorded(times, np.array(list(states)))
 
+    def at_start(self) -> Record:
+        """Where this route places everything at time 0."""
+        return self.recorded(np.zeros(1), self.lean.equations.start()[None])
+
     def recorded(self, times: Array, states: Array) -> Record:
         """What the states mean; reactions come from the complete rows of all bodies."""
         found = gathered(times, [self._sample(self.lean.normalised(state)) for state in states])

@@ -7,10 +7,12 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.plug_in import MechanismTruth
 from proofroll.truth.mechanism.two_routes import CHAOS, find_truth
 
 MODELS = Path(__file__).parents[4] / "models"
@@ -218,6 +220,58 @@ def test_plane_bodies_without_inertia_are_moved_by_what_they_carry(monkeypatch):
     mechanism = Mechanism(bodies, joints, gravity=(0.0, -9.81, 0.0))
     assert [type(body) for body in made_bodies(mechanism, allow_planar=True)] == [Planar] * 5
     agreed(mechanism)
+
+
+SOLID = {"mass": 1.0, "com": (0.1, 0.2, 0.3), "inertia": INERTIA}
+TURNED = [
+    ((0.4, -0.3, 0.2), (0.0, 0.8, 0.6)),
+    ((0.0, 0.0, 0.2), (0.0, 0.8, 0.6)),
+]
+
+
+@pytest.mark.parametrize(("orientation", "axis"), TURNED)
+def test_a_hinge_whose_child_is_turned_has_a_truth(orientation, axis, monkeypatch):
+    """A damped rod that is turned against the world at q = 0 moves in a plane: both routes agree on its motion."""
+    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    hinge = Joint("hinge", "revolute", "world", "rod", (0.1, 0.2, 0.3), orientation, axis, q0=(0.7,), v0=(1.0,))
+    mechanism = Mechanism((Body("rod", **SOLID),), (replace(hinge, child_position=(0.05, 0.1, 0.0), damping=0.1),))
+    assert [type(body) for body in made_bodies(mechanism, allow_planar=True)] == [Planar]
+    agreed(mechanism)
+
+
+def test_routes_that_start_apart_are_an_error_of_ours(scene, monkeypatch):
+    """A route that places a body wrongly at t = 0 is said to be wrong, and no singular pose is named."""
+    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    start = MaximalCoordinates.at_start
+
+    def shifted(route):
+        return replace(start(route), p_WB=start(route).p_WB + np.array([0.01, 0.0, 0.0]))
+
+    monkeypatch.setattr(MaximalCoordinates, "at_start", shifted)
+    with pytest.raises(Refused, match=r"0.01 m .* apart at t = 0 s.*an error of proofroll's truth.*report") as refused:
+        find_truth(scene("slider_crank"), np.array([0.0, 0.1]))
+    assert "singular" not in str(refused.value)
+
+
+def test_energy_of_a_wound_spring_needs_no_more_samples_than_asked_for(monkeypatch):
+    """A spring on the fast axis of a universal joint holds its energy at four samples over ten turns."""
+    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    laws = {"stiffness": 3.0, "rest": 0.1}
+    body = Body("rotor", 1.0, (0.1, 0.2, -0.3), (0.1, 0.2, 0.25))
+    joint = Joint("u", "universal", "world", "rotor", axis=(0, 0, 1), q0=(0.3, 0.2), v0=(60.0, -2.0), **laws)
+    element = MechanismElement(Mechanism((body,), (joint,)))
+    energy = MechanismTruth.truth(element, np.linspace(0, 1, 4), ())["energy"]
+    assert np.ptp(energy.to_numpy()) < energy.attrs["error_bar"] < 1e-9
+
+
+def test_the_bar_of_drift_covers_its_round_off(scene):
+    """Joints are never open in truth; what is seen of that, and round-off of places and cosines, is the bar."""
+    mechanism = scene("oscillators")
+    found = find_truth(mechanism, np.array([0.0, 0.5, 1.0]))
+    placed = found.record.placed(mechanism)
+    turned = replace(placed, q_WB=placed.q_WB * (1 + 4 * np.finfo(float).eps), p_WB=placed.p_WB + np.spacing(1.0))
+    assert (np.abs(turned.drift() - placed.drift()) < found.bars["drift"]).all()
+    assert found.bars["drift"][-1] < 1e-13
 
 
 def test_routes_of_a_spinning_body_agree(scene):
