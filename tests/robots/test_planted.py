@@ -46,6 +46,26 @@ FLYING = """<mujoco model="f"><worldbody><body name="b" pos="0.2 0.3 1" euler="9
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/></body></worldbody></mujoco>"""
 FLOOR = '<worldbody><geom type="plane" size="0 0 0.05"/></worldbody><actuator>'
 HIDDEN = 'contype="0" conaffinity="0"'
+_OWN = '<inertial pos="0.1 0.02 0" mass="1.5" {}/>'
+_SLIM = 'diaginertia="0.01 0.02 0.021"'
+
+
+def held_by(body: str, *, root: str = "", outside: str = "", inertial: str = _OWN.format(_SLIM)) -> str:
+    """An MJCF with one hinge, whose body also has what is given; attributes of the body around it, other sections."""
+    return f"""<mujoco model="m">{outside}<worldbody><body name="base" {root}><body name="a" pos="0 0 1">
+    <joint name="h" axis="0 1 0" class="k"/>{body}{inertial}</body></body></worldbody></mujoco>"""
+
+
+CLASS_K = '<default><default class="k"><joint {}/><geom {}/></default></default>'
+PLAIN_CLASS = CLASS_K.format("", "")
+CORNER = '<asset><mesh name="t" vertex="0 0 0 .1 0 0 0 .1 0 0 0 .1"/></asset>'
+MESHED = '<geom type="mesh" mesh="t" mass="0.1" pos="0.1 0.2 0.3" euler="10 20 30"/>'
+RODS = '<geom class="k" type="capsule" size="0.05 0.2"/><geom type="box" size="0.1 0.2 0.3" pos="0 0.1 0" mass="2"/>'
+GROUPS = '<geom type="box" size=".1 .2 .3"/><geom type="box" size=".1 .2 .1" pos=".3 0 0" group="3"/>'
+HAND = f'<body name="b" pos="0.3 0 0" euler="20 30 40"><joint name="k2" axis="0 0.6 0.8"/>{_OWN.format(_SLIM)}</body>'
+ARMED = """<mujoco model="m"><worldbody><body name="a" pos="0 0 1"><joint name="f" type="free" armature="0.1"/>
+<geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/><body name="b" pos="0.4 0 0">
+<joint name="k" axis="0 1 0"/><geom type="box" size="0.1 0.2 0.1"/></body></body></worldbody></mujoco>"""
 
 # What a file holds, the engine that reads it, and the causes that must be named.
 REAL: list[tuple[str, str, str, set[str]]] = [
@@ -94,6 +114,75 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "mujoco", set()),
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "exudyn", set()),
     ("hidden shape", mjcf(shape=HIDDEN), "pinocchio", {"noncolliding_shapes_weightless"}),
+    (
+        "posed base",
+        held_by("", outside=PLAIN_CLASS, root='pos="0 0 .3" quat="1 0 1 0"'),
+        "pinocchio",
+        {"root_pose_dropped"},
+    ),
+    (
+        "mass of a class",
+        held_by(RODS, outside=CLASS_K.format("", 'mass="1"'), inertial=""),
+        "pinocchio",
+        {"class_mass_ignored"},
+    ),
+    ("density of a class", held_by(RODS, outside=CLASS_K.format("", 'density="500"'), inertial=""), "pinocchio", set()),
+    ("pose of a class", held_by("", outside=CLASS_K.format('pos="0 0 .1"', "")), "pinocchio", {"class_pose_ignored"}),
+    (
+        "shape's pose of a class",
+        held_by(RODS, outside=CLASS_K.format("", 'pos="0 0 .1"'), inertial=""),
+        "pinocchio",
+        {"class_pose_ignored"},
+    ),
+    ("mesh", held_by(MESHED, outside=PLAIN_CLASS + CORNER, inertial=""), "pinocchio", {"meshes_weigh_one_kilogram"}),
+    (
+        "mesh of a class",
+        held_by('<geom class="k" mesh="t"/>', outside=CLASS_K.format("", 'type="mesh" mass="2"') + CORNER, inertial=""),
+        "pinocchio",
+        {"meshes_weigh_one_kilogram"},
+    ),
+    ("mesh", held_by(MESHED, outside=PLAIN_CLASS + CORNER), "pinocchio", set()),
+    (
+        "capitals",
+        held_by(HAND, outside='<compiler eulerseq="XYZ"/>' + PLAIN_CLASS),
+        "pinocchio",
+        {"euler_sequence_in_small_letters"},
+    ),
+    ("small letters", held_by(HAND, outside='<compiler eulerseq="zyx"/>' + PLAIN_CLASS), "pinocchio", set()),
+    (
+        "groups",
+        held_by(GROUPS, outside='<compiler inertiagrouprange="0 2"/>' + PLAIN_CLASS, inertial=""),
+        "pinocchio",
+        {"inertia_groups_ignored"},
+    ),
+    (
+        "balanced",
+        held_by(
+            "",
+            outside='<compiler balanceinertia="true"/>' + PLAIN_CLASS,
+            inertial=_OWN.format('euler="10 20 30" diaginertia="0.01 0.02 0.041"'),
+        ),
+        "pinocchio",
+        {"balance_ignored"},
+    ),
+    (
+        "long axis",
+        held_by("", outside=PLAIN_CLASS, inertial=_OWN.format('axisangle="1 1 0 40" ' + _SLIM)),
+        "pinocchio",
+        {"axisangle_not_normalised"},
+    ),
+    ("armature of a free joint", ARMED, "pinocchio", {"armature_of_free_joints_turns"}),
+    ("armature of a free joint", ARMED, "mujoco", set()),
+    (
+        "base, class and letters",
+        held_by(
+            HAND,
+            outside='<compiler eulerseq="XYZ"/>' + CLASS_K.format('pos="0 0 .1"', ""),
+            root='pos="0 0 .3" euler="10 20 30"',
+        ),
+        "pinocchio",
+        {"root_pose_dropped", "class_pose_ignored", "euler_sequence_in_small_letters"},
+    ),
     ("two joints", mjcf(second=TWO), "pinocchio", set()),
     ("two joints", mjcf(second=TWO), "mujoco", set()),
     ("free body", mjcf(extra=LOOSE), "mujoco", set()),

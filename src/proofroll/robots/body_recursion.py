@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.robots.model import WORLD, Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.states import RobotStates
-from proofroll.robots.two_formulations import Dynamics, armature, skew, within
+from proofroll.robots.two_formulations import Dynamics, armature, skew, turned_armature, within
 
 
 def body_recursion(robot: Robot, states: RobotStates) -> Dynamics:
@@ -21,7 +21,7 @@ def body_recursion(robot: Robot, states: RobotStates) -> Dynamics:
     M = newton_euler(robot, states, np.zeros((count, n, n)), units, np.zeros(3))
     g = newton_euler(robot, states, still, still, robot.gravity)[:, 0]
     h = newton_euler(robot, states, v, still, robot.gravity)[:, 0]
-    return Dynamics(M + np.diag(armature(robot)), g, h)
+    return Dynamics(M + np.diag(armature(robot)), g, h + turned_armature(robot, v[:, 0]))
 
 
 def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity: Array) -> Array:

@@ -77,6 +77,7 @@ class RobotJoint:
         rest: coordinate at which the spring is at rest [rad or m].
         lower, upper: limits of the coordinate; None: there is none.
         actuated: whether an actuator acts on the joint.
+        turning: whether the armature of a free joint acts along the body's axes, not the world's.
     """
 
     name: str
@@ -95,6 +96,7 @@ class RobotJoint:
     lower: float | None = None
     upper: float | None = None
     actuated: bool = False
+    turning: bool = False
 
     @property
     def dofs(self) -> int:

@@ -113,12 +113,23 @@ def world_jacobians(robot: Robot, states: RobotStates) -> Dynamics:
         M += body.mass * Jc.transpose(0, 2, 1) @ Jc + motion.Jw.transpose(0, 2, 1) @ inertia @ motion.Jw
         g -= body.mass * np.einsum("sij,i->sj", Jc, robot.gravity)
         c += body.mass * np.einsum("sij,si->sj", Jc, ac) + np.einsum("sij,si->sj", motion.Jw, torque)
-    return Dynamics(M + np.diag(armature(robot)), g, g + c)
+    return Dynamics(M + np.diag(armature(robot)), g, g + c + turned_armature(robot, v))
 
 
 def armature(robot: Robot) -> Array:
     """Of every velocity, shape (n,)."""
     return np.concatenate([np.zeros(0), *(np.full(joint.dofs, joint.armature) for joint in robot.moving)])
+
+
+def turned_armature(robot: Robot, v: Array) -> Array:
+    """Force of armature along axes that turn with a free body: −armature ω × v, shape (states, n)."""
+    found = np.zeros_like(v)
+    for joint in robot.moving:
+        if joint.turning:
+            rate = v[:, robot.columns[joint.name]]
+            columns = slice(robot.columns[joint.name].start, robot.columns[joint.name].start + 3)
+            found[:, columns] = -joint.armature * np.cross(rate[:, 3:], rate[:, :3])
+    return found
 
 
 def _carried(

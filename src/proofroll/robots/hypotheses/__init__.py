@@ -6,17 +6,23 @@ the engine's difference from that has to vanish.
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import importlib
 import inspect
 import pkgutil
 from collections.abc import Callable, Mapping
+from typing import TypeVar
 from xml.etree.ElementTree import Element
 
-from proofroll.robots.model import Robot
+import numpy as np
+
+from proofroll.robots.model import Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
+
+_Part = TypeVar("_Part", RobotBody, RobotJoint)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,6 +40,36 @@ class RobotEvidence:
     robot: Robot
     reading: Reading
     recompiled: Callable[[Element], Robot | None] = lambda _: None
+
+    def edited(self, edit: Callable[[Element], bool]) -> Robot | None:
+        """The robot with all that an edit of the file changes in bodies and joints; None: nothing, or no meaning.
+
+        What the edit leaves as it is keeps the causes found so far. It says whether it changed the file.
+        """
+        root = copy.deepcopy(self.file.root)
+        if not edit(root):
+            return None
+        before, after = self.recompiled(self.file.root), self.recompiled(root)
+        return None if before is None or after is None else self.carried_over(before, after)
+
+    def carried_over(self, before: Robot, after: Robot) -> Robot | None:
+        """The robot with all that differs between two others; None: nothing does."""
+        robot = self.robot
+        bodies = [_moved(body, before.bodies.get(name), after.bodies.get(name)) for name, body in robot.bodies.items()]
+        old, new = ({joint.name: joint for joint in each.joints} for each in (before, after))
+        joints = tuple(_moved(joint, old.get(joint.name), new.get(joint.name)) for joint in robot.joints)
+        parts = zip((*bodies, *joints), (*robot.bodies.values(), *robot.joints), strict=True)
+        if all(one is other for one, other in parts):
+            return None
+        return robot.with_bodies(bodies).change(joints=joints)
+
+
+def _moved(part: _Part, before: _Part | None, after: _Part | None) -> _Part:
+    """A part with the values that another has now and had otherwise before."""
+    if before is None or after is None:
+        return part
+    changed = {name: value for name, value in vars(after).items() if not np.array_equal(value, getattr(before, name))}
+    return dataclasses.replace(part, **changed) if changed else part
 
 
 Change = Callable[[RobotEvidence], Robot | None]

@@ -24,6 +24,20 @@ def armature_left_out(evidence: RobotEvidence) -> Robot | None:
     return _without("armature", evidence.robot)
 
 
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "write free joints without armature: nothing is geared there")
+def armature_of_free_joints_turns(evidence: RobotEvidence) -> Robot | None:
+    """Armature of a free joint acts along axes that turn with the body.
+
+    It adds mass to the velocity in body axes, whose derivative has the term of a turning frame; in the file it is mass
+    for the velocity in axes of the world.
+    """
+    robot = evidence.robot
+    if not any(joint.kind == "free" and joint.armature for joint in robot.joints):
+        return None
+    joints = (dataclasses.replace(joint, turning=joint.kind == "free") for joint in robot.joints)
+    return robot.change(joints=tuple(joints))
+
+
 @hypothesis({"drake": "1.51.1"}, "give every joint with armature an actuator")
 def armature_of_actuated_joints_only(evidence: RobotEvidence) -> Robot | None:
     """Armature is used only of joints that have an actuator."""

@@ -116,3 +116,22 @@ def free_body_offset(evidence: RobotEvidence) -> Robot | None:
     joints = tuple(_offset(joint, robot) for joint in robot.joints)
     changed = any(one is not other for one, other in zip(joints, robot.joints, strict=True))
     return robot.change(joints=joints) if changed else None
+
+
+@hypothesis(
+    {"pinocchio": "3.9.0 to 4.1.0"},
+    "put the pose into the next body, or multiply the poses of the model by it; update Pinocchio once that is released",
+)
+def root_pose_dropped(evidence: RobotEvidence) -> Robot | None:
+    """The pose of the first body is dropped where it has no joint.
+
+    All that it carries is placed as if it lay at the origin of the world.
+    """
+    robot = evidence.robot
+    if not robot.joints or robot.joints[0].kind != "fixed":
+        return None
+    first = robot.joints[0]
+    if not np.any(first.position) and np.array_equal(first.rotation, np.eye(3)):
+        return None
+    dropped = dataclasses.replace(first, position=np.zeros(3), rotation=np.eye(3))
+    return robot.change(joints=(dropped, *robot.joints[1:]))

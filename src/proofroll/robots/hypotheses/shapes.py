@@ -68,11 +68,11 @@ _STAND_IN = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
 )
 def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
     """Shapes that collide with nothing (contype 0, conaffinity 0) give no mass."""
-    robot, root = evidence.robot, copy.deepcopy(evidence.file.root)
+    root = copy.deepcopy(evidence.file.root)
     bare, touched = set(), False
     for body in root.iter("body"):
         name, shapes = str(body.get("name")), body.findall("geom")
-        collides = robot.sources.get(name, {}).get("collides", [])
+        collides = evidence.robot.sources.get(name, {}).get("collides", [])
         if len(shapes) != len(collides) or all(collides):
             continue
         touched = True
@@ -82,15 +82,13 @@ def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
         if not any(collides) and body.find("inertial") is None:
             SubElement(body, "inertial", _STAND_IN)
             bare.add(name)
+    before = evidence.recompiled(evidence.file.root) if touched else None
     compiled = evidence.recompiled(root) if touched else None
-    if compiled is None:
+    if before is None or compiled is None:
         return None
     nothing = np.zeros((3, 3))
-    lighter = (
-        dataclasses.replace(body, mass=0.0, com=np.zeros(3), inertia=nothing) if body.name in bare else body
-        for body in compiled.bodies.values()
-    )
-    return robot.with_bodies(body for body in lighter if body.name in robot.bodies)
+    lighter = (RobotBody(name, 0.0, np.zeros(3), nothing) for name in bare if name in compiled.bodies)
+    return evidence.carried_over(before, compiled.with_bodies(lighter))
 
 
 _DENSITY = 1000.0

@@ -1,0 +1,160 @@
+"""Causes by which an importer of MJCF overlooks an attribute, or takes it for another."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from collections.abc import Iterable
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.mjcf_classes import with_classes
+from proofroll.robots.model import Array, Robot, RobotBody
+from proofroll.robots.two_formulations import skew
+
+_POSES = ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis")
+_REWRITE = "write it at each element, or compile once with MuJoCo and save (mj_saveLastXML)"
+
+
+def _without(elements: Iterable[Element], *attributes: str) -> bool:
+    """Removes attributes; whether there were any."""
+    removed = [element.attrib.pop(name, None) for element in elements for name in attributes]
+    return any(value is not None for value in removed)
+
+
+def _defaults(root: Element, *tags: str) -> Iterable[Element]:
+    """Elements of default classes."""
+    return (given for default in root.iter("default") for tag in tags for given in default.findall(tag))
+
+
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, _REWRITE)
+def class_mass_ignored(evidence: RobotEvidence) -> Robot | None:
+    """The mass that a default class gives to shapes is ignored: they weigh what their density says."""
+    return evidence.edited(lambda root: _without(_defaults(root, "geom"), "mass"))
+
+
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, _REWRITE)
+def class_pose_ignored(evidence: RobotEvidence) -> Robot | None:
+    """The pose that a default class gives to joints and shapes is ignored."""
+    return evidence.edited(lambda root: _without(_defaults(root, "joint", "geom"), *_POSES))
+
+
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "write quaternions (quat) instead of angles (euler)")
+def euler_sequence_in_small_letters(evidence: RobotEvidence) -> Robot | None:
+    """Capital letters of eulerseq are read as small ones: turns about fixed axes become turns about moving ones."""
+
+    def edit(root: Element) -> bool:
+        capital = [
+            each for each in root.iter("compiler") if each.get("eulerseq", "") != each.get("eulerseq", "").lower()
+        ]
+        for each in capital:
+            each.set("eulerseq", each.get("eulerseq", "").lower())
+        return bool(capital)
+
+    return evidence.edited(edit)
+
+
+@hypothesis(
+    {"pinocchio": "3.9.0 to 4.1.0"}, "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML)"
+)
+def inertia_groups_ignored(evidence: RobotEvidence) -> Robot | None:
+    """Inertiagrouprange is ignored: shapes of all groups weigh."""
+    return evidence.edited(lambda root: _without(root.iter("compiler"), "inertiagrouprange"))
+
+
+def _inertials(root: Element) -> list[tuple[str, Element]]:
+    return [(str(body.get("name")), given) for body in root.iter("body") for given in body.findall("inertial")]
+
+
+def _moments(inertial: Element) -> tuple[str, list[float]] | None:
+    """The attribute that holds the moments, and its numbers."""
+    for name in ("diaginertia", "fullinertia"):
+        if inertial.get(name):
+            return name, [float(part) for part in inertial.get(name, "").split()]
+    return None
+
+
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "correct the inertia in the file, and leave balanceinertia out")
+def balance_ignored(evidence: RobotEvidence) -> Robot | None:
+    """Balanceinertia is ignored: impossible inertias are taken as written.
+
+    To compile them each gets as much more about every axis as makes it possible, which is taken away again.
+    """
+    root, more = copy.deepcopy(evidence.file.root), dict[str, float]()
+    if not _without(root.iter("compiler"), "balanceinertia"):
+        return None
+    for name, inertial in _inertials(root):
+        given = _moments(inertial)
+        if given is not None:
+            attribute, moments = given
+            more[name] = 3 * max(map(abs, moments))
+            raised = [moment + more[name] * (index < 3) for index, moment in enumerate(moments)]
+            inertial.set(attribute, " ".join(map(repr, raised)))
+    before, after = evidence.recompiled(evidence.file.root), evidence.recompiled(root)
+    if before is None or after is None:
+        return None
+    lowered = (
+        dataclasses.replace(body, inertia=body.inertia - more.get(name, 0.0) * np.eye(3))
+        for name, body in after.bodies.items()
+    )
+    written = [body for body in lowered if body.name in before.bodies and _other(body, before.bodies[body.name])]
+    return evidence.carried_over(before, before.with_bodies(written))
+
+
+def _other(body: RobotBody, before: RobotBody) -> bool:
+    """Whether an inertia is another, by more than the round-off of what was added and taken away."""
+    return bool(np.abs(body.inertia - before.inertia).max() > 1e-9 * np.abs(body.inertia).max())
+
+
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "write the axis of axisangle with length 1, or a quaternion")
+def axisangle_not_normalised(evidence: RobotEvidence) -> Robot | None:
+    """An inertial's axisangle is taken with its axis as long as it is written, which gives no rotation."""
+    degrees = not any(each.get("angle") == "radian" for each in evidence.file.root.iter("compiler"))
+    stretched = []
+    for name, inertial in _inertials(evidence.file.root):
+        body = evidence.robot.bodies.get(name)
+        if body is None or not inertial.get("axisangle") or not inertial.get("diaginertia"):
+            continue
+        *axis, angle = (float(part) for part in inertial.get("axisangle", "").split())
+        R = _unnormalised(np.array(axis), np.radians(angle) if degrees else angle)
+        moments = np.diag([float(part) for part in inertial.get("diaginertia", "").split()])
+        stretched.append(dataclasses.replace(body, inertia=R @ moments @ R.T))
+    return evidence.robot.with_bodies(stretched) if stretched else None
+
+
+def _unnormalised(axis: Array, angle: float) -> Array:
+    """Rodrigues' formula with an axis of any length."""
+    return np.asarray(
+        np.cos(angle) * np.eye(3) + np.sin(angle) * skew(axis) + (1 - np.cos(angle)) * np.outer(axis, axis)
+    )
+
+
+# Radius of a ball of 1 kg with unit moments [m]: ⅖ r² = 1.
+_UNIT_BALL = 2.5**0.5
+
+
+@hypothesis(
+    {"pinocchio": "3.9.0 to 4.1.0"}, "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML)"
+)
+def meshes_weigh_one_kilogram(evidence: RobotEvidence) -> Robot | None:
+    """Every mesh weighs 1 kg, with unit inertia about its origin."""
+    collides = {name: list(source.get("collides", ())) for name, source in evidence.robot.sources.items()}
+
+    def edit(root: Element) -> bool:
+        effective = {id(geom): attributes for geom, attributes in with_classes(root, "geom")}
+        touched = False
+        for body in root.iter("body"):
+            shapes = body.findall("geom")
+            hits = collides.get(str(body.get("name")), [])
+            for shape, weighs in zip(shapes, hits if len(hits) == len(shapes) else [True] * len(shapes), strict=True):
+                given = effective[id(shape)]
+                if weighs and (given.get("type") == "mesh" or given.get("mesh")):
+                    _without([shape], "mesh", "density", "shellinertia")
+                    shape.attrib |= {"type": "sphere", "size": repr(_UNIT_BALL), "mass": "1"}
+                    touched = True
+        _without(_defaults(root, "geom"), "mesh")
+        return touched
+
+    return evidence.edited(edit)
