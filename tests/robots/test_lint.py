@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from robot_templates import inertial, urdf
+from robot_templates import inertial, mjcf, spherical, urdf
 
 from proofroll.robots.lint import lint
+from proofroll.robots.model import Robot
 from proofroll.robots.robot_file import LintFinding, open_robot
 from proofroll.robots.urdf import read_urdf
 
@@ -18,6 +19,7 @@ FLAT = inertial(ixx="0.01", iyy="0.01", izz="0.9")
 MASSLESS = inertial(mass="0")
 ROD = inertial(ixx="0", iyy="0.01", izz="0.01", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 EMPTY = inertial(mass="0", ixx="0", iyy="0", izz="0", ixy="0").replace("0.002", "0").replace("-0.001", "0")
+POINT = inertial(ixx="0", iyy="0", izz="0", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 PLANTED = {
     "without inertial": (urdf(), "warning", "links", "1 without <inertial>: tool"),
     "shape without inertial": (urdf(tool=BOX), "warning", "link tool", "1000 kg/m³"),
@@ -37,6 +39,13 @@ PLANTED = {
     "no limits": (urdf(kinds=("revolute", "prismatic", "revolute")), "warning", "joint j3", "needs <limit>"),
     "author's options": (urdf(extra="<gazebo/>"), "note", "gazebo", "left out for every engine"),
     "unknown element": (urdf(extra="<wheel/>"), "warning", "wheel", "the specification has no such element"),
+    "mass without inertia": (urdf(tip=POINT), "warning", "link tip", "mass of 1.3 kg but no inertia"),
+    "g mm²": (urdf(tip=spherical("0.3", "4e5")), "warning", "link tip", "radius of gyration is 1155 m"),
+    "denser than osmium": (urdf(tip=spherical("1.3", "4e-9")), "warning", "link tip", "denser than osmium"),
+    "mm": (urdf().replace("0.3 0.1 0", "300 100 0"), "warning", "joint j3", "316.2 m from its parent's origin"),
+    "far centre": (urdf(tip=inertial(com="0 0 14")), "warning", "link tip", "centre of mass lies 14 m"),
+    "limits in degrees": (urdf().replace('upper="1.2"', 'upper="90"'), "warning", "joint j1", "14.3 turns"),
+    "rpy in degrees": (urdf().replace("0.2 0.7 -0.3", "0 90 0"), "warning", "joint j3", "rpy 0 90 0: angles are rad"),
     "unknown inside": (urdf(first="<spring/>"), "warning", "joint j1", "no <spring> here"),
 }
 
@@ -59,3 +68,42 @@ def test_planted(name: str, tmp_path: Path) -> None:
 def test_nothing_planted(tmp_path: Path) -> None:
     """A clean file has no findings."""
     assert _findings(urdf(tool=inertial()), tmp_path) == []
+
+
+LIFTED = '<body name="b"><joint name="f" type="free" {}/><geom size="0.1"/></body>'
+SPRUNG = '<default><joint damping="2"/><default class="k"><joint armature="0.01"/></default></default>'
+IN_MJCF = {
+    "inherited by a free joint": (
+        LIFTED.format('class="k"'),
+        SPRUNG,
+        "damping 2 and armature 0.01 from a default class",
+    ),
+    "inherited through childclass": (
+        LIFTED.format("").replace("<body", '<body childclass="k"'),
+        SPRUNG,
+        "armature 0.01",
+    ),
+    "radians": ('<body><joint name="f" range="-3.14 3.14"/><geom size="0.1"/></body>', "", "is in degrees"),
+}
+FREE = (LIFTED.format('class="k" damping="0" armature="0"'), LIFTED.format('damping="1"'), "<body><freejoint/></body>")
+
+
+def _mjcf_findings(extra: str, default: str, folder: Path) -> list[LintFinding]:
+    path = folder / "robot.xml"
+    path.write_text(mjcf(extra=extra).replace("<worldbody>", default + "<worldbody>"))
+    return [item for item in lint(open_robot(path), Robot("r", {}, ())) if item.where == "joint f"]
+
+
+@pytest.mark.parametrize("name", IN_MJCF)
+def test_planted_in_mjcf(name: str, tmp_path: Path) -> None:
+    """What a default class gives a free joint, and radians that are read as degrees, are told."""
+    extra, default, what = IN_MJCF[name]
+    (found,) = _mjcf_findings(extra, default, tmp_path)
+    assert found.level == "warning"
+    assert what in found.what
+
+
+@pytest.mark.parametrize("extra", FREE)
+def test_free_joints_that_say_it_themselves(extra: str, tmp_path: Path) -> None:
+    """A free joint whose own attributes say what acts on it, or that inherits nothing, is left alone."""
+    assert not [item for item in _mjcf_findings(extra, SPRUNG, tmp_path) if "default class" in item.what]

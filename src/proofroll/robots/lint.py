@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from proofroll.robots.model import Robot, RobotJoint
+from proofroll.robots.plausibility import implausible
 from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
 
 # Level, where and what of a :class:`LintFinding`.
@@ -25,7 +26,9 @@ _KNOWN = {
 def lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
     """Everything that is noticed in a file and in what it means, errors first."""
     own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
-    found = [LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot))]
+    found = [
+        LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))
+    ]
     return sorted(found, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
 

@@ -1,0 +1,93 @@
+"""Numbers of a robot file that no machine has: most often another unit, or a default that was not meant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from proofroll.robots.mjcf_classes import with_classes
+from proofroll.robots.model import Robot, RobotBody
+from proofroll.robots.robot_file import RobotFile
+
+# Machines larger than this are rarer than lengths in millimetres [m].
+_LARGE = 10.0
+# A centre of mass is not further away than this [m], or so many times all distances between joints.
+_FAR, _TIMES = 1.0, 10.0
+# Of osmium, the densest material [kg/m³].
+_DENSEST = 22600.0
+# Limits beyond are degrees or mean none: joints turn two times, and those that turn on have large round numbers [rad].
+_TURNS = 4 * math.pi, 720.0
+# What acts on a free joint as on any other.
+_LAWS = ("damping", "armature", "frictionloss", "stiffness")
+# Angles in radians that stand where degrees are read, to as many digits as people write.
+_IN_RADIANS = (1.57, 3.14, 6.28)
+
+
+def implausible(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:
+    """Level, where and what of each such number."""
+    noun = "link" if file.kind == "urdf" else "body"
+    between = sum(float(np.linalg.norm(joint.position)) for joint in robot.joints if joint.kind != "free")
+    for name, body in robot.bodies.items():
+        for what in _body(body, between):
+            yield "warning", f"{noun} {name}", what
+    for joint in robot.joints:
+        away = float(np.linalg.norm(joint.position))
+        if away > _LARGE and joint.kind != "free":
+            yield "warning", f"joint {joint.name}", f"it lies {away:.4g} m from its parent's origin; lengths are metres"
+    yield from (_urdf_angles(file, robot) if file.kind == "urdf" else _mjcf_joints(file))
+
+
+def _body(body: RobotBody, between: float) -> Iterator[str]:
+    if not body.mass > 0:
+        return
+    away = float(np.linalg.norm(body.com))
+    if away > _LARGE or (between and away > max(_FAR, _TIMES * between)):
+        yield f"its centre of mass lies {away:.4g} m from its origin; lengths are metres"
+    largest = float(body.moments[-1])
+    if not np.any(body.inertia):
+        yield f"it has a mass of {body.mass:.4g} kg but no inertia: some engines refuse it, others invent one"
+    elif largest > 0:
+        gyration = math.sqrt(largest / body.mass)
+        smallest = math.sqrt(0.4) * (3 * body.mass / (4 * math.pi * _DENSEST)) ** (1 / 3)
+        if gyration > _LARGE:
+            yield f"its radius of gyration is {gyration:.4g} m; inertias are kg m²: 1 g mm² is 1e-9, 1 kg mm² is 1e-6"
+        elif gyration < smallest:
+            words = (
+                f"its radius of gyration of {1e3 * gyration:.4g} mm is that of {body.mass:.4g} kg denser than osmium"
+            )
+            yield f"{words}; inertias are kg m²"
+
+
+def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:
+    for joint in robot.moving:
+        limits = [abs(limit) for limit in (joint.lower, joint.upper) if limit is not None]
+        if joint.kind == "revolute" and limits and _TURNS[0] < max(limits) <= _TURNS[1]:
+            words = f"a limit of {max(limits):g} rad are {max(limits) / 2 / math.pi:.1f} turns; angles are radians"
+            yield "warning", f"joint {joint.name}", words
+    for owner in (*file.root.findall("joint"), *file.root.findall("link")):
+        for origin in owner.iter("origin"):
+            turns = [abs(turn) for turn in _numbers(origin.get("rpy", "0"))]
+            if max(turns) > _TURNS[0]:
+                where = f"{owner.tag} {owner.get('name')}"
+                yield "warning", where, f"rpy {origin.get('rpy')}: angles are radians"
+
+
+def _mjcf_joints(file: RobotFile) -> Iterator[tuple[str, str, str]]:
+    degrees = not any(compiler.get("angle") == "radian" for compiler in file.root.iter("compiler"))
+    for joint, given in with_classes(file.root, "joint"):
+        where = f"joint {joint.get('name')}"
+        if given.get("type") == "free":
+            laws = [name for name in _LAWS if name not in joint.attrib and any(_numbers(given.get(name, "0")))]
+            if laws:
+                words = f"it inherits {' and '.join(f'{law} {given[law]}' for law in laws)} from a default class"
+                yield "warning", where, f"{words}, which acts on the flight of the body; write <freejoint/>"
+        elif given.get("type", "hinge") == "hinge" and degrees and "range" in given:
+            bounds = [abs(bound) for bound in _numbers(given["range"])]
+            if any(abs(bound - angle) < 0.005 for bound in bounds for angle in _IN_RADIANS):
+                yield "warning", where, f'range {given["range"]} is in degrees; radians need <compiler angle="radian"/>'
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(part) for part in text.split()]
