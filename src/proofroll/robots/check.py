@@ -15,12 +15,12 @@ from proofroll.core.errors import InputError, Missing
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
-from proofroll.robots.judging import TIME_LIMIT, judged, meaning
+from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
-from proofroll.robots.robot_file import RobotFile, open_robot
+from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
@@ -34,6 +34,7 @@ def check(
     engines: Sequence[str] = (),
     *,
     base: str = "fixed",
+    root: Path | None = None,
     states: int = 20,
     seed: int = 0,
     time_limit: float = TIME_LIMIT,
@@ -46,6 +47,7 @@ def check(
         path: of a URDF or MJCF.
         engines: ``name`` or ``name[option=true,…]``; by default all whose readers are installed.
         base: what carries the root of a URDF, ``fixed`` or ``free``.
+        root: folder that the file and what it names lie in; by default the file's own.
         states: how many random states are compared.
         seed: of the states.
         time_limit: for each engine [s].
@@ -60,9 +62,9 @@ def check(
         if not place_of(spec.name):
             reading.require_reader(spec.name)
         asked.append((spec, reading.options_of(spec.options, spec.name)))
-    file = open_robot(path, base)
     with lent_workers(workers) as lent, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        file = opened(path, base, root, time_limit, lent)
         written = reading.write(file, folder)
         robot, compiler = meaning(file, written, time_limit, lent)
         by = f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"

@@ -17,6 +17,10 @@ def check(
     file: Annotated[Path, typer.Argument(help="A robot file (URDF, MJCF), a scene, or a comparison or other study.")],
     engine: options.Engines = None,
     base: Annotated[str, typer.Option(help="What carries the root of a URDF: fixed or free.")] = "fixed",
+    root: Annotated[
+        Path | None,
+        typer.Option("--root", help="Folder of what a robot file includes and its meshes; by default its own."),
+    ] = None,
     states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
@@ -37,7 +41,14 @@ def check(
 
     with options.progress_bar("engines") as advance:
         content = checked(
-            file, engine or (), base=base, states=states, seed=seed, time_limit=time_limit, progress=advance
+            file,
+            engine or (),
+            base=base,
+            root=root,
+            states=states,
+            seed=seed,
+            time_limit=time_limit,
+            progress=advance,
         )
     if out is not None:
         from proofroll.robots.page import page

@@ -5,9 +5,10 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache, lru_cache
 from pathlib import Path
+from typing import TypeVar
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 import numpy as np
@@ -20,12 +21,13 @@ from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences
 from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.records import HeldLayer, ImporterRow
-from proofroll.robots.robot_file import RobotFile
+from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.urdf import read_urdf
 from proofroll.running.asking import lent_workers
-from proofroll.running.process import WorkerDied
+from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
 
+_Answer = TypeVar("_Answer")
 # For each engine [s].
 TIME_LIMIT = 120.0
 # The two formulations must agree to a tenth of any tolerance; else their difference raises it.
@@ -112,16 +114,48 @@ def meaning(
     """
     if file.kind == "urdf":
         return read_urdf(file), None
-    asked = _defines.get(file.kind, file.kind)
+    robot, by = _by_definer(
+        file.kind, file.path, workers, lambda worker: reading.compiled(worker, file, written, time_limit)
+    )
+    return robot.change(name=file.root.get("model", "robot")), by
+
+
+def opened(
+    path: Path,
+    base: str,
+    root: Path | None = None,
+    time_limit: float = TIME_LIMIT,
+    workers: Workers | None = None,
+) -> RobotFile:
+    """A file as :func:`proofroll.robots.robot_file.open_robot` reads it, its macros written out.
+
+    The engine that defines the format is asked for no longer than ``time_limit`` [s].
+    """
+
+    def expand(parts: Mapping[str, Element]) -> Element:
+        return _by_definer("mjcf", path, workers, lambda w: reading.expanded(w, path, parts, time_limit))[0]
+
+    return open_robot(path, base, root, expand)
+
+
+def _by_definer(
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, reading.Compiler]]
+) -> tuple[_Answer, reading.Compiler]:
+    """What the engine that defines a format answers.
+
+    Raises:
+        InputError: it crashed or took too long.
+    """
+    asked = _defines.get(kind, kind)
     with lent_workers(workers) as lent:
         try:
             with lent.lend(asked) as worker:
-                robot, by = reading.compiled(worker, file, written, time_limit)
+                answer, by = ask(worker)
         except WorkerDied as error:
-            raise InputError("file", file.path, f"it could not be compiled: {error}") from None
-        _defines[file.kind] = by.engine
+            raise InputError("file", path, f"it could not be compiled: {error}") from None
+        _defines[kind] = by.engine
         lent.rename(asked, by.engine)  # which it has loaded, and is asked next what it holds
-    return robot.change(name=file.root.get("model", "robot")), by
+    return answer, by
 
 
 @lru_cache(maxsize=8)

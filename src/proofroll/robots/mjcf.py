@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import itertools
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
-from proofroll.robots.robot_file import MOST_ELEMENTS, LintFinding, read_xml
+from proofroll.robots.mjcf_meshes import Shapes, remove_height_fields, remove_meshes
+from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintFinding, read_xml, required_file
 
 # How deep files may include files.
 _DEEPEST = 8
+_MOST_MODELS = 32
 # Neither mass nor torque without contacts depends on these.
 _LOOKS = {
     "visual",
@@ -27,45 +31,87 @@ _LOOKS = {
     "contact",
     "custom",
 }
-_UNCOVERED = {"extension", "deformable", "flexcomp", "composite", "replicate", "attach", "plugin"}
+# Part of a body's mass or motion that no rigid body has.
+_UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
+# What an engine that defines the format writes out.
+_MACROS = {"replicate", "attach", "composite"}
 
 
-def stripped(root: Element, path: Path) -> tuple[Element, list[LintFinding]]:
-    """A copy that names no file but meshes that exist beside it, and what was left out.
+def stripped(
+    root: Element, path: Path, inside: Path, expand: Expand | None = None
+) -> tuple[Element, list[LintFinding]]:
+    """A copy that names no file but meshes that exist in the folder ``inside``, and what was left out.
 
     Raises:
-        InputError: it includes a file outside its folder, or holds what the check does not cover.
+        InputError: it includes a file outside the folder, or holds what the check does not cover.
     """
-    root = copy.deepcopy(root)
-    root.tag = "mujoco"
-    _include(root, path, path.resolve().parent, (path.resolve(),))
-    for element in root.iter():
-        if element.tag in _UNCOVERED:
-            raise InputError("file", path, f"the check does not cover <{element.tag}>")
-    for parent in list(root.iter()):
-        for child in list(parent):
-            if child.tag in _LOOKS or child.get("hfield"):
-                parent.remove(child)
-        parent.attrib.pop("material", None)
-    findings = [*_meshes(root, path.resolve().parent), *_gravity_compensations(root)]
-    _name(root)
+    parts: dict[str, Element] = {}
+    findings = _add(root, path, path.resolve(), inside, parts)
+    root = next(iter(parts.values()))
+    macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
+    if macros:
+        names = ", ".join(f"<{name}>" for name in macros)
+        if expand is None:
+            raise InputError("file", path, f"the check does not cover {names}")
+        if sum(map(_written_out, parts.values())) > MOST_ELEMENTS:
+            raise InputError("file", path, f"{names}: written out these are more than {MOST_ELEMENTS} elements")
+        root = expand(parts)
+        findings.append(LintFinding("note", names, "written out by the engine that defines the format, to six digits"))
+    name_all(root)
     return root, findings
 
 
-def _include(element: Element, path: Path, folder: Path, open_files: tuple[Path, ...]) -> None:
+def _written_out(element: Element) -> float:
+    """How many elements stand where macros are written out, about."""
+    inside = 1 + sum(map(_written_out, element))
+    if element.tag not in _MACROS:
+        return inside
+    with contextlib.suppress(ValueError):
+        return inside * math.prod(max(1.0, float(part)) for part in element.get("count", "1").split())
+    return inside  # the engine says what is wrong
+
+
+def _add(root: Element, path: Path, place: Path, inside: Path, parts: dict[str, Element]) -> list[LintFinding]:
+    """Adds a file without looks and named files, and those that it attaches, by names that are free in one folder."""
+    root = copy.deepcopy(root)
+    root.tag = "mujoco"
+    _include(root, path, place.parent, inside, (place,))
+    for part in ("actuator", "extension"):
+        for element in [*root.iter(part)]:
+            element[:] = [child for child in element if part == "actuator" and child.tag != "plugin"]
+    for element in root.iter():
+        if element.tag in _UNCOVERED:
+            raise InputError("file", path, f"the check does not cover <{element.tag}>")
+    shapes = Shapes(root)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            if child.tag in _LOOKS:
+                parent.remove(child)
+        parent.attrib.pop("material", None)
+    remove_height_fields(root, shapes)
+    findings = [*remove_meshes(root, shapes, place.parent, inside), *_gravity_compensations(root)]
+    parts[f"{len(parts)}.xml"] = root
+    for model in root.iter("model"):
+        target = required_file(place.parent, model, inside)
+        if len(parts) >= _MOST_MODELS:
+            raise InputError("<model file>", model.get("file"), f"more than {_MOST_MODELS} models are attached")
+        model.attrib.setdefault("name", target.stem)
+        model.set("file", f"{len(parts)}.xml")
+        findings += _add(read_xml(target), path, target, inside, parts)
+    return findings
+
+
+def _include(element: Element, path: Path, folder: Path, inside: Path, open_files: tuple[Path, ...]) -> None:
     """Puts the content of included files in place of what includes them."""
     for index, child in reversed(list(enumerate(element))):
         if child.tag != "include":
-            _include(child, path, folder, open_files)
+            _include(child, path, folder, inside, open_files)
             continue
-        target = _inside(folder, child.get("file", ""))
-        if target is None:
-            said = "the file includes another outside its folder, which is not read"
-            raise InputError("<include file>", child.get("file", ""), said)
+        target = required_file(folder, child, inside)
         if target in open_files or len(open_files) > _DEEPEST:
             raise InputError("<include file>", child.get("file", ""), "files include each other, or too deeply")
         included = read_xml(target)
-        _include(included, path, folder, (*open_files, target))
+        _include(included, path, folder, inside, (*open_files, target))
         element.remove(child)
         for offset, part in enumerate(included):
             element.insert(index + offset, part)
@@ -73,52 +119,6 @@ def _include(element: Element, path: Path, folder: Path, open_files: tuple[Path,
             raise InputError(
                 "<include file>", child.get("file", ""), f"more than {MOST_ELEMENTS} elements are included"
             )
-
-
-def _inside(folder: Path, name: str) -> Path | None:
-    """A file by its name if it lies in the folder or below, links followed."""
-    try:
-        target = (folder / name).resolve()
-    except (OSError, ValueError):  # a loop of links; a name with a null character
-        return None
-    return target if target.is_relative_to(folder) and target != folder else None
-
-
-def _meshes(root: Element, folder: Path) -> Iterator[LintFinding]:
-    """Leaves out meshes that weigh nothing or cannot be read; others are named by their whole path."""
-    compilers = list(root.iter("compiler"))
-    inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in compilers)
-    places = [compiler.attrib.pop(key, None) for key in ("texturedir", "assetdir", "meshdir") for compiler in compilers]
-    place = next((place for place in reversed(places) if place), "")
-    files = {
-        _mesh_name(mesh): _inside(folder, f"{place}/{mesh.get('file')}")
-        for mesh in root.iter("mesh")
-        if mesh.get("file")
-    }
-    present = {name for name, target in files.items() if target is not None and target.is_file()}
-    used = {name for name in (_mesh_name(mesh) for mesh in root.iter("mesh") if mesh.get("vertex")) if name}
-    for body in root.iter("body"):
-        weighed = inferred or body.find("inertial") is None
-        lost = 0
-        for geom in [geom for geom in body.findall("geom") if geom.get("mesh")]:
-            name = str(geom.get("mesh"))
-            if weighed and name in present | used:
-                used.add(name)
-            else:
-                body.remove(geom)
-                lost += weighed
-        if lost:
-            words = f"{lost} meshes that would give it mass are not in the file's folder; all engines read it without"
-            yield LintFinding("warning", f"body {body.get('name', '')}", words)
-    for world in root.iter("worldbody"):
-        for geom in [geom for geom in world.findall("geom") if geom.get("mesh")]:
-            world.remove(geom)
-    for asset in root.iter("asset"):
-        for mesh in asset.findall("mesh"):
-            if _mesh_name(mesh) not in used:
-                asset.remove(mesh)
-            elif mesh.get("file"):
-                mesh.set("file", str(files[_mesh_name(mesh)]))
 
 
 def _gravity_compensations(root: Element) -> Iterator[LintFinding]:
@@ -129,11 +129,7 @@ def _gravity_compensations(root: Element) -> Iterator[LintFinding]:
             yield LintFinding("note", f"body {body.get('name', '')}", words)
 
 
-def _mesh_name(mesh: Element) -> str:
-    return mesh.get("name") or Path(mesh.get("file", "")).stem
-
-
-def _name(root: Element) -> None:
+def name_all(root: Element) -> None:
     """Names for bodies and joints without one, so that engines can be compared by name."""
     root.attrib.setdefault("model", "robot")
     taken = {element.get("name") for element in root.iter()}

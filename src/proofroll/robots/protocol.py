@@ -87,7 +87,8 @@ class RobotReader(Protocol):
     """An engine's importer.
 
     A reader whose engine defines a format names it as ``defines`` and has ``compiled(path)``, which returns what the
-    engine makes of a file as a :class:`Robot`: that is what the file means.
+    engine makes of a file as a :class:`Robot`: that is what the file means; and ``expanded(path)``, a file's text with
+    its macros written out.
 
     Attributes:
         kinds: formats that it reads.

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import dataclasses
 import json
+import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -119,7 +122,8 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
         raise Missing(f"{engine} reads no {request.kind.upper()}")
     told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
     try:
-        reading = reader.read(request)
+        with contextlib.chdir(Path(arrays).parent):  # where an engine may leave its log
+            reading = reader.read(request)
         _require_whole(reading, request.states.count)
     except Refused as error:
         return told | {"refused": str(error)}
@@ -156,6 +160,16 @@ def _require_whole(reading: Reading, states: int) -> None:
 
 def compile_robot(path: str) -> dict[str, Any]:
     """The worker's side: what a file means in a format that an engine defines."""
+    return _defined(Path(path), lambda reader: {"robot": plain(reader.compiled(Path(path)))})
+
+
+def expand_robot(path: str) -> dict[str, Any]:
+    """The worker's side: the text of a file in a format that an engine defines, its macros written out."""
+    return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
+
+
+def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+    """What the engine that defines MJCF answers, and which it is; or why there is no answer."""
     from proofroll.running.worker import one_line
 
     for name in reader_names():
@@ -166,11 +180,11 @@ def compile_robot(path: str) -> dict[str, Any]:
         if getattr(reader, "defines", None) == "mjcf":
             by = Compiler(name, reader.version())
             try:
-                return {"robot": plain(reader.compiled(Path(path))), "by": by}
+                with contextlib.chdir(path.parent):  # where an engine may leave its log
+                    return answer(reader) | {"by": by}
             except Exception as error:
-                return {"robot": None, "message": f"{' '.join(by)} says: {one_line(error)}"}
-    lacking = "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"
-    return {"robot": None, "message": lacking}
+                return {"message": f"{' '.join(by)} says: {one_line(error)}"}
+    return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
 
 
 def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
@@ -181,7 +195,7 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
         WorkerDied: it crashed or took too long.
     """
     told = worker.request(_call(compile_robot, path=str(written)), time_limit)
-    if told["robot"] is None:
+    if "robot" not in told:
         raise InputError("file", file.path, f"it has no meaning: {told['message']}")
     robot = robot_from(told["robot"])
     for name, part in (*robot.bodies.items(), *((joint.name, joint) for joint in robot.joints)):
@@ -190,6 +204,23 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
             if endless and key not in {"lower", "upper"}:  # which most joints have not
                 raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
     return robot, Compiler(*told["by"])
+
+
+def expanded(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
+    """An MJCF with its macros written out, and by whom; ``parts`` are the file and those that it attaches, by name.
+
+    Raises:
+        InputError: the engine that defines the format cannot do that, or is not installed.
+        WorkerDied: it crashed or took too long.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for part, content in parts.items():
+            (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
+        told = worker.request(_call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
+    if "text" not in told:
+        raise InputError("file", path, f"its macros cannot be written out: {told['message']}")
+    return ElementTree.fromstring(told["text"]), Compiler(*told["by"])
 
 
 def write(file: RobotFile, folder: Path) -> Path:

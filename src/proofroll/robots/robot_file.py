@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
@@ -51,25 +53,38 @@ class RobotFile:
     findings: tuple[LintFinding, ...] = ()
 
 
-def open_robot(path: Path, base: str = "fixed") -> RobotFile:
+# Content of a file and of those that it attaches, by their names -> what an engine makes of macros in it.
+Expand = Callable[[Mapping[str, Element]], Element]
+
+
+def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand: Expand | None = None) -> RobotFile:
     """Reads a file, and leaves out what engines must not or need not load.
 
+    Args:
+        path: of a URDF or MJCF.
+        base: what carries the root of a URDF, ``fixed`` or ``free``.
+        root: folder that the file and what it names lie in; by default the file's own.
+        expand: writes out what macros of a format (repetition, attached models) stand for.
+
     Raises:
-        InputError: the file is broken, of another kind, too large, or asks for files outside its folder.
+        InputError: the file is broken, of another kind, too large, or asks for files outside the folder.
     """
     require_known("base", base, BASES)
     with told_of(str(path)):
-        return _opened(path, base)
+        inside = (path.parent if root is None else root).resolve()
+        if not path.resolve().is_relative_to(inside):
+            raise InputError("--root", root, f"{path} is not in this folder")
+        return _opened(path, base, inside, expand)
 
 
-def _opened(path: Path, base: str) -> RobotFile:
+def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> RobotFile:
     from proofroll.robots import mjcf, urdf
 
     root = read_xml(path)
     if root.tag == "robot":
         kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, findings), body = "mjcf", mjcf.stripped(root, path), "body"
+        kind, (root, findings), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
@@ -118,15 +133,50 @@ def read_xml(path: Path) -> Element:
         text = path.read_bytes()
     except OSError as error:
         raise InputError("file", path, f"the file cannot be read: {error.strerror}") from None
-    parser = XMLParser(target=_Builder())
     try:
-        parser.feed(text)
-        root: Element = parser.close()
+        try:
+            return _parsed(text)
+        except ParseError:
+            return _parsed(_COMMENTS.sub(b"", text).lstrip())  # as engines do, whose parsers are no stricter
     except _TooMuch as error:
         raise InputError("file", path, str(error)) from None
     except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that does not exist
         raise InputError("file", path, f"this is no XML: {error}") from None
+
+
+# A comment may hold no "--", and nothing may stand before <?xml: few files keep to that, and no engine asks for it.
+_COMMENTS = re.compile(rb"<!--.*?-->", re.DOTALL)
+
+
+def _parsed(text: bytes) -> Element:
+    parser = XMLParser(target=_Builder())
+    parser.feed(text)
+    root: Element = parser.close()
     return root
+
+
+def file_inside(folder: Path, name: str, inside: Path) -> Path | None:
+    """A file by its name in a folder if it lies in ``inside`` or below, links followed."""
+    try:
+        target = (folder / name).resolve()
+    except (OSError, ValueError):  # a loop of links; a name with a null character
+        return None
+    return target if target.is_relative_to(inside) and target != inside else None
+
+
+def required_file(folder: Path, element: Element, inside: Path) -> Path:
+    """The file that an element names.
+
+    Raises:
+        InputError: it lies outside the folder ``inside``.
+    """
+    target = file_inside(folder, element.get("file", ""), inside)
+    if target is None:
+        said = (
+            "it is outside its folder, the only one that files are read from; `proofroll check` takes another by --root"
+        )
+        raise InputError(f"<{element.tag} file>", element.get("file", ""), said)
+    return target
 
 
 def numbers(element: Element, attribute: str, default: str | None, count: int) -> list[float]:

@@ -17,9 +17,9 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
-from proofroll.robots.judging import meant
+from proofroll.robots.judging import meant, opened
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
-from proofroll.robots.robot_file import BASES, RobotFile, open_robot
+from proofroll.robots.robot_file import BASES, RobotFile
 from proofroll.robots.states import RobotStates, random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early
@@ -119,7 +119,7 @@ class RobotScenes:
 
 
 def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
-    file = open_robot(path, base)
+    file = opened(path, base)
     return file, meant(file.path, file.kind, base, tostring(file.root))
 
 

@@ -45,6 +45,12 @@ class MujocoRobots:
         """The compiled model of an MJCF as plain data."""
         return robot_of(mujoco.MjModel.from_xml_path(str(path)))
 
+    def expanded(self, path: Path) -> str:
+        """An MJCF with repetitions, attached models and composites written out."""
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.compile()
+        return str(spec.to_xml())
+
     def read(self, request: Request) -> Reading:
         """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
         model = _compile(request)

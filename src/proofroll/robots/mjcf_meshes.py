@@ -1,0 +1,125 @@
+"""Shapes of an MJCF that name meshes or height fields: those that give no mass are left out."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from proofroll.core.number_text import counted
+from proofroll.robots.robot_file import LintFinding, file_inside, required_file
+
+# The default class of what names none.
+_MAIN = "main"
+
+
+class Shapes:
+    """Shapes in bodies and the world, with attributes that default classes give.
+
+    Attributes:
+        found: each shape, the element that it stands in, and its body or the world.
+    """
+
+    def __init__(self, root: Element) -> None:
+        self._classes: dict[str, dict[str, str]] = {_MAIN: {}}
+        for top in root.findall("default"):
+            self._read(top, _MAIN, _MAIN)
+        self._inherited: dict[Element, str] = {}
+        self.found: list[tuple[Element, Element, Element]] = []
+        for world in root.iter("worldbody"):
+            self._walk(world, world, _MAIN)
+
+    def _read(self, default: Element, name: str, above: str) -> None:
+        self._classes[name] = dict(self._classes[above])
+        for geom in default.findall("geom"):
+            self._classes[name] |= geom.attrib
+        for child in default.findall("default"):
+            self._read(child, child.get("class", ""), name)
+
+    def _walk(self, parent: Element, body: Element, inherited: str) -> None:
+        inherited = parent.get("childclass", inherited)
+        for child in parent:
+            if child.tag == "geom":
+                self._inherited[child] = inherited
+                self.found.append((child, parent, body))
+            self._walk(child, child if child.tag == "body" else body, inherited)
+
+    def of(self, shape: Element, attribute: str) -> str | None:
+        """An attribute of a shape."""
+        name = shape.get("class", self._inherited.get(shape, _MAIN))
+        return shape.get(attribute, self._classes.get(name, {}).get(attribute))
+
+
+def remove_height_fields(root: Element, shapes: Shapes) -> None:
+    """Leaves out height fields, which weigh nothing."""
+    for geom, parent, _ in shapes.found:
+        if shapes.of(geom, "hfield"):
+            parent.remove(geom)
+    _forget(root, "hfield", set())
+
+
+def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> Iterator[LintFinding]:
+    """Leaves out meshes that weigh nothing or do not exist; others are named by their whole path.
+
+    Args:
+        root: of the file.
+        shapes: in it.
+        folder: of the file.
+        inside: folder that meshes must lie in.
+
+    Raises:
+        InputError: a mesh that gives mass lies outside.
+    """
+    inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in root.iter("compiler"))
+    place, strip = _mesh_folder(root, folder)
+    given = {name for mesh in root.iter("mesh") if mesh.get("vertex") and (name := _mesh_name(mesh))}
+    named = {_mesh_name(mesh): mesh for mesh in root.iter("mesh") if mesh.get("file")}
+    if strip:
+        for mesh in named.values():
+            mesh.set("file", Path(mesh.get("file", "")).name)
+    files = {name: file_inside(place, mesh.get("file", ""), inside) for name, mesh in named.items()}
+    used: set[str] = set()
+    lost: Counter[Element] = Counter()
+    for geom, parent, body in shapes.found:
+        wanted = shapes.of(geom, "mesh")
+        if wanted is None:
+            continue
+        weighed = body.tag == "body" and (inferred or body.find("inertial") is None)
+        target = required_file(place, named[wanted], inside) if weighed and wanted in named else None
+        if weighed and (wanted in given or (target is not None and target.is_file())):
+            used.add(wanted)
+        else:
+            parent.remove(geom)
+            lost[body] += weighed
+    for body, number in (+lost).items():
+        words = f"{counted(number, 'mesh shapes')} that would give it mass: no such file; all engines read it without"
+        yield LintFinding("warning", f"body {body.get('name', '')}", words)
+    _forget(root, "mesh", used)
+    for asset in root.iter("asset"):
+        for mesh in asset.findall("mesh"):
+            if _mesh_name(mesh) not in used:
+                asset.remove(mesh)
+            elif mesh.get("file"):
+                mesh.set("file", str(files[_mesh_name(mesh)]))
+
+
+def _mesh_folder(root: Element, folder: Path) -> tuple[Path, bool]:
+    """The folder of meshes, and whether paths in their names do not count; taken out of the file."""
+    found: dict[str, str] = {}
+    for compiler in root.iter("compiler"):
+        for key in ("texturedir", "assetdir", "meshdir", "strippath"):
+            found[key] = compiler.attrib.pop(key, found.get(key, ""))
+    return folder / (found.get("meshdir") or found.get("assetdir", "")), found.get("strippath") == "true"
+
+
+def _forget(root: Element, attribute: str, kept: set[str]) -> None:
+    """Takes an attribute out of default classes, but for some of its values."""
+    for default in root.iter("default"):
+        for geom in default.findall("geom"):
+            if geom.get(attribute) not in kept:
+                geom.attrib.pop(attribute, None)
+
+
+def _mesh_name(mesh: Element) -> str:
+    return mesh.get("name") or Path(mesh.get("file", "")).stem
