@@ -26,12 +26,11 @@ FILE = ROOT / "docs" / "vocabulary.md"
 
 
 class Table(NamedTuple):
-    """A table of a file: its header as TOML writes it, what reads it, fields that are no keys, and further keys."""
+    """A table of a file: its header as TOML writes it, what reads it, fields that are no keys."""
 
     header: str
     read_by: type[Any]
     no_keys: tuple[str, ...] = ()
-    also: tuple[tuple[str, str, str, str], ...] = ()
 
 
 _OF_FILE = ("name",)
@@ -49,18 +48,7 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
     ),
     "A scene with a mechanism": (
         Table("[[bodies]]", mechanisms.Body),
-        Table(
-            "[[joints]]",
-            mechanisms.Joint,
-            also=(
-                (
-                    "dependent",
-                    "bool",
-                    "false",
-                    "q0 and v0 are found from the loops; the q0 that is given is the guess.",
-                ),
-            ),
-        ),
+        Table("[[joints]]", mechanisms.Joint),
         Table("[[loops]]", mechanisms.Loop),
         Table("[[springs]]", mechanisms.Spring),
         Table("[[points]]", mechanisms.Point),
@@ -121,7 +109,8 @@ INTRODUCTION = """# The vocabulary of scenes and comparisons
 
 Written by `docs/vocabulary.py` from what reads the files; do not edit it. `proofroll check NAME` says whether a file is
 sound, and an unknown key is an error. SI units, angles in rad; nothing is converted. In a scene `"$name"` is the value
-of a parameter, and in a mechanism `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )` and `pi`.
+of a parameter, and `"= mass*length^2/12"` is a formula of parameters with `+ - * / ^ ( )` and `pi`. Both must have the
+unit of their place; a bare number takes the unit of what it is added to, and has none in a product.
 """
 
 
@@ -139,13 +128,22 @@ def keys(table: Table) -> Iterator[tuple[str, str, str, str]]:
     said = meanings(table.read_by)
     for item in dataclasses.fields(table.read_by):
         if item.name not in table.no_keys:
-            unit = item.metadata.get("unit")
+            unit = _unit(item.metadata.get("unit"))
             text = (
                 re.sub(r":\w+:`~?(?:[\w.]+\.)?(\w+)`", r"`\1`", said[item.name]).replace("``", "`").replace("|", r"\|")
             )
             text += f" [{unit}]" if unit and f"[{unit}" not in text and "[" not in text else ""
             yield item.name, _type(item.type), _default(item), text
-    yield from table.also
+
+
+def _unit(unit: Any) -> str:
+    """The unit of a key, with the kinds that have it where it hangs on the kind."""
+    if isinstance(unit, dict):
+        kinds: dict[str, list[str]] = {}
+        for kind, own in unit.items():
+            kinds.setdefault(_unit(own), []).append(kind)
+        return "; ".join(f"{own}: {', '.join(names)}" for own, names in kinds.items())
+    return unit if isinstance(unit, str) else ", ".join(unit or ())
 
 
 def _type(annotation: Any) -> str:
@@ -153,7 +151,8 @@ def _type(annotation: Any) -> str:
     known = {
         "Vector": "[x, y, z]",
         "Vector | None": "[x, y, z]",
-        "Matrix": "3×3 or [Ixx, Iyy, Izz]",
+        "Inertia": "3×3 or [Ixx, Iyy, Izz]",
+        "Numbers": "number or list",
         "Kind": "kind of joint",
         "Tolerance": '"1e-3 m" or "1 %"',
     }

@@ -1,12 +1,20 @@
-"""The numbers of a scene file, for those who read its tables: ``"$name"`` is the value of a parameter."""
+"""The numbers of a scene file: ``"$name"`` is the value of a parameter, ``"= mass*length^2/12"`` that of a formula."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from proofroll.core.errors import InputError, require_known
+from proofroll.core.expressions import evaluated
+from proofroll.core.quantity import Quantity, powers_of
+
+# Of a number, or of each number of a list; "": not checked.
+Unit = str | tuple[str, ...]
+_NUMBERED = re.compile(r"\{([^{}]*)\}")
 
 
 @dataclass(frozen=True)
@@ -21,26 +29,58 @@ class Numbers:
     values: Mapping[str, float]
     units: Mapping[str, str]
 
-    def filled(self, content: Any, where: str, units: Mapping[str, str], unit: str = "") -> Any:
-        """The content of a table with each ``$name`` replaced by its number, which must have the unit of its place.
+    def filled(self, content: Any, where: str, units: Mapping[str, Unit], unit: Unit = "") -> Any:
+        """The content of a table with its parameters and formulas replaced by numbers, each of the unit of its place.
 
-        ``units`` are those of numbers by their keys, ``unit`` is that of the content itself, if it is a number.
+        Args:
+            content: of a file: ``"$name"`` is a parameter, ``"= ..."`` a formula, ``{i}`` in a text a number.
+            where: its place, for messages.
+            units: of numbers by their keys.
+            unit: of the content itself, if it is a number or a list of numbers.
 
         Raises:
-            InputError: no such parameter, another unit, or a truth value instead of a number.
+            InputError: no such parameter, another unit, a formula that is none, or a truth value instead of a number.
         """
         if isinstance(content, dict):
             return {
                 key: self.filled(value, f"{where}.{key}", units, units.get(key, "")) for key, value in content.items()
             }
         if isinstance(content, list):
-            return [self.filled(value, f"{where}.{index}", units, unit) for index, value in enumerate(content)]
-        if isinstance(content, bool):
-            raise InputError(where, content, "this is not a number; give one" + (f" in {unit}" if unit else ""))
-        if isinstance(content, str) and content.startswith("$"):
+            return [
+                self.filled(value, f"{where}.{index}", units, unit_at(unit, index))
+                for index, value in enumerate(content)
+            ]
+        own = unit_at(unit, 0)
+        plain = isinstance(content, str) and not content.startswith(("$", "="))
+        if own and (plain or isinstance(content, bool)):
+            raise InputError(where, content, "this is not a number; give one" + (f" in {own}" if own != "1" else ""))
+        if not isinstance(content, str):
+            return content
+        if content.startswith("$"):
             require_known(where, content[1:], self.values, "there is no such parameter; choose from", content)
-            given = self.units[content[1:]]
-            if unit and given != unit:
-                raise InputError(where, content, f"this number is in {unit}, that parameter in {given}")
+            given = self.units.get(content[1:], "")
+            if own and given and given != own:
+                raise InputError(where, content, f"this number is in {own}, that parameter in {given}")
             return self.values[content[1:]]
-        return content
+        if content.startswith("="):
+            return evaluated(where, content[1:], self._quantities, own)
+        return _NUMBERED.sub(lambda found: f"{evaluated(where, found[1], self._quantities):g}", content)
+
+    def beside(self, name: str, value: float) -> Numbers:
+        """These numbers and a plain one of this name."""
+        return Numbers({**self.values, name: value}, self.units)
+
+    @cached_property
+    def _quantities(self) -> dict[str, Quantity]:
+        units = {name: self.units.get(name, "1") for name in self.values}
+        return {
+            name: Quantity(float(value), None if units[name] == "1" else powers_of(units[name]))
+            for name, value in self.values.items()
+        }
+
+
+def unit_at(unit: Unit, index: int) -> str:
+    """The unit of one number of a list of numbers; of a list beyond its end it is not checked."""
+    if isinstance(unit, str):
+        return unit
+    return unit[index] if index < len(unit) else ""

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.bounds import OutOfBounds
 from proofroll.core.errors import InputError, no_such_key
+from proofroll.core.numbers import Unit
 
 _T = TypeVar("_T")
 # JSON has no infinity, which a parameter may be (friction without a bound): there it is null.
@@ -135,3 +136,21 @@ def advice(kind: str, said: str) -> str:
 def units_of(*types: type) -> dict[str, str]:
     """Unit of each number of dataclasses whose fields carry one."""
     return {item.name: item.metadata["unit"] for kind in types for item in fields(kind) if "unit" in item.metadata}
+
+
+def units_of_kind(table: type, kind: object) -> dict[str, Unit]:
+    """Unit of each number of a dataclass, whose fields may carry one for each ``kind`` that a file can name."""
+    units = {item.name: item.metadata.get("unit", "") for item in fields(table)}
+    return {name: unit.get(kind, "") if isinstance(unit, Mapping) else unit for name, unit in units.items()}
+
+
+def all_units_of(*types: type) -> dict[str, str]:
+    """Every unit that a number of these dataclasses may have, by its key, and by kind and place where these decide."""
+    found: dict[str, str] = {}
+    for each in types:
+        for item in fields(each):
+            unit = item.metadata.get("unit", "")
+            for kind, own in unit.items() if isinstance(unit, Mapping) else [("", unit)]:
+                for place, one in enumerate([own] if isinstance(own, str) else own):
+                    found[".".join(filter(None, [item.name, kind, str(place or "")]))] = one
+    return {name: unit for name, unit in found.items() if unit}

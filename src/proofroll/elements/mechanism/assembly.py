@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -24,20 +23,21 @@ IMMOBILE = "it cannot move; free a joint or a loop"
 ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
 
 
-def assembled(mechanism: Mechanism, dependent: Collection[str]) -> Mechanism:
-    """The mechanism with q0 and v0 of the ``dependent`` joints found from its loops; their own q0 are guesses.
+def assembled(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with q0 and v0 of the dependent joints found from its loops; their own q0 are guesses.
 
     Raises:
         InputError: one of them has coordinates that cannot be found.
     """
+    dependent = [joint.name for joint in mechanism.joints if joint.dependent]
     if not dependent:
         return mechanism
     if not mechanism.loops:
         advice = "there is no loop that it could follow from; add one, or leave dependent out"
-        raise InputError(f"joints.{next(iter(dependent))}.dependent", True, advice)
+        raise InputError(f"joints.{dependent[0]}.dependent", True, advice)
     tree = Tree(mechanism)
     q, v = mechanism.start()
-    free = np.concatenate([np.full(joint.nv, joint.name in dependent) for joint in mechanism.joints])
+    free = np.concatenate([np.full(joint.nv, joint.dependent) for joint in mechanism.joints])
     for _ in range(_ROUNDS):
         rows = tree.loop_rows(tree.at(q, v))
         dv = np.zeros(len(v))
@@ -48,7 +48,7 @@ def assembled(mechanism: Mechanism, dependent: Collection[str]) -> Mechanism:
     C = tree.loop_rows(tree.at(q, v)).C
     v[free] = -least(C[:, free], C[:, ~free] @ v[~free])
     joints = tuple(
-        replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]))
+        replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]), dependent=False)
         for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
     )
     return replace(mechanism, joints=joints)

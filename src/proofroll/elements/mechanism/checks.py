@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from pydantic import BeforeValidator
 
 from proofroll.core.errors import InputError
 
+
+def _diagonal(value: Any) -> Any:
+    """Rows of a diagonal matrix for a list of three numbers, anything else as it is."""
+    if (
+        isinstance(value, list | tuple)
+        and len(value) == 3
+        and not any(isinstance(part, list | tuple) for part in value)
+    ):
+        return [[part if row == column else 0.0 for column in range(3)] for row, part in enumerate(value)]
+    return value
+
+
 Vector = tuple[float, float, float]
 Matrix = tuple[Vector, Vector, Vector]
+# A list of numbers; a single one stands for a list of one.
+Numbers = Annotated[
+    tuple[float, ...], BeforeValidator(lambda value: value if isinstance(value, list | tuple) else [value])
+]
+# Rows of a matrix; a file may give three principal moments instead.
+Inertia = Annotated[Matrix, BeforeValidator(_diagonal)]
+METRES, RADIANS, RATIO = ({"unit": unit} for unit in ("m", "rad", "1"))
 WORLD = "world"
 ZERO: Vector = (0.0, 0.0, 0.0)
 Z: Vector = (0.0, 0.0, 1.0)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from proofroll.core.errors import InputError, require_known
+from proofroll.core.numbers import Unit
 from proofroll.elements.mechanism import checks, rotations
-from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector, Z
+from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Numbers, Vector, Z
 from proofroll.elements.mechanism.rotations import Array
 
 Kind = Literal["fixed", "revolute", "prismatic", "universal", "spherical", "planar", "free"]
@@ -65,6 +66,29 @@ LAWS: dict[str, tuple[str, ...]] = {
     "torque": ("revolute", "prismatic"),
     "armature": ("revolute", "prismatic"),
 }
+_LENGTHS, _SPEEDS = ("m", "m", "m"), ("m/s", "m/s", "m/s")
+_ABOUT: dict[str, dict[str, Unit]] = {
+    "q": {"spherical": "1", "planar": ("m", "m", "rad"), "free": (*_LENGTHS, "1", "1", "1", "1")},
+    "v": {
+        "spherical": "rad/s",
+        "planar": ("m/s", "m/s", "rad/s"),
+        "free": (*_SPEEDS, "rad/s", "rad/s", "rad/s"),
+    },
+    "damping": {"spherical": "N m s/rad"},
+}
+# Of what lies along a coordinate, by the kind of joint: about an axis, along one, otherwise.
+_UNITS: dict[str, dict[str, dict[str, Unit]]] = {
+    name: {"unit": {"revolute": turning, "universal": turning, "prismatic": sliding, **_ABOUT.get(name, {})}}
+    for name, turning, sliding in (
+        ("q", "rad", "m"),
+        ("coordinate", "rad", "m"),
+        ("v", "rad/s", "m/s"),
+        ("stiffness", "N m/rad", "N/m"),
+        ("damping", "N m s/rad", "N s/m"),
+        ("effort", "N m", "N"),
+        ("armature", "kg m^2", "kg"),
+    )
+}
 
 
 @dataclass(frozen=True)
@@ -86,83 +110,86 @@ class Joint:
     Attributes:
         name, kind: a unique name; one of :data:`FACTS`.
         parent, child: names of bodies; the parent may be ``world``.
-        position: of the joint in the parent's frame, m.
-        orientation: roll, pitch, yaw (fixed axes x, y, z) of the child's frame against the parent's at q = 0, rad.
+        position: of the joint in the parent's frame [m].
+        orientation: roll, pitch, yaw (fixed axes x, y, z) of the child's frame against the parent's at q = 0 [rad].
         axis: in the child's frame; of revolute, prismatic, universal and planar joints (the plane's normal).
         second_axis: in the child's frame, perpendicular to ``axis``: second axis of a universal joint, x of a planar
             one; None: any perpendicular (x of the child, where it can be).
-        child_position: of the joint in the child's frame, m.
+        child_position: of the joint in the child's frame [m].
         q0, v0: start; none given: zero.
-        stiffness, rest, damping: of a spring and damper along each coordinate, N m/rad or N/m (and ·s); rest is the
-            coordinate at which the spring is at rest.
-        friction: dry friction, N m or N.
-        torque: constant drive, N m or N.
-        armature: inertia of the drive, added to the coordinate's own, kg m² or kg.
+        stiffness, damping: of a spring and damper along each coordinate.
+        rest: coordinate at which the spring is at rest.
+        friction: dry friction.
+        torque: constant drive.
+        armature: inertia of the drive, added to the coordinate's own.
         limits: least and greatest coordinate of a revolute or prismatic joint, or None.
+        dependent: q0 and v0 are to be found from the loops, with q0 as a guess; no joint of a mechanism that has
+            started is.
     """
 
     name: str
     kind: Kind
     parent: str
     child: str
-    position: Vector = ZERO
-    orientation: Vector = ZERO
-    axis: Vector = Z
-    second_axis: Vector | None = None
-    child_position: Vector = ZERO
-    q0: tuple[float, ...] = ()
-    v0: tuple[float, ...] = ()
-    stiffness: float = 0.0
-    rest: float = 0.0
-    damping: float = 0.0
-    friction: float = 0.0
-    torque: float = 0.0
-    armature: float = 0.0
-    limits: tuple[float, float] | None = None
+    position: Vector = field(default=ZERO, metadata=METRES)
+    orientation: Vector = field(default=ZERO, metadata=RADIANS)
+    axis: Vector = field(default=Z, metadata=RATIO)
+    second_axis: Vector | None = field(default=None, metadata=RATIO)
+    child_position: Vector = field(default=ZERO, metadata=METRES)
+    q0: Numbers = field(default=(), metadata=_UNITS["q"])
+    v0: Numbers = field(default=(), metadata=_UNITS["v"])
+    stiffness: float = field(default=0.0, metadata=_UNITS["stiffness"])
+    rest: float = field(default=0.0, metadata=_UNITS["coordinate"])
+    damping: float = field(default=0.0, metadata=_UNITS["damping"])
+    friction: float = field(default=0.0, metadata=_UNITS["effort"])
+    torque: float = field(default=0.0, metadata=_UNITS["effort"])
+    armature: float = field(default=0.0, metadata=_UNITS["armature"])
+    limits: tuple[float, float] | None = field(default=None, metadata=_UNITS["coordinate"])
+    dependent: bool = False
 
     def __post_init__(self) -> None:
-        field = f"joints.{checks.name(self.name, 'joints')}"
-        require_known(f"{field}.kind", self.kind, FACTS)
+        place = f"joints.{checks.name(self.name, 'joints')}"
+        require_known(f"{place}.kind", self.kind, FACTS)
         if self.parent == self.child:
-            raise InputError(f"{field}.child", self.child, "a joint connects two bodies; parent and child are the same")
+            raise InputError(f"{place}.child", self.child, "a joint connects two bodies; parent and child are the same")
         if self.child == WORLD:
-            raise InputError(f"{field}.child", WORLD, "the world is nobody's child; exchange parent and child")
+            raise InputError(f"{place}.child", WORLD, "the world is nobody's child; exchange parent and child")
         for key in ("position", "orientation", "child_position"):
-            checks.assign(self, **{key: checks.vector(f"{field}.{key}", getattr(self, key))})
-        checks.assign(self, axis=checks.axis(f"{field}.axis", self.axis))
+            checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
+        checks.assign(self, axis=checks.axis(f"{place}.axis", self.axis))
         if self.kind not in WITH_AXIS and (self.axis != Z or self.second_axis is not None):
-            raise InputError(f"{field}.axis", self.axis, f"a {self.kind} joint has no axis; remove it")
+            raise InputError(f"{place}.axis", self.axis, f"a {self.kind} joint has no axis; remove it")
         if self.second_axis is not None:
-            second = checks.axis(f"{field}.second_axis", self.second_axis)
+            second = checks.axis(f"{place}.second_axis", self.second_axis)
             if abs(np.dot(second, self.axis)) > 1e-9:
-                raise InputError(f"{field}.second_axis", self.second_axis, "must be perpendicular to axis")
+                raise InputError(f"{place}.second_axis", self.second_axis, "must be perpendicular to axis")
             checks.assign(self, second_axis=second)
-        self._check_start(field)
+        self._check_start(place)
         for key, kinds in LAWS.items():
             least = None if key in {"rest", "torque"} else 0.0
-            value = checks.number(f"{field}.{key}", getattr(self, key), at_least=least)
+            value = checks.number(f"{place}.{key}", getattr(self, key), at_least=least)
             if value and self.kind not in kinds:
-                raise InputError(f"{field}.{key}", value, f"a {self.kind} joint has none; it is for {', '.join(kinds)}")
+                raise InputError(f"{place}.{key}", value, f"a {self.kind} joint has none; it is for {', '.join(kinds)}")
             checks.assign(self, **{key: value})
         if self.limits is not None:
-            low, high = checks.numbers(f"{field}.limits", self.limits, 2)
+            low, high = checks.numbers(f"{place}.limits", self.limits, 2)
             if self.nq != 1 or low >= high:
                 raise InputError(
-                    f"{field}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
+                    f"{place}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
                 )
             checks.assign(self, limits=(low, high))
 
-    def _check_start(self, field: str) -> None:
+    def _check_start(self, place: str) -> None:
         zero = [0.0] * self.nq
         if self.kind in WITH_QUATERNION:
             zero[-4] = 1.0
-        q0 = list(checks.numbers(f"{field}.q0", zero if _none(self.q0) else self.q0, self.nq))
+        q0 = list(checks.numbers(f"{place}.q0", zero if _none(self.q0) else self.q0, self.nq))
         if self.kind in WITH_QUATERNION:
             length = float(np.linalg.norm(q0[-4:]))
             if length == 0.0:
-                raise InputError(f"{field}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
+                raise InputError(f"{place}.q0", self.q0, "a quaternion of length zero is no rotation; give a unit one")
             q0[-4:] = [component / length for component in q0[-4:]]
-        v0 = checks.numbers(f"{field}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
+        v0 = checks.numbers(f"{place}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
         checks.assign(self, q0=tuple(q0), v0=v0)
 
     @property

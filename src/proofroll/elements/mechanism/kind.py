@@ -9,8 +9,9 @@ from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
 from proofroll.core.scene import Scene
+from proofroll.core.validation import all_units_of
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.reader import made_mechanism
+from proofroll.elements.mechanism.reader import KINDS, made_mechanism
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
@@ -21,30 +22,19 @@ class MechanismKind:
 
     name: ClassVar[str] = "mechanism"
     tables: ClassVar[tuple[str, ...]] = (
-        "bodies",
-        "joints",
-        "loops",
-        "springs",
-        "points",
+        *KINDS,
         "repeat",
         "published",
         "unmodelled",
     )
-    units: ClassVar[Mapping[str, str]] = {
-        "inertia": "kg m^2",
-        "stiffness": "N/m",
-        "torsional stiffness": "N m/rad",
-        "damping": "N s/m",
-        "torsional damping": "N m s/rad",
-        "torque": "N m",
-    }
+    units: ClassVar[Mapping[str, str]] = all_units_of(*KINDS.values())
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[MechanismElement]:
         """All bodies, joints, loops and springs of a file are one mechanism."""
         x, y, z = gravity.vector.tolist()
         try:
-            return [MechanismElement(made_mechanism(tables, (x, y, z), numbers.values))]
+            return [MechanismElement(made_mechanism(tables, (x, y, z), numbers))]
         except InputError as error:
             raise InputError(f"{where}: {error.field}", error.value, error.advice) from None
 

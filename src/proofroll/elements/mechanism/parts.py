@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
-from proofroll.elements.mechanism.checks import WORLD, ZERO, Matrix, Vector, Z
+from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Inertia, Vector, Z
 from proofroll.elements.mechanism.joint import FACTS, Kind
 from proofroll.elements.mechanism.rotations import Array
 
@@ -20,24 +20,24 @@ class Body:
 
     Attributes:
         name: unique in the mechanism.
-        mass: kg.
-        com: centre of mass in the body's frame, m.
-        inertia: 3×3 about the centre of mass, in the body's axes, kg m²; may be given as three principal moments.
+        mass: of the body [kg].
+        com: centre of mass in the body's frame [m].
+        inertia: 3×3 about the centre of mass, in the body's axes [kg m²]; may be given as three principal moments.
     """
 
     name: str
-    mass: float
-    com: Vector = ZERO
-    inertia: Matrix = (ZERO, ZERO, ZERO)
+    mass: float = field(metadata={"unit": "kg"})
+    com: Vector = field(default=ZERO, metadata=METRES)
+    inertia: Inertia = field(default=(ZERO, ZERO, ZERO), metadata={"unit": "kg m^2"})
 
     def __post_init__(self) -> None:
-        field = f"bodies.{checks.name(self.name, 'bodies')}"
+        place = f"bodies.{checks.name(self.name, 'bodies')}"
         if self.name == WORLD:
             raise InputError("bodies.name", WORLD, "this name means the world; choose another")
-        inertia = checks.inertia(f"{field}.inertia", self.inertia)
-        if checks.number(f"{field}.mass", self.mass, at_least=0) == 0 and np.any(inertia):
-            raise InputError(f"{field}.inertia", self.inertia, "a body without mass has no inertia; give it a mass")
-        checks.assign(self, mass=float(self.mass), com=checks.vector(f"{field}.com", self.com), inertia=inertia)
+        inertia = checks.inertia(f"{place}.inertia", self.inertia)
+        if checks.number(f"{place}.mass", self.mass, at_least=0) == 0 and np.any(inertia):
+            raise InputError(f"{place}.inertia", self.inertia, "a body without mass has no inertia; give it a mass")
+        checks.assign(self, mass=float(self.mass), com=checks.vector(f"{place}.com", self.com), inertia=inertia)
 
 
 @dataclass(frozen=True)
@@ -49,33 +49,33 @@ class Loop:
     Attributes:
         name, kind: as for joints; any kind but free.
         body_a, body_b: names of bodies, or ``world``.
-        position_a, position_b: the point of each body that the loop holds together, in its frame, m.
+        position_a, position_b: the point of each body that the loop holds together, in its frame [m].
         axis_a, axis_b: axis in the frame of each body; revolute, planar: parallel; universal: perpendicular;
             prismatic: ``axis_a`` alone.
-        orientation: roll, pitch, yaw of body_b's frame against body_a's, held by fixed and prismatic loops, rad.
+        orientation: roll, pitch, yaw of body_b's frame against body_a's, held by fixed and prismatic loops [rad].
     """
 
     name: str
     kind: Kind
     body_a: str
     body_b: str
-    position_a: Vector = ZERO
-    position_b: Vector = ZERO
-    axis_a: Vector = Z
-    axis_b: Vector = Z
-    orientation: Vector = ZERO
+    position_a: Vector = field(default=ZERO, metadata=METRES)
+    position_b: Vector = field(default=ZERO, metadata=METRES)
+    axis_a: Vector = field(default=Z, metadata=RATIO)
+    axis_b: Vector = field(default=Z, metadata=RATIO)
+    orientation: Vector = field(default=ZERO, metadata=RADIANS)
 
     def __post_init__(self) -> None:
-        field = f"loops.{checks.name(self.name, 'loops')}"
-        require_known(f"{field}.kind", self.kind, FACTS)
+        place = f"loops.{checks.name(self.name, 'loops')}"
+        require_known(f"{place}.kind", self.kind, FACTS)
         if self.kind == "free":
-            raise InputError(f"{field}.kind", self.kind, "a free loop holds nothing; remove it")
+            raise InputError(f"{place}.kind", self.kind, "a free loop holds nothing; remove it")
         if self.body_a == self.body_b:
-            raise InputError(f"{field}.body_b", self.body_b, "a loop connects two bodies; these are the same")
+            raise InputError(f"{place}.body_b", self.body_b, "a loop connects two bodies; these are the same")
         for key in ("position_a", "position_b", "orientation"):
-            checks.assign(self, **{key: checks.vector(f"{field}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
         for key in ("axis_a", "axis_b"):
-            checks.assign(self, **{key: checks.axis(f"{field}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.axis(f"{place}.{key}", getattr(self, key))})
 
     @cached_property
     def frame_a(self) -> Array:
@@ -100,27 +100,29 @@ class Spring:
     Attributes:
         name: unique among springs.
         body_a, body_b: names of bodies, or ``world``.
-        position_a, position_b: its ends in the frame of each body, m.
-        stiffness, damping, length: N/m, N s/m, free length in m.
+        position_a, position_b: its ends in the frame of each body [m].
+        stiffness: of the pull along the line [N/m].
+        damping: of the pull along the line [N s/m].
+        length: at which the spring is free [m].
     """
 
     name: str
     body_a: str
     body_b: str
-    position_a: Vector = ZERO
-    position_b: Vector = ZERO
-    stiffness: float = 0.0
-    damping: float = 0.0
-    length: float = 0.0
+    position_a: Vector = field(default=ZERO, metadata=METRES)
+    position_b: Vector = field(default=ZERO, metadata=METRES)
+    stiffness: float = field(default=0.0, metadata={"unit": "N/m"})
+    damping: float = field(default=0.0, metadata={"unit": "N s/m"})
+    length: float = field(default=0.0, metadata=METRES)
 
     def __post_init__(self) -> None:
-        field = f"springs.{checks.name(self.name, 'springs')}"
+        place = f"springs.{checks.name(self.name, 'springs')}"
         if self.body_a == self.body_b:
-            raise InputError(f"{field}.body_b", self.body_b, "a spring connects two bodies; these are the same")
+            raise InputError(f"{place}.body_b", self.body_b, "a spring connects two bodies; these are the same")
         for key in ("position_a", "position_b"):
-            checks.assign(self, **{key: checks.vector(f"{field}.{key}", getattr(self, key))})
+            checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
         for key in ("stiffness", "damping", "length"):
-            checks.assign(self, **{key: checks.number(f"{field}.{key}", getattr(self, key), at_least=0)})
+            checks.assign(self, **{key: checks.number(f"{place}.{key}", getattr(self, key), at_least=0)})
 
 
 @dataclass(frozen=True)
@@ -130,13 +132,13 @@ class Point:
     Attributes:
         name: unique among points.
         body: name of its body, or ``world``.
-        position: in the body's frame, m.
+        position: in the body's frame [m].
     """
 
     name: str
     body: str
-    position: Vector = ZERO
+    position: Vector = field(default=ZERO, metadata=METRES)
 
     def __post_init__(self) -> None:
-        field = f"points.{checks.name(self.name, 'points')}"
-        checks.assign(self, position=checks.vector(f"{field}.position", self.position))
+        place = f"points.{checks.name(self.name, 'points')}"
+        checks.assign(self, position=checks.vector(f"{place}.position", self.position))

@@ -8,6 +8,7 @@ from proofroll.elements.mechanism.analysis import analysed
 from proofroll.files.scene_file import load_scene
 
 LENGTH = 'unit = "m"\nsource = "this test"'
+MASS = 'unit = "kg"\nsource = "this test"'
 SLIDER_CRANK = f"""
 [parameters.crank]
 value = 0.15
@@ -20,19 +21,27 @@ value = 0.4
 meaning = "rod"
 above = 0
 {LENGTH}
+[parameters.crank_mass]
+value = 0.4
+meaning = "mass of the crank"
+{MASS}
+[parameters.rod_mass]
+value = 0.8
+meaning = "mass of the rod"
+{MASS}
 [gravity]
 magnitude = 9.81
 direction = [0, -1, 0]
 [[bodies]]
 name = "crank"
-mass = 0.4
+mass = "$crank_mass"
 com = ["= crank/2", 0, 0]
-inertia = [1e-4, "= 0.4*crank^2/12", "= 0.4*crank^2/12"]
+inertia = [1e-4, "= crank_mass*crank^2/12", "= crank_mass*crank^2/12"]
 [[bodies]]
 name = "rod"
-mass = 0.8
+mass = "$rod_mass"
 com = ["= rod/2", 0, 0]
-inertia = [1e-4, "= 0.8*rod^2/12", "= 0.8*rod^2/12"]
+inertia = [1e-4, "= rod_mass*rod^2/12", "= rod_mass*rod^2/12"]
 [[bodies]]
 name = "slider"
 mass = 0.6
@@ -92,6 +101,12 @@ def test_dependent_joints_follow_from_the_loops(read):
         assert joints["guide"].v0[0] == pytest.approx(speed, abs=1e-13)
 
 
+def test_a_bare_number_takes_the_unit_of_what_it_is_added_to(read):
+    """A formula may add a number to a length; one of plain numbers alone stands for a number."""
+    for formula in ("= crank/2 + 0.025", "= 0.1 - 0.025 + 2*crank - 1*crank - 0.125", "= 0.2/2"):
+        assert read(SLIDER_CRANK.replace("= crank/2", formula)).bodies[0].com[0] == pytest.approx(0.1, abs=1e-15)
+
+
 def test_joints_are_sorted_depth_first(read):
     """Each joint comes after its parent's and before any other branch, whatever the file's order."""
     assert [joint.name for joint in read().joints] == ["guide", "shaft", "pin"]
@@ -112,13 +127,18 @@ def test_repeat_writes_tables_with_an_index(read):
     unit = "1"
     meaning = "number of links"
     source = "this test"
+    [parameters.w]
+    value = 1
+    unit = "m"
+    meaning = "length"
+    source = "this test"
     [gravity]
     magnitude = 1
     [[repeat]]
     from = 1
     count = "$n"
     bodies = [{name = "link{i}", mass = "= i", inertia = [1, 1, 1]}]
-    joints = [{name = "j{i}", kind = "revolute", parent = "link{i-1}", child = "link{i}", position = ["= i/n", 0, 0]}]
+    joints = [{name = "j{i}", kind = "revolute", parent = "link{i-1}", child = "link{i}", position = ["= i/n*w", 0, 0]}]
     [[bodies]]
     name = "link0"
     mass = 1
@@ -206,17 +226,41 @@ BAD = {
         SLIDER_CRANK.split("[[bodies]]", maxsplit=1)[0] + ROD + joint("world", "extra", more="dependent = true"),
         "joints.extra.dependent.*no loop that it could follow from",
     ),
+    "parameter of another unit": (
+        SLIDER_CRANK.replace('mass = "$rod_mass"', 'mass = "$rod"'),
+        "bodies.1.mass = '.rod': this number is in kg, that parameter in m",
+    ),
+    "parameter of the other kind of joint": (
+        SLIDER_CRANK.replace("v0 = 10", 'v0 = 10\nstiffness = "$rod"'),
+        "joints.2.stiffness = '.rod': this number is in N m/rad, that parameter in m",
+    ),
+    "formula of another unit": (
+        SLIDER_CRANK.replace("= crank/2", "= crank^2/2"),
+        r"bodies.0.com.0 = ' crank\^2/2': this number is in m, the formula gives m\^2",
+    ),
+    "formula with a factor that hides a unit": (
+        SLIDER_CRANK.replace("= rod_mass*rod^2/12", "= 0.8*rod^2/12"),
+        r"bodies.1.inertia.1 = .*in kg m\^2, the formula gives m\^2; .* make a parameter",
+    ),
+    "sum of different units": (SLIDER_CRANK.replace("= crank/2", "= crank + rod_mass"), "m and kg cannot be added"),
+    "power with a unit": (SLIDER_CRANK.replace("= crank/2", "= rod^crank"), "a power must be a plain number"),
     "division by zero": (SLIDER_CRANK.replace("= crank/2", "= crank/0"), "bodies.0.com.0 = .* divides by zero"),
     "function call": (SLIDER_CRANK.replace("= crank/2", "= sin(crank)"), "Function 'sin' not defined"),
     "hostile expression": (SLIDER_CRANK.replace("= crank/2", "= __import__('os').getcwd()"), "bodies.0.com.0"),
     "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*Attribute"),
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
     "complex": (SLIDER_CRANK.replace("= crank/2", "= (0-1)^0.5"), "no finite real number"),
-    "text": (SLIDER_CRANK.replace("mass = 0.6", 'mass = "heavy"'), "bodies.slider.mass.*give one number"),
-    "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), "joints.guide.q0.*give one number"),
-    "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.slider.inertia.*finite"),
+    "text": (
+        SLIDER_CRANK.replace("mass = 0.6", 'mass = "heavy"'),
+        "bodies.2.mass = 'heavy': this is not a number; give one in kg",
+    ),
+    "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), r"joints.0.q0.1 = \[2\]: give a number"),
+    "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.2.inertia.0.*give a number"),
     "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),
-    "bool": (SLIDER_CRANK.replace("mass = 0.6", "mass = true"), "bodies.slider.mass.*give one number"),
+    "bool": (
+        SLIDER_CRANK.replace("mass = 0.6", "mass = true"),
+        "bodies.2.mass = True: this is not a number; give one in kg",
+    ),
     "unknown key": (
         SLIDER_CRANK.replace("mass = 0.6", "mass = 0.6\ncolour = 3"),
         "bodies.2.colour.*no such key here; the keys are name, mass",
@@ -227,7 +271,10 @@ BAD = {
     ),
     "missing key": (SLIDER_CRANK.replace("mass = 0.6\n", ""), "bodies.2.mass.*required"),
     "unknown parameter": (SLIDER_CRANK.replace("$crank", "$lenght"), "no such parameter; choose from crank, rod"),
-    "unknown kind": (SLIDER_CRANK.replace('"prismatic"', '"slider"'), "joints.guide.kind.*choose one of fixed"),
+    "unknown kind": (
+        SLIDER_CRANK.replace('"prismatic"', '"slider"'),
+        "joints.0.kind = 'slider': it must be 'fixed', 'revolute'",
+    ),
     "name used twice": (SLIDER_CRANK.replace('"wrist"', '"pin"'), "used twice"),
     "out of bounds": (
         SLIDER_CRANK.replace("value = 0.15", "value = 0.5"),

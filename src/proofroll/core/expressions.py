@@ -1,0 +1,67 @@
+"""Formulas in a scene file: ``"= mass*length^2/12"`` and, in names that repeat, ``"rod{i+1}"``."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Mapping
+
+from simpleeval import InvalidExpression, SimpleEval
+
+from proofroll.core.errors import InputError
+from proofroll.core.quantity import Quantity, UnitsDiffer, powers_of
+
+_OPERATORS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: lambda base, power: Quantity(base) ** power if not isinstance(base, Quantity) else base**power,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_LONGEST = 500  # characters: what a person writes is far shorter, and nesting stays shallow enough to be parsed
+
+
+def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = "") -> float:
+    """The number of an expression of parameters with + - * / ^ ** ( ) and ``pi``; it cannot call functions.
+
+    Args:
+        field: where it stands, for the message.
+        text: the expression.
+        names: the parameters, with their units.
+        unit: that its result must have, as scene files write it; "": not checked. A formula of plain numbers alone is
+            a plain number, as one that stands there itself.
+
+    Raises:
+        InputError: it cannot be read, names an unknown parameter, calls a function, divides by zero, overflows, adds
+            what has different units, or its result has another unit.
+    """
+    if len(text) > _LONGEST:
+        raise InputError(field, text, f"an expression may have at most {_LONGEST} characters")
+    known = {"pi": Quantity(math.pi), **names}
+    evaluator = SimpleEval(operators=_OPERATORS, functions={}, names=known)
+    del evaluator.nodes[ast.Attribute]
+    try:
+        found = Quantity(0.0) + evaluator.eval(text.replace("^", "**").strip())
+        number = float(found.value)
+    except ZeroDivisionError:
+        raise InputError(field, text, "divides by zero; change the expression or its parameters") from None
+    except UnitsDiffer as error:
+        raise InputError(field, text, f"{error}; change the formula, or the unit of a parameter in it") from None
+    except InvalidExpression as error:
+        problem = str(error).splitlines()[0].rstrip(".")
+        raise InputError(field, text, f"{problem}; use + - * / ^ and {_list(known)}") from None
+    except (SyntaxError, TypeError, ValueError, OverflowError, RecursionError, MemoryError, KeyError):
+        raise InputError(field, text, f"is no finite real number; use + - * / ^ and {_list(known)}") from None
+    if not math.isfinite(number):
+        raise InputError(field, text, "is not finite; change the expression or its parameters")
+    if unit and found.powers is not None and found.powers != powers_of(unit):
+        advice = f"this number is in {unit}, the formula gives {found.unit}; a bare number in a product has no unit"
+        raise InputError(field, text, f"{advice}: make a parameter of what has one")
+    return number
+
+
+def _list(names: Mapping[str, Quantity]) -> str:
+    return ", ".join(names) or "no parameter"
