@@ -267,6 +267,13 @@ class Row(Breaking, breaks="samples_are_well_formed"):
         return BallSample(right.p_WB[None], right.v_WB, right.w_WB)
 
 
+class Stretched(Breaking, breaks="samples_are_well_formed"):
+    """Gives quaternions that grow longer on the way."""
+
+    def _told(self, right: BallSample) -> BallSample:
+        return dataclasses.replace(right, q_WB=np.array([1.01 if self.t else 1.0, 0, 0, 0]))
+
+
 class Hushed(Breaking, breaks="samples_are_well_formed"):
     """Gives a force at time 0, and none later."""
 

@@ -72,6 +72,17 @@ def test_an_order_that_was_not_declared() -> None:
     assert rough.values is scattered[-1]
 
 
+def test_changes_of_two_shapes_are_not_extrapolated() -> None:
+    """Changes that fall as those of an order do, but not along one curve, are no order: the finest curve is kept."""
+    fine = LIMIT + 1e-3 * np.cos(T)
+    middle = fine + 1e-3 * np.sin(9 * T)
+    coarse = middle + 4e-3 * np.max(np.abs(np.sin(9 * T))) * np.cos(5 * T)
+    found = richardson([coarse, middle, fine], (4, 2, 1), 4)
+    assert found.order == pytest.approx(2, abs=1e-9)
+    assert found.values is fine
+    assert found.error_bar >= 1e-3
+
+
 def test_a_limit_that_is_not_the_truth_stays_wrong() -> None:
     """Extrapolation finds the limit of the curves, whatever the truth is."""
     found = richardson([curve(h, 2) + 0.01 for h in (0.04, 0.02, 0.01)], (4, 2, 1))
