@@ -120,6 +120,7 @@ class Worker:
             WorkerDied: the process crashed, took longer than ``time_limit`` [s], in which time that others had the
                 processor does not count, or needed too much memory.
         """
+        self._forget_words()
         self._asked += 1
         try:
             assert self._process.stdin is not None  # it was opened with a pipe
@@ -200,6 +201,14 @@ class Worker:
                 if not heard:
                     self._open.remove(self._words)
         return ready
+
+    def _forget_words(self) -> None:
+        """Drops what was printed for an earlier request: it explains no end in this one."""
+        if self._asked and not self._ended():
+            for _ in range(_DRAUGHTS):
+                if self._words not in self._listen(0):
+                    break
+            self._said = b""
 
     def _ended(self) -> bool:
         """Whether the process has ended. It is not reaped yet, so that its group cannot become somebody else's."""

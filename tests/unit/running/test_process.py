@@ -89,6 +89,21 @@ def test_an_answer_belongs_to_its_question(pretend: Pretend) -> None:
             worker.ask({"do": "nothing"}, 60)
 
 
+def test_last_words_are_of_the_request_that_failed(pretend: Pretend) -> None:
+    """A crash without a word is not explained by what the process had printed for an earlier request."""
+    pretend("""
+        print("all is well so far", file=sys.stderr, flush=True)
+        answer(b'{"number": 1}\\n')
+        sys.stdin.readline()
+        os._exit(3)
+    """)
+    with Worker() as worker:
+        assert worker.ask({"do": "nothing"}, 60) == {}
+        with pytest.raises(WorkerDied) as found:
+            worker.ask({"do": "nothing"}, 60)
+    assert str(found.value) == "the engine's process ended with exit code 3"
+
+
 def test_a_child_that_keeps_the_pipes_open(pretend: Pretend) -> None:
     """A worker that has ended is noticed although its child holds its pipes, and the child ends with it."""
     pretend("""
@@ -141,8 +156,18 @@ def test_a_flood_does_not_outlast_the_limit(pretend: Pretend) -> None:
 
 def test_too_much_memory(pretend: Pretend) -> None:
     """A worker whose memory grows is ended, and the sentence says how much it was allowed."""
-    pretend("hoard = []\nwhile True:\n    hoard.append(b'x' * 10_000_000)\n    time.sleep(0.01)")
-    assert str(died(memory=0.2)) == "needed more than 0.2 GB of memory and was ended; PROOFROLL_MEMORY allows more"
+    pretend("""
+        hoard = []
+        for _ in range(40):  # 0.4 GB, and no more where nobody watches
+            hoard.append(b'x' * 10_000_000)
+            time.sleep(0.01)
+        time.sleep(60)
+        answer(b'{"number": 1}\\n')
+    """)
+    assert (
+        str(died(time_limit=300, memory=0.2))
+        == "needed more than 0.2 GB of memory and was ended; PROOFROLL_MEMORY allows more"
+    )
 
 
 def test_address_space_is_not_memory(pretend: Pretend) -> None:
