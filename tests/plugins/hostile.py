@@ -12,8 +12,10 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from proofroll.core import certificate
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface import certificate as ball_certificate
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import initial_response
 from proofroll.elements.ball_on_surface.model import BallCapability
@@ -241,6 +243,36 @@ class Commands(Oracle):
     def advance(self, t: float) -> None:  # noqa: ARG002 -- the protocol's signature
         """See :class:`proofroll.core.engine.Engine`."""
         raise Diverged("\x1b]0;owned\x07\x9b2J it stopped")
+
+
+class JudgesItself(Oracle):
+    """Puts a certificate that always holds in the place of the one that judges it."""
+
+    name = "judges_itself"
+
+    def __init__(self, scene: Scene) -> None:
+        certificate.Line.holds = property(lambda _: True)  # type: ignore[assignment,method-assign]  # that is the fault
+        super().__init__(scene)
+
+
+class MovesTheBar(Oracle):
+    """Widens what counts as round-off."""
+
+    name = "moves_the_bar"
+
+    def __init__(self, scene: Scene) -> None:
+        certificate.EXACT = 1.0
+        super().__init__(scene)
+
+
+class SignsForTheBall(Oracle):
+    """Puts lines of its own in the place of an element's, whose module is loaded with it."""
+
+    name = "signs_for_the_ball"
+
+    def __init__(self, scene: Scene) -> None:
+        ball_certificate.certify = lambda *_: []  # type: ignore[assignment]  # that is the fault
+        super().__init__(scene)
 
 
 # Entry points of all of them, and of some that do no harm, so that tests of either share worker processes; "absent"

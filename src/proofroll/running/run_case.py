@@ -13,6 +13,7 @@ from typing import Any
 from proofroll.core.errors import Diverged, ProofrollError, Refused, lack_behind
 from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
+from proofroll.running.integrity import changed
 from proofroll.running.manifest import manifest
 from proofroll.running.manifest import versions as made_with
 from proofroll.running.time_case import clean_runs
@@ -20,15 +21,28 @@ from proofroll.running.time_case import clean_runs
 
 def run(case: dict[str, Any], out: str) -> dict[str, Any]:
     """Runs a case and writes its trajectory to ``out``; everything the case says comes back as a result."""
-    spent = _TimeAccounts()
+    spent, wanted = _TimeAccounts(), Case.from_dict(case)
     gc.freeze()  # what there is by now are modules: to look at each of them after the case costs as much as a short one
     try:
-        answer = dataclasses.asdict(_run(Case.from_dict(case), Path(out), spent)) | {"interpreter": sys.executable}
+        answer = dataclasses.asdict(_run(wanted, Path(out), spent)) | {"interpreter": sys.executable}
+        _require_untouched(wanted.engine.name)
     finally:
         gc.collect()  # the next case of this process starts clean,
         gc.freeze()  # and need not look again at what stays: the modules
     spent.on("clean-up")
     return answer | {"spent": spent.seconds, "processor": spent.processor}
+
+
+def _require_untouched(engine: str) -> None:
+    """Looks whether what judges engines is what it was; an error ends the process, so that no other row is judged so.
+
+    Raises:
+        ProofrollError: the engine has put something else in its place.
+    """
+    from proofroll.running.loading import load
+
+    if engine != "truth" and (name := changed(load(engine))):
+        raise ProofrollError(f"{engine} changed {name} in its process, so nothing that was found there is believed")
 
 
 def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:

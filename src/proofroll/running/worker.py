@@ -20,6 +20,7 @@ from proofroll.running.case import Case
 from proofroll.running.ending import end_with, end_with_pipe
 from proofroll.running.handshake import hello
 from proofroll.running.identity import describe, resolve
+from proofroll.running.integrity import watch
 from proofroll.running.memory import volunteer
 from proofroll.running.run_case import run
 from proofroll.running.time_case import time_once
@@ -32,6 +33,7 @@ def main(answers: int, parent: int, life: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # an engine that catches it would take it for its own failure
     volunteer()
     gc.disable()  # until the engine is loaded: modules leave nothing to collect, and to look costs a tenth of the start
+    watch()
     requests = os.fdopen(os.dup(0), encoding="utf-8")
     with open(os.devnull, "rb") as nothing:
         os.dup2(nothing.fileno(), 0)  # an engine that asks its user something must not read the next request

@@ -21,6 +21,7 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner, run_one
 from proofroll.running.store import Store
+from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import single_case
 
 MakeCase = Callable[..., Case]
@@ -41,6 +42,12 @@ OUTCOMES = {
     "refuses": (Status.REFUSED, "no wheel, no ball"),
     "absent": (Status.MISSING, "absent is not installed here"),
     "misspelt": (Status.CRASHED, "NoSuchClass"),
+    "judges_itself": (Status.CRASHED, "changed proofroll.core.certificate.Line.holds in its process"),
+    "moves_the_bar": (Status.CRASHED, "changed proofroll.core.certificate.EXACT in its process"),
+    "signs_for_the_ball": (
+        Status.CRASHED,
+        "changed proofroll.elements.ball_on_surface.certificate.certify in its process",
+    ),
 }
 
 
@@ -163,6 +170,7 @@ from pathlib import Path
 from proofroll.running.case import Case
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll.running.worker_pool import Workers
 
 store, cases = Store(Path(sys.argv[1])), [Case.from_dict(content) for content in json.loads(sys.argv[2])]
 first = Runner(store, jobs=1).run(cases)
@@ -278,3 +286,17 @@ def test_code_hash_follows_the_adapter(tmp_path: Path, monkeypatch: pytest.Monke
         assert isinstance(facts, EngineFacts)
         hashes.append(facts.code)
     assert hashes[0] != hashes[1]
+
+
+def test_what_an_engine_does_to_its_judge_reaches_no_other_row(tmp_path: Path, make_case: MakeCase) -> None:
+    """A row whose engine changed what judges it is not believed, and its process judges no further one."""
+    bent, honest = make_case("judges_itself"), make_case("oracle")
+    workers = Workers()
+    with workers.lend("oracle") as worker:
+        first = worker._process.pid
+    workers.rename("oracle", "judges_itself")  # they may serve one distribution
+    results = Runner(Store(tmp_path), jobs=1, workers=workers).run([bent, honest])
+    assert [results[case.key].status for case in (bent, honest)] == [Status.CRASHED, Status.DONE]
+    with workers.lend("oracle") as worker:
+        assert worker._process.pid != first
+    workers.close()

@@ -1,0 +1,65 @@
+"""What in a worker's process judges engines: whether an engine has put something of its own there."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Iterator
+from types import FunctionType, ModuleType
+from typing import Any
+
+from proofroll.core.source_code import OWN
+
+# What reads scenes, certifies and records; none of it has a reason to change while a process lives.
+_JUDGING = tuple(f"proofroll.{folder}." for folder in ("core", "elements", "files", "running"))
+# Loaded by the first case otherwise, when an engine's package may have been at work already.
+_EARLY = ("core.first_steps", "core.dataset", "running.recording", "files.scene_file")
+
+_watched: dict[str, tuple[Any, ...]] = {}
+
+
+def watch() -> None:
+    """Remembers what judges engines in this process, before any is loaded."""
+    for name in _EARLY:
+        importlib.import_module(f"proofroll.{name}")
+    _watched.update(_held())
+
+
+def changed(kind: Any) -> str | None:
+    """The first name in what judges that is another one than before, or of the package of an engine; None: none is.
+
+    Modules that were loaded since :func:`watch` are held against it from now on. Nothing where it was never called.
+    """
+    if not _watched:
+        return None
+    now, package = _held(), kind.__module__.partition(".")[0]
+    for name, found in now.items():
+        before = _watched.setdefault(name, found)
+        if any(one is not other for one, other in zip(before, found, strict=True)):
+            return name
+        if package != OWN.name and str(getattr(found[0], "__module__", "")).partition(".")[0] == package:
+            return name
+    return None
+
+
+def _held() -> dict[str, tuple[Any, ...]]:
+    """Functions, classes, what these have, and constants of all modules that judge, by their full names."""
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith(_JUDGING)]
+    return {name: found for module in modules for name, found in _of_module(module)}
+
+
+def _of_module(module: ModuleType) -> Iterator[tuple[str, tuple[Any, ...]]]:
+    for name, value in list(vars(module).items()):
+        if callable(value) or name.isupper():
+            yield f"{module.__name__}.{name}", _identity(value)
+        if isinstance(value, type) and value.__module__ == module.__name__:
+            for inner, part in list(vars(value).items()):
+                if callable(part) or isinstance(part, (property, classmethod, staticmethod)):
+                    yield f"{module.__name__}.{name}.{inner}", _identity(part)
+
+
+def _identity(value: Any) -> tuple[Any, ...]:
+    """The object itself and, of a function, what it runs."""
+    if isinstance(value, FunctionType):
+        return value, value.__code__, value.__defaults__, value.__kwdefaults__
+    return (value,)
