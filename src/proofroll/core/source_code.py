@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import hashlib
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +28,45 @@ def package_of(kind: type) -> Path | None:
 def code_of(item: Any) -> list[str]:
     """Hash of each package, other than this one, whose dataclasses ``item`` holds at any depth."""
     places = {package_of(kind) for kind in set(_kinds(item))}
-    return sorted(hash_of([place]) for place in places - {None, OWN} if place is not None)
+    return sorted(hash_of(with_imports(place)) for place in places - {None, OWN} if place is not None)
+
+
+def with_imports(place: Path) -> list[Path]:
+    """A module or package of others and, at any depth, the modules and packages that it imports, sorted.
+
+    Python's own modules, this package, and other packages that are installed are left out.
+    """
+    found, waiting = set[Path](), [place]
+    while waiting:
+        found.add(here := waiting.pop())
+        files = here.rglob("*.py") if here.is_dir() else [here]
+        names = {name for file in files for name in _imported(file)} - sys.stdlib_module_names
+        waiting += {source for name in names if (source := _source(name)) is not None} - found - {OWN}
+    return sorted(found)
+
+
+def _imported(file: Path) -> Iterator[str]:
+    """Names of the outermost packages or modules that a file imports, also inside functions."""
+    for node in ast.walk(ast.parse(file.read_bytes())):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module]
+        yield from (name.partition(".")[0] for name in names)
+
+
+def _source(name: str) -> Path | None:
+    """File of a module, or folder of a package that is not installed; None: there is none."""
+    try:
+        spec = find_spec(name)
+    except (ImportError, ValueError):  # a module that was made without a file
+        return None
+    if spec is None or not (spec.origin or "").endswith(".py"):
+        return None
+    file = Path(str(spec.origin)).resolve()
+    installed = {"site-packages", "dist-packages"} & set(file.parts)
+    if file.name != "__init__.py":
+        return file
+    return None if installed else file.parent
 
 
 def _kinds(item: Any) -> Iterator[type]:

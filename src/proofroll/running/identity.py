@@ -13,7 +13,7 @@ from typing import Any
 
 import proofroll
 from proofroll.core.errors import InputError
-from proofroll.core.source_code import OWN, hash_of, package_of
+from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
 from proofroll.running.case import EngineDescription, EngineFacts
@@ -69,7 +69,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
-        code = digest(sorted({_of(truth) for truth in load_truths()}))
+        code = digest(sorted({place for truth in load_truths() for place in _of(truth)}))
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats
     from proofroll.core.plugins import resolve_settings
@@ -81,7 +81,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     facts = EngineFacts(
         name=engine,
         version=kind.version(),
-        code=digest([_of(kind)]),
+        code=digest(_of(kind)),
         settings=dataclasses.asdict(settings),
         resolution=settings.resolution,
         order=settings.order,
@@ -110,10 +110,10 @@ def digest(sources: Iterable[Path]) -> str:
     return hash_of([*(OWN / name for name in FOUNDATION), *sources], ASIDE)
 
 
-def _of(kind: Any) -> Path:
-    """The code of an engine or a truth: of this package its own folder or module, of another one all that it has."""
+def _of(kind: Any) -> list[Path]:
+    """The code of an engine or a truth: of this package its own folder or module, else all of it and its imports."""
     if (whole := package_of(kind)) != OWN:
-        return whole or Path(inspect.getfile(kind))
+        return with_imports(whole or Path(inspect.getfile(kind)))
     _, *inside = kind.__module__.split(".")
     place = OWN.joinpath(*inside[: 1 if inside[0] == "truth" else 2])
-    return place if place.is_dir() else place.with_suffix(".py")
+    return [place if place.is_dir() else place.with_suffix(".py")]

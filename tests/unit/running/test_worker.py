@@ -117,6 +117,34 @@ def test_all_of_an_engines_package_decides_its_key(tmp_path: Path, monkeypatch: 
     assert identity.resolve("theirs", {})["code"] != before
 
 
+def test_what_a_plug_in_of_one_file_imports_decides_its_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A change of a module that an engine of one file imports, at any depth, outdates its results."""
+    files = {
+        "of_one_file.py": "from tiny import Tiny\nfrom of_one_file_helper import ORDER\n\n"
+        "class Theirs(Tiny):\n    name = 'theirs'\n",
+        "of_one_file_helper.py": "import json\nORDER = 1\n\ndef later():\n    import of_one_file_depth.deep\n",
+    }
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    (tmp_path / "of_one_file_depth").mkdir()
+    for name in ("__init__.py", "deep.py"):
+        (tmp_path / "of_one_file_depth" / name).write_text("import of_one_file\n")  # round in a circle
+    (tmp_path / "beside.py").write_text("")
+    info = tmp_path / "theirs-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text("[proofroll.engines]\ntheirs = of_one_file:Theirs\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    codes = [identity.resolve("theirs", {})["code"]]
+    for changed in ("of_one_file_helper.py", "of_one_file_depth/deep.py"):
+        path = tmp_path / changed
+        path.write_text(path.read_text() + "# changed\n")
+        codes.append(identity.resolve("theirs", {})["code"])
+    assert len(set(codes)) == 3
+    (tmp_path / "beside.py").write_text("# nobody imports it\n")
+    assert identity.resolve("theirs", {})["code"] == codes[-1]
+
+
 def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
     """An adapter's digest changes with its code, but not with that which only writes reproducers."""
     package = tmp_path / "adapter"
