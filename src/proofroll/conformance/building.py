@@ -23,7 +23,7 @@ from proofroll.core.several import REQUIRED
 def builds_or_refuses(subject: Subject) -> None:
     """The engine builds the scene, or refuses it in one line that says why."""
     try:
-        subject.engine.build(subject.scene, subject.settings)
+        subject.engine.build(subject.scene.for_an_engine, subject.settings)
     except Refused as refusal:
         text = str(refusal)
         require(text.strip() and "\n" not in text, f"a refusal must be one line that says why, not {text!r}")
@@ -56,7 +56,7 @@ def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
     for settings in engine.presets.get(formulation, {}).values():
         try:
             require_provided(engine, formulation, scene)
-            engine.build(scene, settings)
+            engine.build(scene.for_an_engine, settings)
         except Refused as refusal:
             why = str(refusal)
         else:

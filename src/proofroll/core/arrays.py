@@ -1,17 +1,43 @@
-"""Types of arrays, and how far two are apart."""
+"""Types of arrays, arrays that nobody can write to, and how far two are apart."""
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
+T = TypeVar("T")
 
 
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+
+
+def read_only(item: T) -> T:
+    """The item itself; its arrays, in dataclasses, tuples, lists and mappings at any depth, can no longer be written.
+
+    What a dataclass has cached counts too.
+    """
+    inside: Iterable[Any] = ()
+    if isinstance(item, np.ndarray):
+        item.flags.writeable = False
+    elif isinstance(item, Mapping):
+        inside = item.values()
+    elif isinstance(item, (tuple, list)):
+        inside = item
+    elif dataclasses.is_dataclass(item) and not isinstance(item, type):
+        inside = vars(item).values() if hasattr(item, "__dict__") else _fields(item)
+    for part in inside:
+        read_only(part)
+    return item
+
+
+def _fields(item: Any) -> list[Any]:
+    return [getattr(item, field.name) for field in dataclasses.fields(item)]
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.gravity import Gravity
 from proofroll.core.numbers import Numbers
@@ -75,6 +75,9 @@ class FirstMotion:
     scale: float
     moment: float
     pull: float | None = None
+
+    def __post_init__(self) -> None:
+        read_only(self)
 
 
 @dataclass(frozen=True)

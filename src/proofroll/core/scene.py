@@ -6,6 +6,7 @@ them have. Engines compare :attr:`Scene.requires` with what their formulations p
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import json
 from collections.abc import Mapping
@@ -14,6 +15,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Self
 
+from proofroll.core.arrays import read_only
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.observable import Observable
@@ -46,7 +48,8 @@ class Scene:
     asks: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Checks what concerns the scene as a whole."""
+        """Checks what concerns the scene as a whole, and makes the arrays of its elements read-only."""
+        read_only(self.elements)
         names = [element.name for element in self.elements]
         if not names:
             raise InputError("scene", self.name, "it holds no element; add what it is made of")
@@ -66,6 +69,11 @@ class Scene:
         """The scene with all that can be asked for besides the motion, as of its truth."""
         asks = dict.fromkeys(ask for element in self.elements for ask in element.askable)
         return replace(self, asks=tuple(asks))
+
+    @property
+    def for_an_engine(self) -> Self:
+        """A copy that shares no array with this scene: whatever an engine does to it, the scene stays what it is."""
+        return replace(copy.deepcopy(self))
 
     @cached_property
     def requires(self) -> frozenset[str]:

@@ -34,7 +34,7 @@ class EachAlone:
         for element, alone in zip(scene.elements, each_alone(scene), strict=True):
             own = _settings_for(kind, alone, settings)
             require_provided(kind, own.formulation, alone)
-            self.parts[element.name] = kind.build(alone, own)
+            self.parts[element.name] = kind.build(alone.for_an_engine, own)
             self.steps.append(fixed_step(own))
             if own.formulation != settings.formulation:
                 self._others.append(f"{element.name} is in formulation {own.formulation}, preset {own.preset}")
@@ -96,7 +96,7 @@ def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection
 
 
 def build(kind: Any, scene: Scene, settings: Any) -> Any:
-    """The scene in an engine at time 0.
+    """The scene, in a copy of its own, in an engine at time 0.
 
     Raises:
         Refused: the formulation does not provide what the scene requires, or cannot represent it.
@@ -104,7 +104,7 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
     if len(scene.elements) > 1:
         return EachAlone(kind, scene, settings)
     require_provided(kind, settings.formulation, scene)
-    return kind.build(scene, settings)
+    return kind.build(scene.for_an_engine, settings)
 
 
 def step_of(engine: Any, settings: Any) -> float | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 import numpy as np
 
 from proofroll.core.announced import announced
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.dataset import joined
 from proofroll.core.element import Element
@@ -76,6 +76,8 @@ def load_truths() -> tuple[type[ElementTruth], ...]:
 def truth(scene: Scene, asked: FloatArray, counting: FloatArray | None = None) -> xr.Dataset:
     """The true run of a scene, see :class:`ElementTruth`. No force couples its elements, so each is solved alone.
 
+    Its arrays are read-only; ``copy(deep=True)`` gives others.
+
     It is given at the times that are ``asked`` [s]; turns are counted at those for ``counting`` too
     (:func:`proofroll.core.turns.samples_between`).
 
@@ -90,7 +92,9 @@ def truth(scene: Scene, asked: FloatArray, counting: FloatArray | None = None) -
         said = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
         if said:
             whole.attrs[name] = "; ".join(said)
-    return whole if times is asked else whole.isel(time=np.isin(times, asked))
+    found = whole if times is asked else whole.isel(time=np.isin(times, asked))
+    read_only([variable.values for variable in found.variables.values()])
+    return found
 
 
 def edge_between(scene: Scene, parameter: str, low: float, high: float, until: float) -> float | None:

@@ -251,6 +251,8 @@ def test_surface_without_generators() -> None:
             self._surface = surface
 
         def __getattr__(self, name: str) -> object:
+            if name.startswith("__"):  # as when it is copied, before it has a surface
+                raise AttributeError(name)
             return getattr(self._surface, name)
 
     scene = cylinder()

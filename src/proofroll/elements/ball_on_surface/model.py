@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.bounds import OutOfBounds, bounded
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
@@ -178,6 +178,11 @@ class RollingBall:
     slip0: FloatArray = field(default_factory=lambda: np.zeros(3))
     gap0: float = 0.0
 
+    def __post_init__(self) -> None:
+        """Keeps read-only copies of the arrays."""
+        for name in ("gravity", "u0", "p0", "v0", "w0", "slip0"):
+            object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
+
     @property
     def flies(self) -> bool:
         """Whether the ball starts off the wall, or may leave it and land again."""
@@ -186,7 +191,7 @@ class RollingBall:
     @cached_property
     def wall_rate(self) -> FloatArray | None:
         """W: angular velocity of the wall about the world's origin [rad/s], shape (3,); None: it stands."""
-        return np.array(self.wall.wall_rate) if any(self.wall.wall_rate) else None
+        return read_only(np.array(self.wall.wall_rate)) if any(self.wall.wall_rate) else None
 
     @property
     def udot0(self) -> FloatArray:

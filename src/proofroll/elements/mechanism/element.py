@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.failed_run import FailedRun
@@ -73,7 +73,7 @@ class MechanismElement:
     @cached_property
     def analysis(self) -> Analysis:
         """Rank, mobility, and which reactions are determinate."""
-        return analysed(self.mechanism)
+        return read_only(analysed(self.mechanism))
 
     @cached_property
     def requires(self) -> frozenset[str]:
@@ -216,7 +216,7 @@ class MechanismElement:
     def first_wrench(self) -> FloatArray:
         """What each joint and loop does to its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
         wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
-        return wrench
+        return read_only(wrench)
 
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample], between: object) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""

@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.numbers import Unit
 from proofroll.elements.mechanism import checks, rotations
@@ -205,13 +206,13 @@ class Joint:
     @cached_property
     def child_frame(self) -> Array:
         """Axes of the joint's frame B in the child's axes, as columns: z is the axis."""
-        return rotations.frame_of_axis(self.axis, self.second_axis) if self.kind in WITH_AXIS else np.eye(3)
+        turned = self.kind in WITH_AXIS
+        return read_only(rotations.frame_of_axis(self.axis, self.second_axis) if turned else np.eye(3))
 
     @cached_property
     def parent_frame(self) -> Array:
         """Axes of the joint's frame A in the parent's axes, as columns; A and B coincide at q = 0."""
-        frame: Array = rotations.from_rpy(self.orientation) @ self.child_frame
-        return frame
+        return read_only(rotations.from_rpy(self.orientation) @ self.child_frame)
 
 
 def _none(values: object) -> bool:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Inertia, Vector, Z
@@ -80,17 +81,16 @@ class Loop:
     @cached_property
     def frame_a(self) -> Array:
         """Axes of the loop's frame on body_a in its axes, as columns; z is the axis."""
-        return rotations.frame_of_axis(self.axis_a)
+        return read_only(rotations.frame_of_axis(self.axis_a))
 
     @cached_property
     def frame_b(self) -> Array:
         """Axes of the loop's frame on body_b in its axes; it obeys the same rows with frame_a as a joint's frames."""
         if self.kind in {"fixed", "prismatic"}:
-            frame: Array = rotations.from_rpy(self.orientation).T @ self.frame_a
-            return frame
+            return read_only(rotations.from_rpy(self.orientation).T @ self.frame_a)
         if self.kind == "universal":  # the joint's row is: z of A perpendicular to x of B
-            return rotations.frame_of_axis(self.axis_b)[:, [2, 0, 1]]
-        return rotations.frame_of_axis(self.axis_b)
+            return read_only(rotations.frame_of_axis(self.axis_b)[:, [2, 0, 1]])
+        return read_only(rotations.frame_of_axis(self.axis_b))
 
 
 @dataclass(frozen=True)

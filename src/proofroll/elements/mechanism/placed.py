@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray, cross, on_turns
+from proofroll.core.arrays import FloatArray, cross, on_turns, read_only
 from proofroll.elements.mechanism.checks import ZERO
 from proofroll.elements.mechanism.joint import AXES, FACTS, WITH_QUATERNION, Joint
 from proofroll.elements.mechanism.model import Mechanism
@@ -37,6 +37,9 @@ class Placed:
     q_WB: FloatArray
     known_q: FloatArray | None = None
 
+    def __post_init__(self) -> None:
+        read_only(self)
+
     @cached_property
     def R_WB(self) -> FloatArray:
         """Rotations of the bodies, and of the world last, shape (time, bodies + 1, 3, 3)."""
@@ -44,7 +47,8 @@ class Placed:
         from scipy.spatial.transform import Rotation
 
         turned = Rotation.from_quat(self.q_WB.reshape(-1, 4), scalar_first=True).as_matrix()
-        return np.concatenate([turned.reshape(count, bodies, 3, 3), np.broadcast_to(np.eye(3), (count, 1, 3, 3))], 1)
+        world = np.broadcast_to(np.eye(3), (count, 1, 3, 3))
+        return read_only(np.concatenate([turned.reshape(count, bodies, 3, 3), world], 1))
 
     def point(self, body: str, position: Sequence[float]) -> FloatArray:
         """A point of a body or of the world in the world [m], shape (time, 3)."""
@@ -69,7 +73,7 @@ class Placed:
     def points(self) -> FloatArray:
         """The tracked points, or where there are none the origins of the bodies [m], shape (time, points, 3)."""
         tracked = [self.point(point.body, point.position) for point in self.mechanism.points]
-        return np.stack(tracked, axis=1) if tracked else self.p_WB
+        return read_only(np.stack(tracked, axis=1)) if tracked else self.p_WB
 
     def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Coordinate and rate of each joint with one coordinate [rad or m, and per s], angles counted in turns."""

@@ -181,7 +181,7 @@ def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, Body
 def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Array]:
     """Shift, turn and their rates of the child, in the axes that it has at q = 0."""
     none, still = np.zeros(3), Rotation.identity()
-    e1, e2, e3 = joint.child_frame.T
+    e1, e2, e3 = joint.child_frame.copy().T
     if joint.kind == "revolute":
         return none, Rotation.from_rotvec(q[0] * e3), none, v[0] * e3
     if joint.kind == "prismatic":
@@ -219,7 +219,7 @@ def made_bodies(mechanism: Mechanism, allow_planar: bool) -> list[GeneralBody | 
 def _plane(mechanism: Mechanism) -> Array | None:
     """Frame of the plane in which all bodies move, its normal last; None where they do not."""
     placed = placed_bodies(mechanism)
-    axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2])) for joint in mechanism.joints]
+    axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2].copy())) for joint in mechanism.joints]
     normals = [axis for joint, axis in axes if joint.kind in {"revolute", "planar"}]
     if not normals or any(joint.kind in {"universal", "spherical", "free"} for joint in mechanism.joints):
         return None

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.bounds import bounded
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
@@ -62,7 +62,7 @@ class Plane:
     def _axes(self) -> FloatArray:
         """Columns e1 (into the plane), e2 (down the slope), e3 = e1 × e2."""
         rotation = tilted(self.tilt)
-        return np.stack([-rotation[:, 2], rotation[:, 0], -rotation[:, 1]], axis=-1)
+        return read_only(np.stack([-rotation[:, 2], rotation[:, 0], -rotation[:, 1]], axis=-1))
 
     @cached_property
     def _e1(self) -> tuple[float, float, float]:

@@ -21,7 +21,7 @@ from typing import Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, read_only
 
 
 @dataclass(frozen=True)
@@ -113,9 +113,7 @@ class Surface(Protocol):
 def tilted(angle: float) -> FloatArray:
     """Rotation by ``angle`` [rad] about the world's y axis, read-only, shape (3, 3)."""
     c, s = math.cos(angle), math.sin(angle)
-    rotation = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    rotation.flags.writeable = False  # every caller shares it
-    return rotation
+    return read_only(np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]]))  # every caller shares it
 
 
 def components(column: FloatArray) -> tuple[float, float, float]:
