@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 # The most even way to spread parts of an interval: none is near a simple fraction.
 _GOLDEN = (5**0.5 - 1) / 2
 _OFF_GRID = 8
+# Part by which the length of a quaternion may differ from 1: more than single precision and drift leave of it.
+_UNIT = 1e-3
 # So many samples make no curve that others could be held against (proofroll.elements.ball_on_surface.observables).
 _FEW = 17
 
@@ -159,4 +161,18 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
         # The sum of finite numbers is finite but for overflow; numpy's own question takes ten times as long.
         if not math.isfinite(sum(values.ravel().tolist())) and not np.all(np.isfinite(values)):
             raise Diverged(f"{name} {_NOT_FINITE} at {t:g} s")
+        if name == "q_WB":
+            require_unit(values, f"at {t:g} s")
     return sample
+
+
+def require_unit(q_WB: FloatArray, where: str) -> None:
+    """Checks the length of quaternions, shape (…, 4).
+
+    Raises:
+        Diverged: it is not 1; with the length and ``where``.
+    """
+    lengths = np.sqrt(np.sum(q_WB**2, axis=-1)).ravel()
+    worst = float(lengths[np.argmax(np.abs(lengths - 1))])
+    if abs(worst - 1) > _UNIT:
+        raise Diverged(f"q_WB has length {worst:.4g} {where}; give unit quaternions, scalar first")

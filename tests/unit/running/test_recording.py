@@ -51,10 +51,12 @@ def test_record(sphere: Scene) -> None:
         (Misshapen, 2, ["w_WB", "(2,) instead of (3,)", "0.1 s"]),
         (type("Infinite", (Misshapen,), {"wrong": {"force": np.full(3, np.inf)}}), 2, ["force", "not finite"]),
         (type("Five", (Misshapen,), {"wrong": {"q_WB": np.zeros(5)}}), 2, ["q_WB", "(5,) instead of (4,)"]),
+        (type("Long", (Misshapen,), {"wrong": {"q_WB": np.array([1.01, 0, 0, 0])}}), 2, ["q_WB has length 1.01 at"]),
+        (type("Zero", (Misshapen,), {"wrong": {"q_WB": np.zeros(4)}}), 2, ["q_WB has length 0 at 0.1 s"]),
     ],
 )
 def test_a_run_that_ends_early(sphere: Scene, kind: Any, samples: int, words: list[str]) -> None:
-    """NaN, infinity, a wrong shape or an engine that gives up end the run with a sentence; what came before is kept."""
+    """NaN, infinity, a wrong shape or length, or an engine that gives up end the run with a sentence; what came before is kept."""
     recording = record(kind.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.05))
     assert recording.dataset.sizes["time"] == samples
     assert recording.failure is not None
