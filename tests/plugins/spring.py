@@ -74,7 +74,7 @@ class Spring:
         """The phase of a step."""
         return (StepNumber("phase", "ωh", "angle of the oscillation in a step", self.rate * h),)
 
-    def variables(self, times: FloatArray, samples: Sequence[Sample], between: Mapping[float, Sample]) -> Columns:
+    def variables(self, times: FloatArray, samples: Sequence[Sample]) -> Columns:
         """Elongation, speed, pull and energy."""
         x, v = (np.array([getattr(s, key)[..., 0] for s in samples]).reshape(-1) for key in ("p_WB", "v_WB"))
         energy = 0.5 * self.mass * v**2 + 0.5 * self.stiffness * x**2
@@ -150,7 +150,7 @@ class SpringTruth:
         w, A = element.rate, np.array([[0, 1], [-element.stiffness / element.mass, 0]])
         first = [(element.x0 * np.cos(w * t), -element.x0 * w * np.sin(w * t)) for t in times]
         second = [tuple(expm(A * t) @ [element.x0, 0.0]) for t in times]
-        one, two = (element.variables(times, [at(*s) for s in states], {}).dataset() for states in (first, second))
+        one, two = (element.variables(times, [at(*s) for s in states]).dataset() for states in (first, second))
         for name in one.data_vars:
             one[name].attrs["error_bar"] = 3 * float(np.max(np.abs(one[name] - two[name]))) + 1e-15
         return one.assign_attrs(route="cosine", second_route="exponential of the matrix")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -22,7 +21,9 @@ if TYPE_CHECKING:
 Key = TypeVar("Key", bound=Hashable)
 
 # Dimensions that the variables of all elements share; every other is an element's own.
-_SHARED = frozenset({"time", "xyz", "wxyz"})
+_SHARED = frozenset({"time", "xyz", "wxyz", "between"})
+# Dimension of the samples off the grid, and the beginning of the names of what they hold.
+BETWEEN = "between"
 
 
 def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> xr.Dataset:
@@ -30,23 +31,11 @@ def from_samples(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) 
     return columns_of(scene, times, samples).dataset()
 
 
-def columns_of(
-    scene: Scene,
-    times: FloatArray,
-    samples: Sequence[AnySample],
-    between: Mapping[float, AnySample] = MappingProxyType({}),
-) -> Columns:
-    """The trajectory of a run, of one sample per time [s], shape (time,), or fewer if the run ended early.
-
-    ``between`` has samples off that grid, by time [s].
-    """
+def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) -> Columns:
+    """The trajectory of a run, of one sample per time [s], shape (time,), or fewer if the run ended early."""
     reached = np.asarray(times[: len(samples)], dtype=np.float64)
     parts = {
-        element.name: element.variables(
-            reached,
-            [sample_of(scene, element, sample) for sample in samples],
-            {time: sample_of(scene, element, sample) for time, sample in between.items()},
-        )
+        element.name: element.variables(reached, [sample_of(scene, element, sample) for sample in samples])
         for element in scene.elements
     }
     return joined(scene, parts)
@@ -63,6 +52,27 @@ def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
         if all(np.array_equal(value, values[0]) for value in values):
             said[key] = values[0]
     return Columns(found, {**said, "scene": scene.name, "scene_digest": scene.digest})
+
+
+def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: FloatArray) -> Columns:
+    """The variables at the times that were asked for, and, as ``between.<name>``, the observables and states between.
+
+    Times of neither [s] are left out.
+    """
+    times = columns["time"].values
+    off = np.isin(times, between) & ~np.isin(times, asked)
+    found = columns if np.all(on := np.isin(times, asked)) else columns.at("time", on)
+    if not np.any(off):
+        return found
+    states = {scene.label(element, name) for element in scene.elements for name in element.sample_type.widths}
+    few = {name: columns[name] for name in columns.variables if name in states or name in scene.observables}
+    apart = {
+        f"{BETWEEN}.{name}": item._replace(dims=(BETWEEN, *item.dims[1:]), values=item.values[off])
+        for name, item in few.items()
+        if item.dims[:1] == ("time",)
+    }
+    apart[BETWEEN] = Variable((BETWEEN,), times[off], {"units": "s"})
+    return Columns({**found.variables, **apart}, found.attrs)
 
 
 def _labelled(scene: Scene, element: Element, variables: Mapping[str, Variable]) -> dict[str, Variable]:

@@ -149,20 +149,23 @@ class Element(Protocol):
     def softened(self) -> frozenset[str]:
         """Quantities of the certificate by whose softness an engine's first steps may differ."""
 
-    def variables(self, times: FloatArray, samples: Sequence[Any], between: Mapping[float, Any]) -> Columns:
+    def variables(self, times: FloatArray, samples: Sequence[Any]) -> Columns:
         """All variables of a run, with ``units`` and ``long_name``.
 
         Args:
             times: of the samples [s], shape (time,).
             samples: one per time, of its :attr:`sample_type`.
-            between: samples at other times [s], for audits that the grid must not hide.
         """
 
     def lacks(self, samples: Sequence[Any], asks: Sequence[str]) -> str | None:
         """One sentence about what samples do not say though the scene requires it, or None."""
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
-        """Values of each observable that a run allows; a reaction without time 0."""
+        """Values of each observable that a run allows; a reaction without time 0.
+
+        Those of samples off the grid are ``between.<name>`` along ``between`` [s]; what is a variable itself the
+        harness compares there, too, what is made of several samples is for the element to look at.
+        """
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """Size of each observable in the truth, to which a relative tolerance refers."""

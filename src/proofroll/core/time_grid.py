@@ -11,6 +11,12 @@ from proofroll.core.errors import InputError
 
 # How far apart samples are where nobody says it [s].
 EVERY = 0.01
+# The most even way to spread parts of an interval: none is near a simple fraction.
+_GOLDEN = (5**0.5 - 1) / 2
+# So many samples off the grid, no more than one in so many intervals: an adaptive step ends at each.
+_OFF_GRID, _INTERVALS = 8, 4
+# Parts of an interval at which they lie, where its steps allow: so most engines have them at the same times.
+_PARTS = 10
 
 
 def sampling_interval(step: float | None) -> float:
@@ -42,3 +48,21 @@ def time_grid(until: float, every: float) -> FloatArray:
     else:
         times[-1] = until
     return np.asarray(times, dtype=np.float64)
+
+
+def off_grid(times: FloatArray, step: float | None) -> FloatArray:
+    """A few times [s] between those of the grid, none at the same part of its interval, each a whole number of steps.
+
+    An error that repeats with the grid is zero on it, and seen here. ``step``: the engine's [s]; None: it has none.
+    """
+    found: list[float] = []
+    count = min(_OFF_GRID, (len(times) - 1) // _INTERVALS)
+    for index in np.unique(np.linspace(0, len(times) - 2, count + 2)[1:-1].astype(int)).tolist():
+        start, length = times[index], times[index + 1] - times[index]
+        steps = _PARTS if step is None else round(length / step)
+        if steps < 2 or (step is not None and abs(steps * step - length) > 1e-6 * step):
+            continue
+        parts = next((parts for parts in range(_PARTS, 1, -1) if steps % parts == 0), steps)
+        part = min(max(round((index + 1) * _GOLDEN % 1 * parts), 1), parts - 1)
+        found.append(start + length * (part / parts))
+    return np.asarray(found, dtype=np.float64)

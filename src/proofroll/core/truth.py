@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.announced import announced
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import joined
+from proofroll.core.dataset import joined, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.scene import Scene
@@ -73,28 +73,32 @@ def load_truths() -> tuple[type[ElementTruth], ...]:
     return tuple(point.load() for point in announced(TRUTHS))
 
 
-def truth(scene: Scene, asked: FloatArray, counting: FloatArray | None = None) -> xr.Dataset:
+_NONE = np.zeros(0)
+
+
+def truth(scene: Scene, asked: FloatArray, counting: FloatArray = _NONE, between: FloatArray = _NONE) -> xr.Dataset:
     """The true run of a scene, see :class:`ElementTruth`. No force couples its elements, so each is solved alone.
 
     Its arrays are read-only; ``copy(deep=True)`` gives others.
 
-    It is given at the times that are ``asked`` [s]; turns are counted at those for ``counting`` too
+    It is given at the times that are ``asked`` [s], and off that grid at those ``between``
+    (:func:`proofroll.core.dataset.off_grid_apart`); turns are counted at those for ``counting`` too
     (:func:`proofroll.core.turns.samples_between`).
 
     Raises:
         Refused: an element that nothing covers.
         Diverged: two routes disagree.
     """
-    times = asked if counting is None or not len(counting) else np.union1d(asked, counting)
+    times = np.union1d(asked, np.concatenate([counting, between])) if len(counting) or len(between) else asked
     parts = {element.name: _of_element(element, times, scene.asks) for element in scene.elements}
-    whole = joined(scene, {name: Columns.of(part) for name, part in parts.items()}).dataset()
+    columns = joined(scene, {name: Columns.of(part) for name, part in parts.items()})
+    whole = (columns if times is asked else off_grid_apart(scene, columns, asked, between)).dataset()
     for name in ("route", "second_route", "ill_posed"):
         said = dict.fromkeys(str(part.attrs[name]) for part in parts.values() if part.attrs.get(name))
         if said:
             whole.attrs[name] = "; ".join(said)
-    found = whole if times is asked else whole.isel(time=np.isin(times, asked))
-    read_only([variable.values for variable in found.variables.values()])
-    return found
+    read_only([variable.values for variable in whole.variables.values()])
+    return whole
 
 
 def edge_between(scene: Scene, parameter: str, low: float, high: float, until: float) -> float | None:

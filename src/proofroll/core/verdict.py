@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -19,6 +19,9 @@ _SEVERAL = 3
 # A limit is shown to be wrong by this many of its error bars: extrapolations of engines that solve the scene's own
 # equations were off by up to 8 of theirs where the motion ends abruptly, those of softened contacts by up to 20,000.
 _SHOWN_WRONG = 10
+# Between its samples a run may be off by this many times what it is at the samples: more is hidden from them, and then
+# the limit of small steps, which is that of the samples, excuses nothing.
+_BETWEEN = 10
 # Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
 _ROUND_OFF = 1e3 * np.finfo(float).eps
 
@@ -103,6 +106,7 @@ def judge(
     lost: str = "",
     doubt: Doubt = Doubt.NONE,
     own_bar: float = 0.0,
+    between: tuple[FloatArray, FloatArray] | None = None,
 ) -> Judgement:
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
@@ -120,13 +124,19 @@ def judge(
         doubt: what an ill-posed question leaves to be judged.
         own_bar: how far the run itself leaves open what it shows, as where an event lies between two of its samples;
             an error that may come of this alone is no difference.
+        between: values of the run at a few times off the grid, and the true ones; None: there are none.
     """
     error = largest_difference(values, true)
+    off_grid = 0.0 if between is None else largest_difference(*between)
+    hidden = off_grid > max(tolerance, _BETWEEN * error)
     round_off = _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
     shown_unit = "" if unit == "1" else f" {unit}"
     rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
     if limit is not None:
         rungs = _read(limit, largest_difference(limit.values, true), tolerance, truth_error_bar, round_off, shown_unit)
+    if hidden:
+        rungs = replace(rungs, finding=LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER)
+    on_grid, error = error, max(error, off_grid)
     verdict = _verdict(error, tolerance, rungs, doubt)
     unknown = truth_error_bar + (own_bar if error > tolerance else 0.0)
     placed = verdict in {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS}
@@ -145,7 +155,8 @@ def judge(
         limit_error=rungs.error,
         limit_error_bar=rungs.bar,
         limit=rungs.finding,
-        reason=_reason(verdict, error, tolerance, (truth_error_bar, own_bar), shown_unit, rungs),
+        reason=_reason(verdict, error, tolerance, (truth_error_bar, own_bar), shown_unit, rungs)
+        + (f"; at the samples alone {number(on_grid)}{shown_unit}, so the error is between them" if hidden else ""),
         remarks=(remark,) if rungs.wrong_within else (),
     )
 

@@ -122,6 +122,8 @@ class Case:
         asks: what is wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
         turns: whether samples are taken between those every ``every`` where turns of angles have to be counted
             (:func:`proofroll.core.turns.samples_between`); no study needs that, and an adaptive step ends at each.
+        between: of the truth, times off the grid at which some engine is sampled [s]
+            (:func:`proofroll.core.time_grid.off_grid`); an engine's follow from its step.
     """
 
     scene: str
@@ -134,11 +136,12 @@ class Case:
     time_limit: float = 120.0
     asks: tuple[str, ...] = ()
     turns: bool = False
+    between: tuple[float, ...] = ()
 
     @cached_property
     def key(self) -> str:
         """Hash of all that decides the result; where an interpreter lies does not, what it has does."""
-        left_out = {"time_limit", *(name for name in ("asks", "turns") if not getattr(self, name))}
+        left_out = {"time_limit", *(name for name in ("asks", "turns", "between") if not getattr(self, name))}
         content = {name: value for name, value in asdict(self).items() if name not in left_out}
         content["engine"]["name"] = plain_name(self.engine.name)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:24]
@@ -146,8 +149,8 @@ class Case:
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Case:
         """The case again from ``asdict``."""
-        asks = tuple(content.get("asks", ()))
-        return cls(**{**content, "engine": EngineFacts(**content["engine"]), "asks": asks})
+        some = {name: tuple(content.get(name, ())) for name in ("asks", "between")}
+        return cls(**{**content, "engine": EngineFacts(**content["engine"]), **some})
 
 
 @dataclass(frozen=True)

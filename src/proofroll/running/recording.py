@@ -12,7 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import Columns
-from proofroll.core.dataset import add_events, columns_of
+from proofroll.core.dataset import add_events, columns_of, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.engine_abilities import TellsRemarks
@@ -25,33 +25,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-# The most even way to spread parts of an interval: none is near a simple fraction.
-_GOLDEN = (5**0.5 - 1) / 2
-_OFF_GRID = 8
 # Part by which the length of a quaternion may differ from 1: more than single precision and drift leave of it.
 _UNIT = 1e-3
-# So many samples make no curve that others could be held against (proofroll.elements.ball_on_surface.observables).
-_FEW = 17
-
-
-def off_grid(times: FloatArray, step: float | None) -> FloatArray:
-    """A few times [s] between those of the grid, none at the same part of its interval, each a whole number of steps.
-
-    An error that repeats with the grid is zero on it, and seen here. ``step``: the engine's [s]; None: it has none.
-    """
-    found: list[float] = []
-    if len(times) <= _FEW:
-        return np.zeros(0)
-    for index in np.unique(np.linspace(0, len(times) - 2, _OFF_GRID + 2)[1:-1].astype(int)).tolist():
-        start, length = times[index], times[index + 1] - times[index]
-        part = (index + 1) * _GOLDEN % 1
-        if step is None:
-            found.append(start + length * part)
-            continue
-        steps = round(length / step)
-        if steps > 1 and abs(steps * step - length) <= 1e-6 * step:
-            found.append(start + step * min(max(round(part * steps), 1), steps - 1))
-    return np.asarray(found, dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -91,8 +66,8 @@ def record(
 ) -> Recording:
     """Advances an engine freshly built of a scene and samples it at the times that are ``asked`` [s].
 
-    Probes are a few times off that grid [s], from :func:`off_grid`; what is sampled at times for ``counting`` turns
-    [s], from :func:`proofroll.core.turns.samples_between`, is left out of the result.
+    Probes are a few times off that grid [s], from :func:`proofroll.core.time_grid.off_grid`; what is sampled at times
+    for ``counting`` turns [s], from :func:`proofroll.core.turns.samples_between`, is left out of the result.
     """
     began, processor = time.perf_counter(), -time.process_time()
     inside = 0.0
@@ -100,7 +75,7 @@ def record(
     failure: str | None = None
     wall = 0.0
     between: dict[float, AnySample] = {}
-    off = set(map(float, probes))
+    off = set(map(float, probes)) - set(asked.tolist())
     times = np.array(sorted({*asked.tolist(), *(set(map(float, counting)) - off)}))
     watches = [(element, element.watch(scene.asks)) for element in scene.elements if isinstance(element, WatchesRuns)]
     for t in sorted({*times[1:].tolist(), *off}):
@@ -138,10 +113,11 @@ def record(
         for element in scene.elements
     )
     failure = failure or next(filter(None, lacking), None)
-    shown = np.isin(times[: len(samples)], asked)
-    last = times[: len(samples)][shown][-1]
-    columns = columns_of(scene, times, samples, {at: sample for at, sample in between.items() if at < last})
-    columns = columns if np.all(shown) else columns.at("time", shown)
+    reached = times[: len(samples)]
+    last = reached[np.isin(reached, asked)][-1]
+    taken = dict(zip(reached.tolist(), samples, strict=True)) | {at: one for at, one in between.items() if at < last}
+    columns = columns_of(scene, np.array(sorted(taken)), [taken[at] for at in sorted(taken)])
+    columns = off_grid_apart(scene, columns, asked, np.array(sorted(between)))
     for owner, found in events:
         columns = add_events(scene, owner, columns, found)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()

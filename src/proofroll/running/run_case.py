@@ -10,6 +10,8 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from proofroll.core.errors import Diverged, ProofrollError, Refused, lack_behind
 from proofroll.core.plugins import plain_name
 from proofroll.running.case import Case, Result, Status
@@ -49,18 +51,19 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
     from proofroll.core.first_steps import certificate
     from proofroll.core.several import build, step_of
-    from proofroll.core.time_grid import time_grid
+    from proofroll.core.time_grid import off_grid, time_grid
     from proofroll.core.turns import samples_between
     from proofroll.files.trajectory_file import write
     from proofroll.running.loading import loaded, scene_of
-    from proofroll.running.recording import off_grid, record
+    from proofroll.running.recording import record
 
     scene = scene_of(case)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
         spent.on("loading")
         counting = samples_between(scene, times) if case.turns else times[:0]
-        return _run_truth(scene, times, counting, out, made_with("truth", case.engine.version))
+        between = np.array(case.between)
+        return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version))
     kind, settings = loaded(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
@@ -110,7 +113,7 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
     return Result(status, str(error), versions=versions)
 
 
-def _run_truth(scene: Any, times: Any, counting: Any, out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(scene: Any, times: Any, besides: tuple[Any, Any], out: Path, versions: dict[str, str]) -> Result:
     from proofroll.core.truth import truth
     from proofroll.files.trajectory_file import import_xarray, write
 
@@ -118,7 +121,7 @@ def _run_truth(scene: Any, times: Any, counting: Any, out: Path, versions: dict[
 
     start = time.perf_counter()
     try:
-        dataset = truth(scene, times, counting)
+        dataset = truth(scene, times, *besides)
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     wall = time.perf_counter() - start

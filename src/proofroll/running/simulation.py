@@ -12,12 +12,12 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import EVERY, sampling_interval, time_grid
+from proofroll.core.time_grid import EVERY, off_grid, sampling_interval, time_grid
 from proofroll.core.turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import truth_version
 from proofroll.running.manifest import manifest, versions
-from proofroll.running.recording import off_grid, record
+from proofroll.running.recording import record
 
 if TYPE_CHECKING:
     import xarray as xr

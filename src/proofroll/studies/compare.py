@@ -160,6 +160,7 @@ def _judgements(
             lost=lost,
             doubt=reference.doubt(name),
             own_bar=reference.own_bar(name, trajectories[1.0]),
+            between=reference.between(name, trajectories[1.0]),
         )
         judgements.append(judgement)
     return judgements

@@ -11,6 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
+from proofroll.core.dataset import BETWEEN
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_text import number
 from proofroll.core.observable import Role
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 _USUAL = Tolerance(0.01, True)
 _MOST_TRUTHS = 64
-_truths: dict[tuple[str, bytes], xr.Dataset] = {}
+_truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,8 @@ def judge(
     scene = load_scene(scene) if isinstance(scene, str) else scene
     given = read_run(run, scene)
     dataset = given.dataset
-    reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy()))
+    between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
+    reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy(), between))
     given.require_units(reference.dataset)
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
@@ -161,13 +163,13 @@ def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tole
     return dict(sorted(found.items()))
 
 
-def _truth(scene: Scene, times: FloatArray) -> xr.Dataset:
-    """The truth at these times, which tests ask for again and again."""
-    key = scene.digest, times.tobytes()
+def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
+    """The truth at these times and those off their grid, which tests ask for again and again."""
+    key = scene.digest, times.tobytes(), between.tobytes()
     if key not in _truths:
         late = times[0] > 0
         asked = np.concatenate([[0.0], times]) if late else times
-        found = truth(scene, asked, samples_between(scene, asked))
+        found = truth(scene, asked, samples_between(scene, asked), between)
         _truths[key] = found.isel(time=slice(1, None)) if late else found
         while len(_truths) > _MOST_TRUTHS:
             del _truths[next(iter(_truths))]
@@ -227,18 +229,18 @@ def _compared(
         values = observed[name]
         true, bar = reference.true(name, values)
         scale, doubt = reference.sizes.get(name, 1.0), reference.doubt(name)
-        own = reference.own_bar(name, dataset)
+        own, between = reference.own_bar(name, dataset), reference.between(name, dataset)
     else:
         values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
         true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
             true, values = true[1:], values[1:]  # several engines define reactions only after a first step
         scale, doubt = reference.sizes.get(name) or float(np.ptp(true)) or 1.0, Doubt.NONE
-        own = 0.0
+        own, between = 0.0, None
     found = judge_curve(
         name, _unit(reference, name), values, true,
         truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
-        own_bar=own,
+        own_bar=own, between=between,
     )  # fmt: skip
     return Compared(found, _farthest(values, true, dataset["time"].to_numpy()))
 

@@ -14,7 +14,7 @@ from proofroll.core.errors import InputError, ProofrollError, told_of
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.several import represents
-from proofroll.core.time_grid import time_grid
+from proofroll.core.time_grid import off_grid, time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import described, resolve, resolve_with_truth
@@ -81,10 +81,14 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     rungs = _rungs(rows, resolved, workers)
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
+    times = time_grid(comparison.until, comparison.every)
+    steps = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
+    between = tuple(sorted({t for step in steps for t in off_grid(times, step).tolist()}))
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):
             scene = scene_at(comparison, point)
-            truths.setdefault(point_name(point), _case(comparison, scene.fully_asked, point, truth_facts))
+            true = replace(_case(comparison, scene.fully_asked, point, truth_facts), between=between)
+            truths.setdefault(point_name(point), true)
             if not isinstance(facts, EngineFacts):
                 runs.append(Planned(row, point, facts))
                 continue

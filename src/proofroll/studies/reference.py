@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import Key, common_span, observe, part, scales
+from proofroll.core.dataset import BETWEEN, Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
@@ -119,18 +119,41 @@ class Reference:
         # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 
+    def between(self, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
+        """An observable of a run off the grid, and its true values there; None: there is nothing to compare.
+
+        Where a sampling interval holds an event, of the run or of the truth, nobody is held to it: within a step of
+        the engine forces may still be those before.
+        """
+        own, item = f"{BETWEEN}.{name}", self.scene.observables[name]
+        if own not in dataset or own not in self.dataset:
+            return None
+        times, known = dataset[BETWEEN].to_numpy(), self.dataset[BETWEEN].to_numpy()
+        grid = self.dataset["time"].to_numpy()
+        happened = [event.time for run in (dataset, self.dataset) for event in self._events(run)]
+        alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
+        both = np.isin(times, known) & alone & (times < grid[-1])
+        values, true = dataset[own].to_numpy()[both], self.dataset[own].to_numpy()[np.isin(known, times[both])]
+        if item.role is Role.RESIDUAL:
+            return values, np.zeros_like(values)
+        turned = on_turns_of(true, values, name, (dataset, self.dataset))
+        said = np.isfinite(true)
+        return None if turned is None else (turned[said], true[said])
+
     def own_bar(self, name: str, dataset: xr.Dataset) -> float:
         """How far a run leaves open what it shows of an observable: half the width of its widest event."""
         item = self.scene.observables[name]
         if item.role != Role.EVENT or item.name == EVENT_ORDER:
             return 0.0
-        found = [event for one in self.scene.elements for event in events_of(part(self.scene, one, dataset))]
-        return max((event.time_high - event.time_low for event in found), default=0.0) / 2
+        return max((event.time_high - event.time_low for event in self._events(dataset)), default=0.0) / 2
 
     @property
     def events(self) -> list[Event]:
         """Of all elements."""
-        return [event for item in self.scene.elements for event in events_of(part(self.scene, item, self.dataset))]
+        return self._events(self.dataset)
+
+    def _events(self, dataset: xr.Dataset) -> list[Event]:
+        return [event for item in self.scene.elements for event in events_of(part(self.scene, item, dataset))]
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:

@@ -40,6 +40,27 @@ def test_agrees_within_tolerance() -> None:
     assert "one step only" in found.reason
 
 
+@pytest.mark.parametrize(
+    ("on_grid", "off_grid", "verdict"),
+    [
+        (0.5e-3, 0.9e-3, Verdict.AGREES),
+        (0.5e-3, 2e-3, Verdict.CONVERGES),
+        (1e-6, 2e-3, Verdict.DIFFERS),
+        (1e-6, 0.9e-3, Verdict.AGREES),
+        (1e-6, math.inf, Verdict.DIFFERS),
+    ],
+)
+def test_what_is_hidden_from_the_samples_differs(on_grid: float, off_grid: float, verdict: Verdict) -> None:
+    """Between samples a run is held to its tolerance; the limit of the samples excuses an error of their size alone."""
+    found = judge(
+        "z", "m", TRUE + on_grid, TRUE, truth_error_bar=1e-12, tolerance=MILLIMETRE, scale=1.0,
+        limit=errors(4 * on_grid, 2 * on_grid, on_grid), ladder=True, between=(np.full(3, off_grid), np.zeros(3)),
+    )  # fmt: skip
+    assert found.verdict == verdict
+    assert ("so the error is between them" in found.reason) == (verdict is Verdict.DIFFERS)
+    assert found.error == max(on_grid, off_grid)
+
+
 @pytest.mark.parametrize("declared", [1, 2, None])
 def test_an_error_that_vanishes_by_luck_at_one_step_is_no_agreement(declared: int | None) -> None:
     """A run that is off by 50 mm (1 - h/1 ms) hits the truth at 1 ms; its ladder shows another limit, so it differs."""

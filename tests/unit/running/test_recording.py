@@ -10,11 +10,11 @@ from hostile import GivesUp, HostileSettings, NotANumber, Oracle
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import time_grid
+from proofroll.core.time_grid import off_grid, time_grid
 from proofroll.elements.ball_on_surface.events import lift_off
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import off_grid, record
+from proofroll.running.recording import record
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_record(sphere: Scene) -> None:
     ],
 )
 def test_a_run_that_ends_early(sphere: Scene, kind: Any, samples: int, words: list[str]) -> None:
-    """NaN, infinity, a wrong shape or length, or an engine that gives up end the run with a sentence; what came before is kept."""
+    """NaN, infinity, a wrong shape or length, or an engine that gives up end the run with a sentence."""
     recording = record(kind.build(sphere, HostileSettings()), sphere, time_grid(0.5, 0.05))
     assert recording.dataset.sizes["time"] == samples
     assert recording.failure is not None
@@ -103,7 +103,7 @@ def test_an_orientation_that_was_asked_for() -> None:
 def test_times_off_the_grid() -> None:
     """Some samples lie strictly between those of the grid, at other parts of each interval, and after whole steps."""
     times = time_grid(1.0, 0.02)
-    for step in (None, 1e-3, 2e-3):
+    for step in (None, 1e-3, 2e-3, 1e-4):
         found = off_grid(times, step)
         assert len(found) == 8
         parts = (found - times[np.searchsorted(times, found) - 1]) / 0.02
@@ -112,7 +112,9 @@ def test_times_off_the_grid() -> None:
         if step is not None:
             assert found / step == pytest.approx(np.round(found / step), abs=1e-6)
     assert off_grid(times, 0.02).size == 0, "no whole step ends between"
-    assert off_grid(times[:5], None).size == 0, "too few samples for a curve"
+    assert set(off_grid(times, 1e-3)) == set(off_grid(times, 2e-3)) == set(off_grid(times, None))
+    assert off_grid(times, 0.02 / 7).size == off_grid(times, 0.02 / 13).size == 8, "also where no tenth is a step"
+    assert [off_grid(times[:count], None).size for count in (4, 5, 11)] == [0, 1, 2], "few where there are few"
 
 
 def test_what_counts_as_lift_off() -> None:

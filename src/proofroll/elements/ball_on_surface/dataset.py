@@ -15,10 +15,8 @@ from proofroll.elements.ball_on_surface.natural import turn_interval
 from proofroll.elements.ball_on_surface.sampling import BallSample
 
 
-def from_samples(
-    body: RollingBall, times: FloatArray, samples: Sequence[BallSample], between: Mapping[float, BallSample]
-) -> Columns:
-    """The variables of a run, from one sample per time [s] and some between them; a force missing at time 0 is NaN."""
+def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[BallSample]) -> Columns:
+    """The variables of a run, from one sample per time [s]; a force missing at time 0 is NaN."""
 
     def stacked(values: list[FloatArray | None]) -> FloatArray | None:
         return None if any(value is None for value in values) else np.asarray(values, dtype=np.float64)
@@ -36,24 +34,11 @@ def from_samples(
         force=stacked(forces),
         q_WB=stacked([s.q_WB for s in samples]),
     )
-    found = {**made.variables, **samples_between(between)}
+    found = dict(made.variables)
     if all(s.sticking is not None for s in samples):
         sticking = np.array([s.sticking for s in samples], dtype=np.int8)
         found["sticking"] = Variable(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
     return Columns(found, made.attrs)
-
-
-def samples_between(samples: Mapping[float, BallSample]) -> dict[str, Variable]:
-    """Samples off the grid, by time [s]: ``p_between`` [m] and ``v_between`` [m/s] along ``between`` [s]; if any."""
-    if not samples:
-        return {}
-    p, v = (np.array([np.reshape(getattr(s, name), 3) for s in samples.values()]) for name in ("p_WB", "v_WB"))
-    of = "off the grid, in the world"
-    return {
-        "p_between": Variable(("between", "xyz"), p, {"units": "m", "long_name": f"centre of the ball {of}"}),
-        "v_between": Variable(("between", "xyz"), v, {"units": "m/s", "long_name": f"velocity of the centre {of}"}),
-        "between": Variable(("between",), np.array(list(samples)), {"units": "s"}),
-    }
 
 
 def columns(

@@ -170,11 +170,9 @@ class BallOnSurface:
         friction = truth["needed_friction"].to_numpy()
         return certificate.another_scene(lines, float(np.max(friction[np.isfinite(friction)], initial=0.0)))
 
-    def variables(
-        self, times: FloatArray, samples: Sequence[BallSample], between: Mapping[float, BallSample]
-    ) -> Columns:
+    def variables(self, times: FloatArray, samples: Sequence[BallSample]) -> Columns:
         """See the protocol; the variables are those of :func:`proofroll.elements.ball_on_surface.dataset.columns`."""
-        return from_samples(self.rolling, times, samples, between)
+        return from_samples(self.rolling, times, samples)
 
     def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
         """See :class:`proofroll.core.element_abilities.WatchesRuns`."""

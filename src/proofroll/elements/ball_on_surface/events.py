@@ -114,6 +114,11 @@ def left_at(dataset: xr.Dataset) -> float:
     return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
 
 
+def _on_wall(dataset: xr.Dataset, start: str) -> list[str]:
+    """Variables that there are on the wall only, of those whose names begin so."""
+    return [start + name for name in _ON_WALL if start + name in dataset]
+
+
 def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
     """The truth and the runs up to the end of the shortest, and what is on the wall up to the first lift-off of any.
 
@@ -129,9 +134,9 @@ def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.D
 
     def cut(dataset: xr.Dataset) -> xr.Dataset:
         short = dataset.isel(time=slice(count))
-        there = [name for name in _ON_WALL if name in short]
+        there = [(name, at) for at, start in (("time", ""), ("between", "between.")) for name in _on_wall(short, start)]
         on_wall = {
-            name: short[name].where(short["time"] < until, 0.0).assign_attrs(short[name].attrs) for name in there
+            name: short[name].where(short[at] < until, 0.0).assign_attrs(short[name].attrs) for name, at in there
         }
         return short.assign(on_wall)
 

@@ -6,15 +6,16 @@ Everything here sees a trajectory and the scene's ball, never an engine.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import BETWEEN
 from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment, wall_velocity
+from proofroll.elements.ball_on_surface.mechanics import energy, natural_acceleration, resistance_moment, wall_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerations, carried, stretches
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 # Least size of an observable over its natural one: a ball that moves by less than a hundredth of its radius (0.25 mm
 # inside the cylinder) stands still to the eye, and a range made of round-off is no size.
 _LEAST = 1e-2
+_FORCES = ("N", "F2", "F3")
 # Steps in which the turning from one sample to the next is integrated.
 _SUBSTEPS = 16
 
@@ -149,11 +151,18 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
     Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u, and a wall
     that moves at the velocity w gives F · w; N, F, ω, V and the slip u are the engine's own. Where there is no force at
-    time 0, work counts from the first sample that has one; shape (time - 1,) then.
+    time 0, work counts from the first sample that has one; shape (time - 1,) then. Samples off the grid
+    come last.
     """
     dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
     t, f = dataset["time"].to_numpy(), body.contact.rolling_resistance
+    at, few = np.zeros(0), np.zeros(0)
+    if BETWEEN in dataset:
+        at = dataset[BETWEEN].to_numpy()
+        few = energy(body, *(dataset[f"{BETWEEN}.{name}"].to_numpy() for name in ("p_WB", "v_WB", "w_WB")))
+        few = few - float(dataset["energy"][0])
+        at, few = at[at > t[0]], few[at > t[0]]
     bounded = "sticking" in dataset
     power, rests = np.zeros_like(t), False
     if f:
@@ -173,8 +182,8 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
         # The power has kinks where slip begins and ends and where the ball stops, at which a smooth spline would ring.
         work = make_interp_spline(t, power, k=1 if bounded or rests else DEGREE).antiderivative()
-        balance = balance + work(t) - work(t[0])
-    return np.asarray(balance)
+        balance, few = balance + work(t) - work(t[0]), few + work(at) - work(t[0])
+    return np.concatenate([balance, few])
 
 
 def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -192,8 +201,8 @@ def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """By how much the velocities are not the rates of the positions, in stretches as :func:`force_audit` [m/s].
 
     At every sample v against the derivative of the positions, and, where there is an orientation, the radius times ω
-    against its rate; at samples off the grid (:func:`recording.off_grid`) their velocity and, over the time
-    from the nearest sample, their position against the curve through the samples on it.
+    against its rate; at samples off the grid (:func:`proofroll.core.time_grid.off_grid`) their velocity and spin and,
+    over the time from the nearest sample, their position and orientation against the curves through the samples on it.
     """
     return _joined(_rates_audited(body, stretch) for stretch in stretches(dataset))
 
@@ -209,12 +218,18 @@ def _joined(audited: Iterable[FloatArray]) -> FloatArray:
 
 
 def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """The audit of a stretch without events, shape (time - 10,)."""
-    u, acceleration = accelerations(body.surface, dataset)
-    force = body.ball.mass * (acceleration - body.gravity)
-    local = np.einsum("tij,ti->tj", body.surface.frame(u), force) * [-1.0, 1.0, 1.0]
-    reported = np.stack([dataset[name].to_numpy() for name in ("N", "F2", "F3")], axis=-1)
-    return np.asarray(np.max(np.abs(reported - local), axis=-1)[ENDS:-ENDS])
+    """The audit of a stretch without events: on the grid but for its ends, then off it."""
+
+    def apart(given: Mapping[str, FloatArray], at: FloatArray) -> FloatArray:
+        u, acceleration = accelerations(body.surface, dataset, at)
+        force = body.ball.mass * (acceleration - body.gravity)
+        local = np.einsum("tij,ti->tj", body.surface.frame(u), force) * [-1.0, 1.0, 1.0]
+        reported = np.stack([given[name] for name in _FORCES], axis=-1)
+        return np.asarray(np.max(np.abs(reported - local), axis=-1))
+
+    t, (few, between) = dataset["time"].to_numpy(), _off_grid(dataset)
+    found = apart({name: dataset[name].to_numpy() for name in _FORCES}, t)[ENDS:-ENDS]
+    return np.concatenate([found, apart(few, between)]) if "N" in few else found
 
 
 def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -235,21 +250,44 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     if "q_WB" in dataset:
         turned = body.ball.radius * _turning_apart(t, dataset["q_WB"].to_numpy(), dataset["w_WB"].to_numpy())
         found = np.maximum(found, turned[ENDS : len(t) - ENDS])
-    if "between" not in dataset:
+    few, times = _off_grid(dataset)
+    if not len(times):
         return found
-    between = dataset["between"].to_numpy()
-    inside = (between > t[ENDS]) & (between < t[-1 - ENDS])
-    times, p, v = between[inside], dataset["p_between"].to_numpy()[inside], dataset["v_between"].to_numpy()[inside]
     # Along the wall: how far off it the ball is, is the gap's business.
-    away = surface.position(surface.locate(p)) - surface.position(curve(times))
-    since = np.min(np.abs(times[:, None] - t), axis=1, initial=np.inf)
-    return np.concatenate([found, np.maximum(apart(times, v), np.linalg.norm(away, axis=-1) / since)])
+    away = surface.position(surface.locate(few["p_WB"])) - surface.position(curve(times))
+    since = np.min(np.abs(times[:, None] - t), axis=1)
+    spin = make_interp_spline(t, dataset["w_WB"].to_numpy(), k=DEGREE)
+    off = [apart(times, few["v_WB"]), np.linalg.norm(away, axis=-1) / since]
+    off.append(body.ball.radius * np.linalg.norm(few["w_WB"] - spin(times), axis=-1))
+    if "q_WB" in few:
+        last = np.searchsorted(t, times) - 1
+        attitudes = np.stack([dataset["q_WB"].to_numpy()[last], few["q_WB"]])
+        turned = _apart(attitudes, (t[last], times), (t, dataset["w_WB"].to_numpy()))
+        off.append(body.ball.radius * turned / (times - t[last]))
+    return np.concatenate([found, np.max(off, axis=0)])
+
+
+def _off_grid(dataset: xr.Dataset) -> tuple[dict[str, FloatArray], FloatArray]:
+    """What samples off the grid hold, and their times [s], away from the ends of a stretch."""
+    if BETWEEN not in dataset:
+        return {}, np.zeros(0)
+    t, between = dataset["time"].to_numpy(), dataset[BETWEEN].to_numpy()
+    inside = (between > t[ENDS]) & (between < t[-1 - ENDS])
+    values = {name: item.to_numpy()[inside] for name, item in dataset.items() if item.dims[:1] == (BETWEEN,)}
+    return {str(name).removeprefix(f"{BETWEEN}."): item for name, item in values.items()}, between[inside]
 
 
 def _turning_apart(t: FloatArray, q_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
     """Mean difference of ω and the rate of the orientation between each two samples [rad/s], shape (time - 1,)."""
+    return _apart(np.stack([q_WB[:-1], q_WB[1:]]), (t[:-1], t[1:]), (t, w_WB)) / np.diff(t)
+
+
+def _apart(q_WB: FloatArray, times: tuple[FloatArray, FloatArray], spin: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Angles [rad] between orientations and those to which the spin turns others, given as (t [s], ω [rad/s]).
+
+    ``q_WB``, shape (2, n, 4), are before and after, at these ``times`` [s].
+    """
     from scipy.spatial.transform import Rotation
 
-    attitude = Rotation.from_quat(q_WB, scalar_first=True)
-    turned = carried(attitude[:-1], t, w_WB, _SUBSTEPS)
-    return np.asarray((attitude[1:] * turned.inv()).magnitude() / np.diff(t))
+    before, after = (Rotation.from_quat(each, scalar_first=True) for each in q_WB)
+    return np.asarray((after * carried(before, *spin, _SUBSTEPS, times).inv()).magnitude())

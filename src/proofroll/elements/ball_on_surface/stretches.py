@@ -33,35 +33,44 @@ def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
     return [part for part in parts if part.sizes["time"] > DEGREE + 2 * ENDS]
 
 
-def accelerations(surface: Surface, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray]:
+def accelerations(surface: Surface, dataset: xr.Dataset, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
     """Surface coordinates, shape (time, 2), and accelerations of the centre [m/s²], (time, 3), without events between.
 
-    The rates of the coordinates are differentiated, for they turn slowly, unlike velocities in the world.
+    The rates of the coordinates are differentiated, for they turn slowly, unlike velocities in the world. They are
+    given at the samples, or ``at`` other times [s].
     """
     from scipy.interpolate import make_interp_spline
 
     t = dataset["time"].to_numpy()
+    at = t if at is None else at
     u = np.stack([dataset[name].to_numpy() for name in surface.coordinates], axis=-1)
     rates = np.stack([dataset[f"{name}_rate"].to_numpy() for name in surface.coordinates], axis=-1)
-    second = make_interp_spline(t, rates, k=DEGREE).derivative()(t)
+    curve = make_interp_spline(t, rates, k=DEGREE)
+    second = curve.derivative()(at)
+    if at is not t:
+        u, rates = make_interp_spline(t, u, k=DEGREE)(at), curve(at)
     acceleration = np.einsum("tij,tj->ti", surface.tangents(u), second)
     acceleration += np.einsum("tijk,tj,tk->ti", surface.second(u), rates, rates)
     return u, acceleration
 
 
-def carried(start: Rotation, t: FloatArray, w_WB: FloatArray, substeps: int) -> Rotation:
-    """Where the spin [rad/s], shape (time, 3), turns ``start`` from each sample to the next.
+def carried(
+    start: Rotation, t: FloatArray, w_WB: FloatArray, substeps: int, spans: tuple[FloatArray, FloatArray] | None = None
+) -> Rotation:
+    """Where the spin [rad/s], shape (time, 3), turns ``start`` from each sample to the next, or over other ``spans``.
 
     The ball may turn more than once from sample to sample, so ω is integrated, by Magnus steps of fourth order
     (Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 2009, section 5.4).
 
-    ``start`` are the orientations at all samples but the last, ``t`` the times of the samples [s].
+    ``start`` are the orientations at all samples but the last, or at the beginnings of the spans; ``t`` the times of
+    the samples [s].
     """
     from scipy.interpolate import make_interp_spline
     from scipy.spatial.transform import Rotation
 
-    spin, h = make_interp_spline(t, w_WB, k=min(DEGREE, len(t) - 1)), np.diff(t)[:, None] / substeps
+    begin, end = (t[:-1], t[1:]) if spans is None else spans
+    spin, h = make_interp_spline(t, w_WB, k=min(DEGREE, len(t) - 1)), (end - begin)[:, None] / substeps
     for step in range(substeps):
-        one, two = (spin(t[:-1] + (step + 0.5 + side / np.sqrt(12)) * h[:, 0]) for side in (-1, 1))
+        one, two = (spin(begin + (step + 0.5 + side / np.sqrt(12)) * h[:, 0]) for side in (-1, 1))
         start = Rotation.from_rotvec(h * (one + two) / 2 - np.sqrt(3) / 12 * h**2 * np.cross(one, two)) * start
     return start

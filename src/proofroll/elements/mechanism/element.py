@@ -218,7 +218,7 @@ class MechanismElement:
         wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
         return read_only(wrench)
 
-    def variables(self, times: FloatArray, samples: Sequence[MechanismSample], between: object) -> Columns:  # noqa: ARG002 -- the grid hides nothing here: positions are held against the truth
+    def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
         return from_samples(self, times, samples)
 

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from functools import reduce
 from itertools import accumulate
 
@@ -10,15 +11,16 @@ import xarray as xr
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.dataset import from_samples, observe, scales
+from proofroll.core.dataset import from_samples, observe, off_grid_apart, scales
 from proofroll.core.scene import Scene
-from proofroll.elements.ball_on_surface.dataset import columns, samples_between
+from proofroll.core.time_grid import off_grid
+from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
-from proofroll.running.recording import off_grid
+from proofroll.truth.orientation import QUATERNIONS, orientation
 from proofroll.truth.rolling import reduced
 
 TIMES = np.linspace(0, 0.6, 61)
@@ -103,21 +105,49 @@ def test_rate_audit_sees_a_velocity_of_its_own(case: tuple[Scene, xr.Dataset]) -
 def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
     """What is zero at every sample of the grid, and nowhere else, shows at the samples off it."""
     scene = load_scene("sphere_in_cylinder")
-    times = off_grid(TIMES, None)
-    both = np.union1d(TIMES, times)
-    motion, probed = reduced(rolling_ball(scene), TIMES), reduced(rolling_ball(scene), both)
-    dataset = columns(rolling_ball(scene), TIMES, motion.p_WB, motion.v_WB, motion.w_WB).dataset()
+    dataset = off_the_grid(scene)
 
     def with_beat(size: float) -> xr.Dataset:
-        samples = {}
-        for t in times.tolist():
-            index = int(np.searchsorted(both, t))
-            beat = np.array([0, 0, size * np.sin(200 * np.pi * t)])
-            samples[t] = BallSample(probed.p_WB[index] + beat, probed.v_WB[index], probed.w_WB[index])
-        return dataset.assign(samples_between(samples))
+        beat = xr.zeros_like(dataset["between.p_WB"])
+        beat[:, 2] = size * np.sin(200 * np.pi * dataset["between"])
+        return dataset.assign({"between.p_WB": dataset["between.p_WB"] + beat})
 
     assert largest(rate_audit(rolling_ball(scene), with_beat(0.0))) < 1e-7
     assert largest(rate_audit(rolling_ball(scene), with_beat(1e-5))) > 1e-5 / 0.005 / 2
+
+
+def off_the_grid(scene: Scene) -> xr.Dataset:
+    """A right run with its orientation, sampled on the grid and at a few times off it."""
+    body, between = rolling_ball(scene), off_grid(TIMES, None)
+    times = np.union1d(TIMES, between)
+    motion = reduced(body, times)
+
+    def spin(at: np.ndarray) -> np.ndarray:
+        whole = np.union1d(0.0, at)
+        return reduced(body, whole).w_WB[np.isin(whole, at)]
+
+    q = orientation(spin, times, (), QUATERNIONS)
+    made = columns(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q)
+    return off_grid_apart(scene, made, TIMES, between).dataset()
+
+
+LIES: dict[str, tuple[str, Callable[[xr.DataArray], xr.DataArray]]] = {
+    "w_WB": ("rate_audit", lambda w: 3 * w),
+    "q_WB": ("rate_audit", lambda q: q * 0 + [1.0, 0, 0, 0]),
+    "F2": ("force_audit", lambda F: 100 * F + 1),
+    "v_WB": ("energy_balance", lambda v: 2 * v),
+}
+
+
+@pytest.mark.parametrize("name", LIES)
+def test_audits_see_what_is_wrong_off_the_grid_alone(name: str) -> None:
+    """Spin, orientation, force and speed that are right at every sample of the grid are looked at off it, too."""
+    scene = load_scene("sphere_in_cylinder")
+    right, (audit, lie) = off_the_grid(scene), LIES[name]
+    assert right.sizes["between"] == 8
+    wrong = right.assign({f"between.{name}": lie(right[f"between.{name}"])})
+    before, after = (largest(observe(scene, run)[audit]) for run in (right, wrong))
+    assert after > 100 * before + 0.1
 
 
 def test_rate_audit_sees_an_orientation_of_its_own() -> None:

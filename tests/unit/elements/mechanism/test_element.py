@@ -68,7 +68,7 @@ def noticed(element: MechanismElement, built: MechanismBuilt, **changed: object)
 def test_observables_are_those_of_the_dataset(name: str) -> None:
     """Each observable is a variable of a run with the unit that it declares, and has a size."""
     element = element_of(name)
-    run = element.variables(np.zeros(1), [at_start(element)], {}).dataset()
+    run = element.variables(np.zeros(1), [at_start(element)]).dataset()
     for item in element.observables:
         assert run[item.name].attrs["units"] == item.unit
         assert item.floor is not None
@@ -152,7 +152,7 @@ def test_reactions_of_another_shape_are_named(name: str, wrong: object, words: s
     sample = at_start(element, **({"joint_force": zeros, "joint_torque": zeros} | {name: wrong}))
     for read in (
         lambda: element.certify(right(element), sample),
-        lambda: element.variables(np.zeros(1), [sample], {}),
+        lambda: element.variables(np.zeros(1), [sample]),
     ):
         with pytest.raises(Diverged, match=f"^the engine gave {name} {words}"):
             read()
@@ -169,8 +169,8 @@ def test_a_reaction_without_value_says_why() -> None:
     """What the equations do not determine, and what an engine does not give, have different reasons."""
     element = element_of("slider_crank")
     count = len(element.analysis.determinate)
-    given = element.variables(np.zeros(1), [at_start(element, joint_force=np.ones((count, 3)))], {}).dataset()
-    silent = element.variables(np.zeros(1), [at_start(element)], {}).dataset()
+    given = element.variables(np.zeros(1), [at_start(element, joint_force=np.ones((count, 3)))]).dataset()
+    silent = element.variables(np.zeros(1), [at_start(element)]).dataset()
     assert given["force.pin.z"].attrs["absent"] == UNDETERMINED
     assert np.isnan(given["force.pin.z"]).all()
     assert "absent" not in given["force.pin.x"].attrs
@@ -181,9 +181,9 @@ def test_a_reaction_without_value_says_why() -> None:
 def test_reactions_in_part_are_not_observed() -> None:
     """An engine that gives no reactions is judged by its motion, and those of time 0 are the certificate's."""
     element = element_of("pendulum")
-    silent = element.variables(np.arange(2.0), [at_start(element)] * 2, {}).dataset()
+    silent = element.variables(np.arange(2.0), [at_start(element)] * 2).dataset()
     full = {"joint_force": np.ones((1, 3)), "joint_torque": np.ones((1, 3))}
-    given = element.variables(np.arange(2.0), [at_start(element, **full)] * 2, {}).dataset()
+    given = element.variables(np.arange(2.0), [at_start(element, **full)] * 2).dataset()
     assert "forces" not in element.observe(silent)
     assert element.observe(given)["forces"].shape == (1, 3)
     assert element.observe(given)["positions"].shape == (2, 1, 3)
@@ -195,7 +195,7 @@ def test_signs_of_failure() -> None:
     start = at_start(element)
     apart = at_start(element, p_WB=start.p_WB + 0.5)
     fast = at_start(element, w_WB=start.w_WB + 50.0)
-    run = element.variables(np.arange(3.0), [start, apart, fast], {}).dataset()
+    run = element.variables(np.arange(3.0), [start, apart, fast]).dataset()
     shown = {sign.name: sign.shown.tolist() for sign in element.signs(run, None)}
     assert shown[OPENED] == [False, True, False]
     assert shown[ENERGY_GAIN] == [False, True, True]
