@@ -41,6 +41,7 @@ from proofroll.robots.records import (
     HeldLayer,
     ImporterRow,
     RobotCheck,
+    UnlikeValue,
     UsedTruth,
 )
 from proofroll.robots.robot_file import LintFinding
@@ -149,6 +150,14 @@ def test_a_robot_file(proofroll: Proofroll, tmp_path: Path) -> None:
     assert set(json.loads(out)) == fields("`check --json` of a robot file")
 
 
+def test_two_files_of_a_robot(proofroll: Proofroll, tmp_path: Path) -> None:
+    """The document about two files has the fields of a robot file's and those of its own table."""
+    robot = tmp_path / "arm.urdf"
+    robot.write_text(urdf(), encoding="utf-8")
+    _, out, _ = proofroll("check", str(robot), "--against", str(robot), "--states", "1", "--json")
+    assert set(json.loads(out)) == fields("`check --json` of a robot file") | fields("`check --against --json`")
+
+
 ROBOT = (RobotCheck, LintFinding, UsedTruth, ImporterRow, HeldLayer, RobotCause, DrawnRobot, DrawnBody, DrawnJoint)
 COMPARISON = (
     ReportedComparison, ReportedRow, ReportedRun, WorstJudgement, CauseAt, Cause, Claims, ExceptAt, Cost, Line,
@@ -166,6 +175,7 @@ TRADEOFF = (
     ("page", "title", "records"),
     [
         ("json.md", "`check --json` of a robot file", (*ROBOT, GalleryRow, GalleryReading)),
+        ("json.md", "`check --against --json`", (UnlikeValue,)),
         ("json.md", "`compare --json`", COMPARISON),
         ("json.md", "`stability --json`", MAP),
         ("tradeoff.md", "JSON", (*TRADEOFF, Recommendation, Answer, CheckedOver)),
@@ -173,7 +183,7 @@ TRADEOFF = (
         ("json.md", "`onset --json`", (OnsetStudy, EngineOnset, Onset)),
         ("json.md", "The other commands", (Drilled, Mutated, GalleryRow)),
     ],
-    ids=["robots", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
+    ids=["robots", "against", "compare", "stability", "tradeoff", "ladder", "onset", "others"],
 )
 def test_fields_of_records(page: str, title: str, records: tuple[type, ...]) -> None:
     """Each field of what a command prints as records is named where its JSON is described."""

@@ -14,15 +14,14 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.plugins import parse_engine
 from proofroll.robots import reading
-from proofroll.robots.body_recursion import body_recursion
+from proofroll.robots.against import reading_of
 from proofroll.robots.judging import judged
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
-from proofroll.robots.protocol import Reading, Request
+from proofroll.robots.protocol import Request
 from proofroll.robots.records import ImporterRow
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.states import random_states
-from proofroll.robots.two_formulations import passive, poses
 from proofroll.robots.urdf import BASE_JOINT, read_urdf
 from proofroll.running.process import Worker
 
@@ -320,30 +319,6 @@ UNKNOWN: list[tuple[str, Callable[[str], str], str]] = [
 ]
 
 
-def _held(robot: Robot, truth: RobotTruth) -> Reading:
-    """What an engine would say that holds this robot and evaluates it by the second formulation."""
-    states = truth.states
-    d, placed = body_recursion(robot, states), poses(robot, states)
-    asked = states.stacked(states.acceleration, robot)
-    torque = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
-    forward = np.linalg.solve(d.M, (torque - d.h - passive(robot, states))[..., None])[..., 0]
-    groups = robot.groups
-    return Reading(
-        tuple(groups),
-        tuple(joint.dofs for joint in robot.moving),
-        {name: body.mass for name, body in groups.items()},
-        {name: body.com for name, body in groups.items()},
-        {name: body.inertia for name, body in groups.items()},
-        {joint.name: placed[joint.child][0] for joint in robot.moving},
-        {joint.name: placed[joint.child][1] for joint in robot.moving},
-        d.M,
-        d.g,
-        d.h,
-        np.einsum("sij,sj->si", d.M, asked) + d.h,
-        forward,
-    )
-
-
 def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> ImporterRow:
     files = []
     for name, content in (("true", text), ("held", change(text))):
@@ -352,7 +327,7 @@ def _row(text: str, change: Callable[[str], str], base: str, folder: Path) -> Im
         files.append(open_robot(path, base))
     robot, held = (read_urdf(file) for file in files)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
-    answer = reading.ReaderAnswer("1", "", {}, _held(held, truth), "")
+    answer = reading.ReaderAnswer("1", "", {}, reading_of(held, truth), "")
     return judged(files[0], truth, 1e-14, parse_engine("planted"), answer)
 
 
@@ -424,7 +399,7 @@ def test_planted_causes_in_mjcf(
         written = reading.write(files[-1], tmp_path / f"{name}-given")
         robots.append(reading.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
-    answer = reading.ReaderAnswer("1", "", {}, _held(robots[1], truth), "")
+    answer = reading.ReaderAnswer("1", "", {}, reading_of(robots[1], truth), "")
     row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer)
     assert [found.id for found in row.causes] == [cause]
     assert row.status == "explained"
@@ -437,7 +412,7 @@ def test_free_base_that_was_fixed(tmp_path: Path) -> None:
     free, fixed = open_robot(path, "free"), open_robot(path, "fixed")
     robot, held = read_urdf(free), read_urdf(fixed)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
-    answer = reading.ReaderAnswer("1", "", {}, dataclasses.replace(_held(held, truth)), "")
+    answer = reading.ReaderAnswer("1", "", {}, dataclasses.replace(reading_of(held, truth)), "")
     row = judged(free, truth, 1e-14, parse_engine("planted"), answer)
     assert [cause.id for cause in row.causes] == ["free_base_is_fixed"]
     assert row.status == "explained"

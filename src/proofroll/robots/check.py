@@ -72,7 +72,7 @@ def check(
             raise InputError("file", path, "nothing in it moves" + _fixed_hint(file))
         sampled = random_states(robot, states, seed)
         truth = RobotTruth.of(robot, sampled)
-        bar = _bar(truth)
+        bar = bar_of(truth)
         children = {joint.name: joint.child for joint in robot.moving}
         request = Request(
             written, file.kind, base, BASE_JOINT, {}, children, sampled, truth.torques, robot.gravity, robot
@@ -115,7 +115,7 @@ def check(
         truth=UsedTruth(by, bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=rows,
-        robot=_drawn(truth),
+        robot=drawn(truth),
     )
 
 
@@ -123,14 +123,14 @@ def _fixed_hint(file: RobotFile) -> str:
     return "; try --base free" if file.kind == "urdf" and file.base == "fixed" else ""
 
 
-def _bar(truth: RobotTruth) -> float:
+def bar_of(truth: RobotTruth) -> float:
     """The largest relative difference of the two formulations."""
     one, other = truth.dynamics, body_recursion(truth.robot, truth.states)
     pairs = ((one.M, other.M), (one.g, other.g), (one.h, other.h))
     return max(float(np.abs(a - b).max() / (np.abs(b).max() or 1.0)) for a, b in pairs)
 
 
-def _drawn(truth: RobotTruth) -> DrawnRobot:
+def drawn(truth: RobotTruth) -> DrawnRobot:
     """Where every body is at rest coordinates."""
     robot = truth.robot
     zero = {joint.name: np.zeros(1) for joint in robot.moving}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -25,12 +26,17 @@ def check(
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
     time_limit: Annotated[float, typer.Option(min=0.1, help="Wall seconds for each engine.")] = 120.0,
+    against: Annotated[Path | None, typer.Option(help="Another file of the robot, instead of engines.")] = None,
+    names: Annotated[
+        list[str] | None,
+        typer.Option("--map", help="With --against: joint=joint where names differ, or a TOML file of such; repeat."),
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
 
-    Of a robot file: exit 1 if an engine does not hold the model that the file describes, or if the file describes what
-    cannot be. The options are for these.
+    Of a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
+    if the file describes what cannot be. The options are for these.
     """
     if is_text_check(file):
         _require_none_for_robots(context)
@@ -39,17 +45,18 @@ def check(
     from proofroll.robots.check import check as checked
     from proofroll.robots.terminal import WIDTH, check_parts
 
-    with options.progress_bar("engines") as advance:
-        content = checked(
-            file,
-            engine or (),
-            base=base,
-            root=root,
-            states=states,
-            seed=seed,
-            time_limit=time_limit,
-            progress=advance,
-        )
+    how: dict[str, Any] = {"base": base, "root": root, "states": states, "seed": seed, "time_limit": time_limit}
+    if against is None:
+        if names:
+            raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
+        with options.progress_bar("engines") as advance:
+            content = checked(file, engine or (), progress=advance, **how)
+    else:
+        from proofroll.robots.against import against as held_against
+
+        if engine:
+            raise InputError("--engine", ", ".join(engine), "--against compares two files and asks no engine; drop one")
+        content = held_against(file, against, _partners(names or ()), **how)
     if out is not None:
         from proofroll.robots.page import page
         from proofroll.running.store import write_text
@@ -60,6 +67,24 @@ def check(
     if any(row.differs for row in content.engines) or any(finding.level == "error" for finding in content.lint):
         raise typer.Exit(options.CONTRADICTED)
     raise typer.Exit(options.OK if any(row.layers for row in content.engines) else options.ENGINE)
+
+
+def _partners(given: Sequence[str]) -> dict[str, str]:
+    """Joint of the first file -> joint of the second, from ``joint=joint`` or files of such lines.
+
+    Raises:
+        InputError: one is neither, or a joint is given twice.
+    """
+    from proofroll.files.toml import read_toml
+
+    files = [text for text in given if "=" not in text]
+    written = [text for text in given if "=" in text]
+    for name in files:
+        for one, two in read_toml(Path(name)).items():
+            if not isinstance(two, str):
+                raise InputError(f"{name}: {one}", two, 'write the name of a joint in the second file, "..."')
+            written.append(f"{one}={two}")
+    return options.assignments(written, "--map")
 
 
 def _require_none_for_robots(context: typer.Context) -> None:

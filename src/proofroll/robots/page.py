@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.report.pages import environment, rendered
-from proofroll.robots.records import RobotCheck
+from proofroll.robots.records import AgainstCheck, RobotCheck
 from proofroll.robots.terminal import SHORT, amount, sentences
 
 if TYPE_CHECKING:
@@ -22,7 +22,8 @@ _SIZE = 400.0
 
 def page(content: RobotCheck) -> str:
     """The HTML page; everything from the file and the engines is escaped."""
-    said = {"short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
+    pair = isinstance(content, AgainstCheck)
+    said = {"pair": pair, "short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
     return rendered(_templates(), "check.html", content=content, **said)
 
 

@@ -109,6 +109,36 @@ class RobotCheck:
 
 
 @dataclass(frozen=True)
+class UnlikeValue:
+    """What a joint has in one file ``here`` and in another ``there``; null where a file gives none."""
+
+    joint: str
+    quantity: str
+    here: float | str | None
+    there: float | str | None
+
+
+@dataclass(frozen=True)
+class AgainstCheck(RobotCheck):
+    """A second file held against the first, whose row stands where those of engines do.
+
+    Attributes:
+        against: the second file.
+        against_by: by whose reading it has its meaning.
+        matched: joint of the first file -> its partner in the second.
+        absent, added: moving joints that only the first file has, or only the second.
+        values: what joints have otherwise.
+    """
+
+    against: str
+    against_by: str
+    matched: Mapping[str, str]
+    absent: list[str]
+    added: list[str]
+    values: list[UnlikeValue]
+
+
+@dataclass(frozen=True)
 class GalleryReading:
     """What an engine ``does`` with a robot, in the words of the gallery's file."""
 

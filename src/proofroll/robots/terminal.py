@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
+from pathlib import Path
 
 from rich.table import Column, Table
 from rich.text import Text
@@ -12,7 +13,7 @@ from proofroll.core.number_text import counted, error
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal import STYLES
-from proofroll.robots.records import GalleryContent, HeldLayer, ImporterRow, RobotCheck
+from proofroll.robots.records import AgainstCheck, GalleryContent, HeldLayer, ImporterRow, RobotCheck
 
 WIDTH = 80
 SHORT = {
@@ -35,12 +36,15 @@ def check_parts(content: RobotCheck) -> Iterator[Table | str]:
     yield from lines(content)
     yield table(content)
     yield from verdict_lines(content)
+    if isinstance(content, AgainstCheck):
+        yield from against_lines(content)
 
 
 def table(content: RobotCheck) -> Table:
     """One line per engine: the difference at each layer that does not hold."""
     layers = numeric(*(SHORT[layer] for layer in content.layers))
-    made = plain_table(Column("engine", no_wrap=True, max_width=20), *unbroken(""), *layers)
+    first = "file" if isinstance(content, AgainstCheck) else "engine"
+    made = plain_table(Column(first, no_wrap=True, max_width=20), *unbroken(""), *layers)
     for row in content.engines:
         style = _COLOURS.get(row.status, "bold red")
         # A path would fill the column, and the version says which it is.
@@ -81,6 +85,29 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
             yield from wrapped(sentence)
 
 
+def against_lines(content: AgainstCheck) -> Iterator[str]:
+    """How joints were matched, and what they have in one file and not in the other."""
+    here, there = (Path(name).name for name in (content.file, content.against))
+    if here == there:
+        here, there = content.file, content.against
+    yield from wrapped(f"what {there} says is {content.against_by}")
+    partners = [f"{one} is {two}" for one, two in content.matched.items() if one != two]
+    if partners:
+        yield from wrapped(f"joints with another name there: {', '.join(partners)}")
+    for name, alone in ((here, content.absent), (there, content.added)):
+        if alone:
+            yield from wrapped(f"only in {name}: {', '.join(alone)}")
+    if content.absent and content.added:
+        yield "joints of the same kind are matched by --map NAME=NAME"
+    for value in content.values:
+        said = (f"{_value(each)} in {name}" for each, name in ((value.here, here), (value.there, there)))
+        yield from wrapped(f"joint {value.joint}: {value.quantity} {', '.join(said)}")
+
+
+def _value(value: float | str | None) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else value or "none"
+
+
 def sentences(row: ImporterRow) -> Iterator[str]:
     """What one engine does, a sentence each."""
     name = row.named
@@ -89,9 +116,10 @@ def sentences(row: ImporterRow) -> Iterator[str]:
     if row.message:
         yield f"{name} {_VERBS.get(row.status, row.status)}: {row.message}"
     for cause in row.causes:
+        advice = f" Do: {cause.remedy}." if cause.remedy else ""
         yield (
             f"{name} differs in {cause.layer} by {amount(cause.before)}; explained by: {cause.name}; "
-            f"with that hypothesis {amount(cause.after)}. Do: {cause.remedy}."
+            f"with that hypothesis {amount(cause.after)}.{advice}"
         )
     if row.unexplained:
         off = amount(row.layers[row.unexplained].difference)

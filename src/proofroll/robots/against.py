@@ -1,0 +1,223 @@
+"""Two files of one robot: where they describe different ones, and which file has what."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import math
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import InputError, require_known
+from proofroll.core.plugins import EngineSpec
+from proofroll.robots import reading
+from proofroll.robots.body_recursion import body_recursion
+from proofroll.robots.check import bar_of, drawn
+from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened
+from proofroll.robots.layers import LAYERS, RobotTruth
+from proofroll.robots.lint import lint
+from proofroll.robots.model import Array, Mimic, Robot
+from proofroll.robots.protocol import Reading
+from proofroll.robots.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth
+from proofroll.robots.robot_file import LintFinding, RobotFile
+from proofroll.robots.states import random_states
+from proofroll.robots.two_formulations import passive, poses
+from proofroll.running.asking import lent_workers
+from proofroll.running.worker_pool import Workers
+
+# Values that differ by more, for their size, are told: files round differently when they are read.
+_ROUNDING = 1e-9
+
+
+def against(
+    path: Path,
+    other: Path,
+    names: Mapping[str, str] | None = None,
+    *,
+    base: str = "fixed",
+    root: Path | None = None,
+    states: int = 20,
+    seed: int = 0,
+    time_limit: float = TIME_LIMIT,
+) -> AgainstCheck:
+    """Holds what a second file describes against the first, at states of the first.
+
+    Args:
+        path: of a URDF or MJCF, which is taken as true.
+        other: of another.
+        names: joint of the first -> joint of the second, where they have different names.
+        base: what carries the root of a URDF, ``fixed`` or ``free``.
+        root: folder that each file and what it names lie in; by default the file's own.
+        states: how many random states are compared.
+        seed: of the states.
+        time_limit: for compiling a file [s].
+
+    Raises:
+        InputError: a file is wrong, or a name is none of its joints'.
+    """
+    with lent_workers(None) as workers:
+        (file, robot, by), (second, found, by_other) = (
+            _meant(each, base, root, time_limit, workers) for each in (path, other)
+        )
+        matched = _matched(robot, found, names or {})
+        renamed = _renamed(found, matched)
+        truth = RobotTruth.of(robot, random_states(robot, states, seed))
+        bar = bar_of(truth)
+        there, here = (each.name if path.name != other.name else str(each) for each in (other, path))
+        rows = [judged(file, truth, bar, EngineSpec(there, {}), _answer(renamed, truth), workers)]
+        if rows[0].unexplained:  # what only the second file has is found from its side
+            turned = RobotTruth.of(renamed, random_states(renamed, states, seed))
+            row = judged(second, turned, bar_of(turned), EngineSpec(here, {}), _answer(robot, turned), workers)
+            rows = [row] if row.status == "explained" else rows
+    ours, theirs = ({joint.name for joint in each.moving} for each in (robot, found))
+    return AgainstCheck(
+        file=str(path),
+        kind=file.kind,
+        base=base if "urdf" in {file.kind, second.kind} else "as in the file",
+        lint=[*_lint(file, robot), *(_of_file(other, finding) for finding in _lint(second, found))],
+        truth=UsedTruth(by, bar, states, seed, robot.dofs),
+        layers=LAYERS,
+        engines=[_as_file(row) for row in rows],
+        robot=drawn(truth),
+        against=str(other),
+        against_by=by_other,
+        matched=matched,
+        absent=sorted(ours - matched.keys()),
+        added=sorted(theirs - set(matched.values())),
+        values=list(_unlike(robot, renamed)),
+    )
+
+
+def _meant(
+    path: Path, base: str, root: Path | None, time_limit: float, workers: Workers
+) -> tuple[RobotFile, Robot, str]:
+    """A file, its robot, and by whose reading."""
+    file = opened(path, base, root, time_limit, workers)
+    with tempfile.TemporaryDirectory() as folder:
+        robot, compiler = meaning(file, reading.write(file, Path(folder)), time_limit, workers)
+    if not robot.moving:
+        raise InputError("file", path, "nothing in it moves")
+    return file, robot, f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
+
+
+def _lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
+    return [*file.findings, *lint(file, robot)]
+
+
+def _of_file(path: Path, finding: LintFinding) -> LintFinding:
+    return dataclasses.replace(finding, where=f"{path.name}: {finding.where}")
+
+
+def _answer(robot: Robot, truth: RobotTruth) -> reading.ReaderAnswer:
+    return reading.ReaderAnswer("", "", {}, reading_of(robot, truth), "")
+
+
+def _as_file(row: ImporterRow) -> ImporterRow:
+    """The row without what is to be done about an engine."""
+    return dataclasses.replace(row, causes=[dataclasses.replace(cause, remedy="", known="") for cause in row.causes])
+
+
+def _matched(robot: Robot, other: Robot, names: Mapping[str, str]) -> dict[str, str]:
+    """Moving joint of the first -> of the second: as given, of the same name, or the only free joint of each.
+
+    Raises:
+        InputError: a name is none of a file's moving joints', or is given twice.
+    """
+    ours, theirs = ({joint.name: joint for joint in each.moving} for each in (robot, other))
+    for one, two in names.items():
+        require_known("--map", one, ours, "no joint of the first file moves under this name; those are", f"{one}={two}")
+        words = "no joint of the second file moves under this name; those are"
+        require_known("--map", two, theirs, words, f"{one}={two}")
+        if ours[one].dofs != theirs[two].dofs:
+            kinds = f"{one} is {ours[one].kind}, {two} is {theirs[two].kind}; choose joints of one kind"
+            raise InputError("--map", f"{one}={two}", kinds)
+    taken = set(names.values())
+    if len(taken) < len(names):
+        raise InputError("--map", ", ".join(names.values()), "each joint has one partner")
+    found = dict(names) | {name: name for name in ours if name not in names and name in theirs and name not in taken}
+    free = [
+        [name for name, joint in each.items() if joint.kind == "free" and name not in known]
+        for each, known in ((ours, found), (theirs, set(found.values())))
+    ]
+    if all(len(left) == 1 for left in free):
+        found[free[0][0]] = free[1][0]
+    return {name: found[name] for name in ours if name in found and ours[name].dofs == theirs[found[name]].dofs}
+
+
+def _renamed(other: Robot, matched: Mapping[str, str]) -> Robot:
+    """The second robot with the first's names; a joint without a partner has none of the first's names."""
+    back = {theirs: ours for ours, theirs in matched.items()}
+    new = {joint.name: back.get(joint.name, f"{joint.name} of the second file") for joint in other.joints}
+    joints = tuple(dataclasses.replace(joint, name=new[joint.name]) for joint in other.joints)
+    mimics = tuple(dataclasses.replace(mimic, joint=new[mimic.joint], other=new[mimic.other]) for mimic in other.mimics)
+    return other.change(joints=joints, mimics=mimics)
+
+
+def reading_of(robot: Robot, truth: RobotTruth) -> Reading:
+    """What an engine would answer that holds a robot, evaluated by the second formulation."""
+    states = truth.states.completed(robot)
+    d, placed = body_recursion(robot, states), poses(robot, states)
+    asked = states.stacked(states.acceleration, robot)
+    given = truth.torques
+    still = {joint.name: np.zeros((states.count, joint.dofs)) for joint in robot.moving}
+    torque = np.concatenate([(still | given)[joint.name] for joint in robot.moving], axis=1)
+    forward: Array | None = None
+    with contextlib.suppress(np.linalg.LinAlgError):
+        forward = np.asarray(np.linalg.solve(d.M, (torque - d.h - passive(robot, states))[..., None])[..., 0], float)
+    groups = robot.groups
+    carried = {joint.name: joint.child for joint in robot.moving}
+    true = {mimic.joint: mimic for mimic in truth.robot.mimics}
+    return Reading(
+        tuple(groups),
+        tuple(joint.dofs for joint in robot.moving),
+        {name: body.mass for name, body in groups.items()},
+        {name: body.com for name, body in groups.items()},
+        {name: body.inertia for name, body in groups.items()},
+        {name: placed[child][0] for name, child in carried.items()},
+        {name: placed[child][1] for name, child in carried.items()},
+        d.M,
+        d.g,
+        d.h,
+        np.einsum("sij,sj->si", d.M, asked) + d.h,
+        forward,
+        coupled=tuple(mimic.joint for mimic in robot.mimics if _same(true.get(mimic.joint), mimic)),
+    )
+
+
+def _same(one: Mimic | None, other: Mimic) -> bool:
+    return one is not None and one.other == other.other and not _apart(one.multiplier, other.multiplier)
+
+
+_LAWS = ("kind", "damping", "friction", "armature", "stiffness", "rest", "lower", "upper")
+
+
+def _unlike(robot: Robot, other: Robot) -> Iterator[UnlikeValue]:
+    """What joints have in one file and not, or otherwise, in the other."""
+    theirs = {joint.name: joint for joint in other.moving}
+    groups = robot.groups, other.groups
+    follows = [{mimic.joint: _written(mimic) for mimic in each.mimics} for each in (robot, other)]
+    for joint in robot.moving:
+        if joint.name not in theirs:
+            continue
+        pairs: dict[str, tuple[Any, Any]] = {
+            law: (getattr(joint, law), getattr(theirs[joint.name], law)) for law in _LAWS
+        }
+        pairs["follows"] = (follows[0].get(joint.name), follows[1].get(joint.name))
+        pairs["mass that it carries"] = (groups[0][joint.name].mass, groups[1][joint.name].mass)
+        for quantity, (here, there) in pairs.items():
+            if _apart(here, there):
+                yield UnlikeValue(joint.name, quantity, here, there)
+
+
+def _written(mimic: Mimic) -> str:
+    return f"{mimic.multiplier:g} · {mimic.other} + {mimic.offset:g}"
+
+
+def _apart(here: Any, there: Any) -> bool:
+    if isinstance(here, float) and isinstance(there, float):
+        return not math.isclose(here, there, rel_tol=_ROUNDING, abs_tol=_ROUNDING)
+    return bool(here != there)
