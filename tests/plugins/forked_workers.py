@@ -175,8 +175,7 @@ def _as_if_started(line: socket.socket, request: dict[str, Any], stdin: int, log
         os.dup2(ours, standard)
     os.close(stdin)
     os.close(log)
-    sys.path[0] = request["cwd"]
-    sys.path[1:1] = filter(None, request["env"].get("PYTHONPATH", "").split(os.pathsep))
+    sys.path[:0] = filter(None, request["env"].get("PYTHONPATH", "").split(os.pathsep))
 
 
 if __name__ == "__main__":

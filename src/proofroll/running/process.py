@@ -62,10 +62,14 @@ def end_all() -> None:
         worker.shoot()
 
 
+def safe_environment() -> dict[str, str]:
+    """The environment of a Python that imports no module of the working folder, where ``-m`` and ``-c`` look first."""
+    return {**os.environ, "PYTHONSAFEPATH": "1"}
+
+
 def environment_of_another() -> dict[str, str]:
     """The environment of a process in another interpreter, which shall find its own modules and no others."""
-    kept = {name: value for name, value in os.environ.items() if name not in _OF_THIS_PYTHON}
-    return kept | {"PYTHONSAFEPATH": "1"}  # or ``-m`` would look in the working folder first
+    return {name: value for name, value in safe_environment().items() if name not in _OF_THIS_PYTHON}
 
 
 class Worker:
@@ -96,7 +100,7 @@ class Worker:
                 stdout=log,
                 stderr=log,
                 pass_fds=(writer, life),
-                env=(environment_of_another() if python else os.environ) | _ONE_THREAD,
+                env=(environment_of_another() if python else safe_environment()) | _ONE_THREAD,
                 text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
             )

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.files.data_folders import data_folder
+from proofroll.running.process import safe_environment
 
 # Exit code of a program whose finding still shows; 0 says that it is gone, everything else that it could not tell.
 SHOWS = 10
@@ -137,7 +138,7 @@ def shown(findings: Sequence[EngineFinding], python: str = "", time_limit: float
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / f"{item.name}.py"
             file.write_text(item.program, encoding="utf-8")
-            code, said = _run([interpreter, "-P", str(file)], time_limit, folder)
+            code, said = _run([interpreter, str(file)], time_limit, folder)
         state = {SHOWS: FindingState.SHOWS, 0: FindingState.GONE}.get(code, FindingState.BROKEN)
         yield Shown(item, state, versions[item.package], (said.strip().splitlines() or [""])[-1])
 
@@ -146,7 +147,14 @@ def _run(command: list[str], time_limit: float, folder: str | None = None) -> tu
     """Exit code and output, that of standard error where there is nothing else; engines may write into ``folder``."""
     try:
         done = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", timeout=time_limit, check=False, cwd=folder
+            command,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=time_limit,
+            check=False,
+            cwd=folder,
+            env=safe_environment(),
         )
     except subprocess.TimeoutExpired:
         return -1, f"it did not end within {time_limit:g} s"

@@ -258,3 +258,14 @@ def test_who_computes_without_end_is_ended_beside_others_too(pretend: Pretend, c
     """The limit of time is met by a worker that shares its processor: it is only met later."""
     pretend(f"os.sched_setaffinity(0, {{{crowded}}})\nwhile True: pass")
     assert died(time_limit=0.3).status is Status.TIMEOUT
+
+
+def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A worker beside files named as modules of Python, of ours and of engines runs none of them."""
+    for name in ("random", "numpy", "mujoco", "proofroll"):
+        (tmp_path / f"{name}.py").write_text(f"open({str(tmp_path / 'executed')!r}, 'a').write({name!r})")
+    monkeypatch.chdir(tmp_path)
+    with Worker() as worker:
+        answer = worker.request({"do": "hello", "place": ""}, 60)
+    assert answer["proofroll"]
+    assert not (tmp_path / "executed").exists()

@@ -58,6 +58,15 @@ def test_what_cannot_be_run_is_said() -> None:
         list(shown([made("")], "/no/such/python"))
 
 
+def test_modules_of_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files named as modules of Python that lie where the command is called are not run."""
+    for name in ("json", "random"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit(10)")
+    monkeypatch.chdir(tmp_path)
+    (row,) = shown([made("import json, random")])
+    assert row.state == FindingState.GONE
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [("no front", "begin with TOML"), ("+++\ntitle = \n+++\n", "cannot be read"), ("+++\n+++\n", "begin with TOML")],
