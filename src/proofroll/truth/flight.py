@@ -89,12 +89,25 @@ def airborne(
             if e * approach > _SEEN * natural:
                 events.append(("bounce", time))
             continue
+        bounced = np.isinf(body.contact.mu_static) and e_t == 1 and 0 < e < 1
+        if bounced and _slip(body, v, w, e1) is not None:
+            raise Refused(
+                f"at about {time:.6g} s the ball comes to stay on the wall after infinitely many bounces, each of "
+                "which turns back its contact point whole, so its spin has no limit; "
+                "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
+            )
         v, w = route.impact(body, p, v, w, 0.0, 0.0)
-        slip = v + body.ball.radius * cross(w, e1)
-        slip -= (slip @ e1) * e1
         events.append(("settle", time + 2 * e * approach / ((1 - e) * weight) if e else time))
-        size = float(np.linalg.norm(slip))
-        return Landed(time, (p, v, w), slip if size > _STANDS * (natural + np.linalg.norm(v)) else None)
+        return Landed(time, (p, v, w), _slip(body, v, w, e1))
+
+
+def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> FloatArray | None:
+    """Velocity of the contact point along the wall [m/s], shape (3,); None: zero but for round-off."""
+    a, gravity = body.ball.radius, np.linalg.norm(body.gravity)
+    slip = v + a * cross(w, e1)
+    slip -= (slip @ e1) * e1
+    size = np.linalg.norm(slip)
+    return slip if size > _STANDS * (np.sqrt(a * gravity) + np.linalg.norm(v) + a * np.linalg.norm(w)) else None
 
 
 def _flight(body: RollingBall, world: World, time: float, until: float) -> tuple[float | None, Motion]:

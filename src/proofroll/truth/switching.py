@@ -17,16 +17,17 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.flight import Landed, airborne, pressed, touching
 from proofroll.truth.route import End, Leg, Path, Route
 
-# Relative distance from the friction cone below which round-off decides on which side a state is.
-_ON_CONE = 1e-13
+# Relative distance from the friction cone below which round-off decides on which side a state is; round-off is 1e-15.
+_ON_CONE = 1e-12
 # Normal force at time 0, relative to the natural one, below which the ball is off the wall and not at its round-off.
 _OFF_WALL = 1e-12
 # Part of the natural speed at which a ball that goes back and forth ever less is taken to be at rest: it has some 1e-9
 # of the natural time to go, and 1e-18 of the way. Reversals much smaller than that drown in the round-off of the time.
 _AT_REST = 1e-9
-# As many slips in a row, each shorter than the one before, are followed on the way there; each costs both routes the
-# search for the place where the direction of the resistance jumps.
+# As many slips in a row, each shorter than the one before by more than a part of it, are followed on the way there;
+# each costs both routes the search for the place where the direction of the resistance jumps.
 _REVERSALS = 10
+_SHORTER = 1e-6
 
 
 def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0912, PLR0915 -- one per end
@@ -45,10 +46,10 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
             return Path([_rest(body, route, state, time, until)], events)
         state = route.nudged(state, setting_off(body, route.world(state)[0]))
     slip = body.slip0 if np.any(body.slip0) else None
-    falls = pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body)
+    falls = not body.gap0 and pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body)
     if falls:
         events.append(("lift_off", time))
-    flight = (body.p0, body.v0, body.w0) if falls or body.gap0 > 0 else None
+    flight = (body.p0, body.v0, body.w0) if falls or body.gap0 else None
     sticking: bool | None = None  # it has just begun to touch the wall
     while True:
         if flight is not None:
@@ -81,7 +82,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
             return Path(legs, events)
         if leg.why is End.HALT:
             state = route.nudged(state, setting_off(body, route.world(state)[0]))
-        hastens = len(legs) > 1 and leg.end - leg.start < legs[-2].end - legs[-2].start
+        hastens = len(legs) > 1 and leg.end - leg.start < (1 - _SHORTER) * (legs[-2].end - legs[-2].start)
         reversals = reversals + 1 if leg.why is End.STILL and not sticking and hastens else 0
         if reversals > _REVERSALS:
             raise Refused(

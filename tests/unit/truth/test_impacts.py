@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.files.scene_file import load_scene
@@ -95,3 +95,34 @@ def test_coefficients_have_bounds() -> None:
     for name in ("restitution", "tangential_restitution"):
         with pytest.raises(InputError, match=name):
             load_scene("bouncing_ball", **{name: 1.1})
+
+
+def test_a_spin_that_alternates_for_ever_has_no_limit() -> None:
+    """Bounces that each turn the contact point back whole leave no spin that a ball at rest could have: refused."""
+    bouncing = {"restitution": 0.5, "tangential_restitution": 1.0, "mu_static": math.inf, "mu_kinetic": math.inf}
+    rests = math.sqrt(2 / G) * 3
+    spinning = load_scene("bouncing_ball", back_spin=60.0, **bouncing)
+    with pytest.raises(
+        Refused, match="so its spin has no limit; end the run earlier, take tangential_restitution below"
+    ):
+        truth(spinning, np.array([0.0, rests * 1.1]))
+    # Before, or without a spin, with a bound, or where the spin fades, there is a limit.
+    truth(spinning, np.array([0.0, rests * 0.9]))
+    truth(load_scene("bouncing_ball", **bouncing), np.array([0.0, rests * 1.1]))
+    for limited in ({"mu_static": 10.0, "mu_kinetic": 10.0}, {"tangential_restitution": 0.9}):
+        found = truth(load_scene("bouncing_ball", back_spin=60.0, **{**bouncing, **limited}), np.array([0.0, 3.0]))
+        assert events_of(found)[0].kind == "bounce"
+
+
+def test_a_start_in_the_air_beside_a_curved_wall() -> None:
+    """A ball in the air with a spin of its own does not leave the wall: its bounces are told, by both routes alike."""
+    wall = load_scene("tilted_cylinder", radius=0.05, cylinder_radius=0.5, tilt=1.0, mu_static=0.5)
+    ball = wall.elements[0]
+    scene = changed(
+        wall,
+        contact=replace(ball.contact, restitution=0.5),
+        start=replace(ball.start, coordinates=(3.1, 0.0), velocity=(3.0, 0.0), tangential_spin=(0.0, 0.0), gap=0.05),
+    )
+    found = truth(scene, np.linspace(0.0, 0.6, 4))
+    assert "ill_posed" not in found.attrs
+    assert [event.kind for event in events_of(found)] == [*["bounce"] * 4, "settle"]
