@@ -15,6 +15,8 @@ from proofroll.core.arrays import FloatArray
 _ASYMPTOTIC = 0.1
 # Orders among which the observed one is looked for
 _ORDERS = (1e-3, 20.0)
+# A tightening that changes less than this part of what another one does changes round-off alone.
+_SAME = 1e-6
 # Differences that shrink more slowly than this say nothing about a limit.
 _NO_CONVERGENCE = 0.25
 
@@ -29,12 +31,15 @@ class Limit:
             what a further refinement may still change.
         order: observed order of convergence, NaN where there is none in (0, 20].
         shown: whether the differences shrink, so that there is a limit to speak of.
+        saturated: whether two tolerances gave the same run: something else limits its steps, as samples at which they
+            end, and no limit of small ones follows.
     """
 
     values: FloatArray
     error_bar: float
     order: float
     shown: bool = True
+    saturated: bool = False
 
 
 def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None) -> Limit:
@@ -122,9 +127,12 @@ def _removes(term: int, h: FloatArray, power: int) -> float:
 def tightest(curves: Sequence[FloatArray]) -> Limit:
     """Limit of an adaptive method: its tightest curve.
 
-    It is as uncertain as what the last tightening changed, or as all further ones would if each shrank as that one did.
+    It is as uncertain as what the last tightening changed, or as all further ones would if each shrank as that one did;
+    where one changed nothing, as what all did.
     """
     changes = [size(after - before) for before, after in itertools.pairwise(curves)]
+    if min(changes) <= _SAME * max(changes):
+        return Limit(curves[-1], max(changes), float("nan"), shown=False, saturated=True)
     shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
     rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
     return Limit(curves[-1], max(last, rest), float("nan"), shown)

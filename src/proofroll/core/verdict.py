@@ -106,6 +106,7 @@ def judge(
     lost: str = "",
     doubt: Doubt = Doubt.NONE,
     own_bar: float = 0.0,
+    sampled_bar: float = np.inf,
     between: tuple[FloatArray, FloatArray] | None = None,
 ) -> Judgement:
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
@@ -124,6 +125,7 @@ def judge(
         doubt: what an ill-posed question leaves to be judged.
         own_bar: how far the run itself leaves open what it shows, as where an event lies between two of its samples;
             an error that may come of this alone is no difference.
+        sampled_bar: how far its samples leave that open; no run excuses itself by more.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
     """
     error = largest_difference(values, true)
@@ -138,11 +140,16 @@ def judge(
         rungs = replace(rungs, finding=LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER)
     on_grid, error = error, max(error, off_grid)
     verdict = _verdict(error, tolerance, rungs, doubt)
+    vague, own_bar = own_bar > tolerance, min(own_bar, sampled_bar)
     unknown = truth_error_bar + (own_bar if error > tolerance else 0.0)
     placed = verdict in {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS}
     if truth_error_bar > tolerance or (placed and abs(error - tolerance) <= unknown):
         verdict = Verdict.NOT_JUDGED
-    remark = f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}"
+    remarks = []
+    if rungs.wrong_within:
+        remarks.append(f"within tolerance, but the limit of small steps is shown not to be the truth: {rungs.text}")
+    if vague and verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
+        remarks.append("within tolerance by luck: the run leaves its events open by more than the tolerance")
     return Judgement(
         observable=name,
         unit=unit,
@@ -157,7 +164,7 @@ def judge(
         limit=rungs.finding,
         reason=_reason(verdict, error, tolerance, (truth_error_bar, own_bar), shown_unit, rungs)
         + (f"; at the samples alone {number(on_grid)}{shown_unit}, so the error is between them" if hidden else ""),
-        remarks=(remark,) if rungs.wrong_within else (),
+        remarks=tuple(remarks),
     )
 
 
@@ -193,11 +200,15 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
     finding, leaves = LimitFinding.NOT_SHOWN, error - bar > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitFinding.WITHIN
-    elif leaves and (limit.shown or flat or error - bar / _FLAT > tolerance):
+    elif leaves and not limit.saturated and (limit.shown or flat or error - bar / _FLAT > tolerance):
         finding = LimitFinding.ANOTHER
     wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + round_off
     told = "no order" if order is None else f"order {order:.3g}"
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
+    if not np.isfinite(error):
+        text = "it has not as many values as the truth"
+    elif limit.saturated:
+        text += "; two tolerances give the same run, for something else limits its steps, as near samples do"
     return _Ladder(finding, error, bar, order, leaves, wrong, text)
 
 

@@ -160,6 +160,7 @@ def _judgements(
             lost=lost,
             doubt=reference.doubt(name),
             own_bar=reference.own_bar(name, trajectories[1.0]),
+            sampled_bar=reference.sampled_bar,
             between=reference.between(name, trajectories[1.0]),
         )
         judgements.append(judgement)
@@ -168,14 +169,16 @@ def _judgements(
 
 def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) -> Limit | None:
     """Limit of small steps, if every rung of the ladder gave the observable."""
-    factors = run.row.ladder
+    assert isinstance(run.facts, EngineFacts)  # there are curves
+    stepped = run.facts.resolution == "dt"
+    # of tolerances those that the engine takes
+    factors = run.row.ladder if stepped else [factor for factor in run.row.ladder if factor in run.ladder]
     if len(factors) == 1 or not all(name in curves.get(factor, {}) for factor in factors):
         return None
     values = [curves[factor][name] for factor in factors]
     if len({v.shape for v in values}) > 1 or not values[0].size or not all(np.all(np.isfinite(v)) for v in values):
         return None
-    assert isinstance(run.facts, EngineFacts)  # there are curves
-    if run.facts.resolution != "dt":
+    if not stepped:
         return tightest(values)
     return richardson(values, run.row.ladder, run.facts.order)
 

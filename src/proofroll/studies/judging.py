@@ -240,7 +240,7 @@ def _compared(
     found = judge_curve(
         name, _unit(reference, name), values, true,
         truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
-        own_bar=own, between=between,
+        own_bar=own, sampled_bar=reference.sampled_bar, between=between,
     )  # fmt: skip
     return Compared(found, _farthest(values, true, dataset["time"].to_numpy()))
 

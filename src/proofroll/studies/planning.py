@@ -174,7 +174,7 @@ def _rungs(
     wanted: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
-            wanted += [(index, factor, facts) for factor in row.ladder if factor != 1]
+            wanted += [(index, factor, facts) for factor in row.ladder if factor != 1 and _asked(facts, factor)]
     scaled = [
         (facts.name, {**facts.settings, facts.resolution: facts.settings[facts.resolution] * _scaled(facts, factor)})
         for _, factor, facts in wanted
@@ -185,6 +185,11 @@ def _rungs(
         if isinstance(found, EngineFacts):
             ladders[index][factor] = found
     return ladders
+
+
+def _asked(facts: EngineFacts, factor: float) -> bool:
+    """Whether a ladder has this rung: a relative tolerance of 1 or more asks for nothing."""
+    return facts.resolution != "rtol" or facts.settings["rtol"] * _scaled(facts, factor) < 1
 
 
 def _scaled(facts: EngineFacts, factor: float) -> float:

@@ -148,6 +148,11 @@ class Reference:
         return max((event.time_high - event.time_low for event in self._events(dataset)), default=0.0) / 2
 
     @property
+    def sampled_bar(self) -> float:
+        """How far samples leave open when an event is [s]: half the longest interval between two."""
+        return float(np.max(np.diff(self.dataset["time"].to_numpy()), initial=0.0)) / 2
+
+    @property
     def events(self) -> list[Event]:
         """Of all elements."""
         return self._events(self.dataset)

@@ -288,7 +288,35 @@ def test_a_difference_that_may_be_the_sampling_alone_is_not_judged() -> None:
     assert found.verdict is Verdict.NOT_JUDGED
     assert "error 7e-3 s ± 0.025 s, for the run shows it only between two times" in found.reason
     assert judge("first_slip", "s", times + 7e-3, times, own_bar=1e-3, **late).verdict is Verdict.DIFFERS
-    assert judge("first_slip", "s", times + 1e-3, times, own_bar=25e-3, **late).verdict is Verdict.AGREES
+
+
+def test_a_wide_bracket_excuses_no_more_than_the_samples_do() -> None:
+    """An event that is given to within the whole run differs as if the samples told it, and agrees by luck alone."""
+    late = {"truth_error_bar": 1e-9, "tolerance": 2e-3, "scale": 1.0, "limit": None, "own_bar": 2.0}
+    times = np.array([0.2727])
+    for off, verdict in ((0.3, Verdict.DIFFERS), (7e-3, Verdict.NOT_JUDGED), (1e-3, Verdict.AGREES)):
+        found = judge("first_slip", "s", times + off, times, sampled_bar=10e-3, **late)
+        assert found.verdict is verdict
+        assert ("by luck" in "".join(found.remarks)) == (verdict is Verdict.AGREES)
+
+
+@pytest.mark.parametrize("off", [(5e-3, 5e-3, 5e-3), (5e-3, 5e-3, 4.99e-3), (4e-3, 5e-3, 5e-3)])
+def test_tolerances_that_give_the_same_run_show_no_limit(off: tuple[float, float, float]) -> None:
+    """Where every sample ends a step looser tolerances change nothing: that is no other limit than the truth."""
+    found = verdict_of(off[0], tightest([TRUE + value for value in off]), ladder=True)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert "two tolerances give the same run" in found.reason
+    assert verdict_of(1e-5, tightest([TRUE + 1e-5] * 3), ladder=True).verdict is Verdict.AGREES
+
+
+def test_a_limit_of_other_events_is_told_without_numbers() -> None:
+    """Where the limit has not as many events as the truth there is no distance to tell."""
+    found = judge(
+        "event_times", "s", np.ones(3), np.ones(2), truth_error_bar=9e-13, tolerance=2e-3, scale=1.0, ladder=True,
+        limit=Limit(np.ones(3), 0.0, math.nan),
+    )  # fmt: skip
+    assert found.verdict is Verdict.DIFFERS
+    assert found.reason.endswith("another limit: it has not as many values as the truth")
 
 
 def test_a_reason_never_sets_a_number_against_itself() -> None:

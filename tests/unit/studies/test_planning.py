@@ -26,6 +26,15 @@ def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.Monke
         planning.plan(dataclasses.replace(comparison, rows=rows))
 
 
+def test_a_ladder_asks_for_no_tolerance_of_1_or_more() -> None:
+    """Of a tolerance of a tenth no decades up are asked for, where nothing would be computed."""
+    comparison = load_comparison("inclined_plane")
+    row = Row("projection[formulation=euler,rtol=0.1]", comparison.rows[0].tolerance, ladder=[4.0, 2.0, 1.0, 0.5])
+    found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["projection"])
+    asked = {case.engine.settings["rtol"] for run in found.runs for case in run.ladder.values()}
+    assert sorted(asked) == pytest.approx([0.01, 0.1])
+
+
 def test_the_truth_gives_all_that_can_be_asked_for() -> None:
     """Of the truth everything is asked, so that a replay need invent nothing; of engines only what the scene asks."""
     found = planning.plan(load_comparison("inclined_plane"), ["projection"])

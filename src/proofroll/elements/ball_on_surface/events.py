@@ -27,6 +27,8 @@ _FLIGHT = 0.01
 _FAINT = 1e-6
 # A time known to this part of it is told as one number, of six digits.
 _TOLD = 1e-6
+# What a ball on the wall goes over to.
+_SWITCHES = ("slip", "stick")
 # What there is on the wall only.
 _ON_WALL = ("N", "F2", "F3", "needed_friction", "slip2", "slip3", "slip", "gap")
 
@@ -67,7 +69,8 @@ class Watch:
         sticking = [sample.sticking for sample in samples[:kept]]
         if any(value is None for value in sticking):
             return SeenInRun(kept, [left] if left is not None else None, ended)
-        if located is None:
+        if located is None or contradicted(at, sticking, events):
+            events = [event for event in events if event.kind not in _SWITCHES]
             events = [*between_samples(at, [bool(value) for value in sticking]), *events]
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
@@ -76,6 +79,23 @@ class Watch:
         if sample.force is None:
             return math.nan
         return float(normal_force(self._body, np.reshape(sample.p_WB, 3), np.reshape(sample.force, 3)))
+
+
+def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events: Sequence[Event]) -> bool:
+    """Whether samples say that the ball sticks where the events say that it slips, or the other way round.
+
+    Only samples that lie in no event's bracket are held against them, and only those before it leaves the wall.
+    """
+    switches = [event for event in events if event.kind in _SWITCHES]
+    until = min((event.time_low for event in events if event.kind not in _SWITCHES), default=math.inf)
+    for t, sticks in zip(times, sticking, strict=False):
+        if any(event.time_low <= t <= event.time_high for event in switches):
+            continue
+        before, after = [e for e in switches if e.time_high < t], [e for e in switches if e.time_low > t]
+        said = before[-1].kind == "stick" if before else after[0].kind == "slip" if after else sticking[0]
+        if t < until and bool(sticks) != said:
+            return True
+    return False
 
 
 def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
