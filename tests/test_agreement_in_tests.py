@@ -120,6 +120,60 @@ def test_the_state_alone_is_enough() -> None:
     assert proofroll.judge(state, "inclined_plane", {"p_WB": "1e-3 m"}).agrees
 
 
+def state_of(scene: str, **change: Any) -> dict[str, Any]:
+    """The state of an honest run as arrays, some of them changed."""
+    run = proofroll.simulate(scene, "projection", until=0.2, every=0.02)
+    state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB") if name in run}
+    return state | {name: how(state[name]) for name, how in change.items()}
+
+
+@pytest.mark.parametrize("scene", ["inclined_plane", "pendulum"])
+@pytest.mark.parametrize("name", ["v_WB", "w_WB"])
+def test_velocities_that_are_given_are_judged(scene: str, name: str) -> None:
+    """Velocities and spins in degrees, huge or off by 7 are no agreement, though the places agree."""
+    assert proofroll.judge(state_of(scene), scene).agrees
+    for factor, offset in ((180 / np.pi, 0.1), (1e30, 0.1), (1, 7)):
+        lie = {name: lambda given, factor=factor, offset=offset: factor * given + offset}
+        found = proofroll.judge(state_of(scene, **lie), scene)
+        assert name in [item.judgement.observable for item in found.compared if not item.agrees]
+
+
+@pytest.mark.parametrize(
+    ("scene", "change", "words"),
+    [
+        ("inclined_plane", {"v_WB": lambda v: v * np.nan}, "v_WB.*it is not finite at 0 s"),
+        ("inclined_plane", {"p_WB": lambda p: np.where(np.arange(11) > 2, np.inf, p.T).T}, "p_WB.*finite at 0.06 s"),
+        ("pendulum", {"q_WB": lambda q: 7 * q}, "q_WB has length 7 .*give unit quaternions"),
+        ("pendulum", {"q_WB": lambda q: 0 * q}, "q_WB has length 0 .*give unit quaternions"),
+    ],
+)
+def test_a_state_that_is_none(scene: str, change: dict[str, Any], words: str) -> None:
+    """A state that is not finite, or whose quaternions are none, is told in one line with its variable."""
+    with pytest.raises(InputError, match=words) as caught:
+        proofroll.judge(state_of(scene, **change), scene)
+    assert "\n" not in str(caught.value)
+
+
+def test_quaternions_of_the_other_sign_are_the_same() -> None:
+    """Turned by -q as by q, whether alone or with the state, and from any sample on."""
+    given = state_of("pendulum", q_WB=lambda q: q * np.where(np.arange(11) % 3, -1.0, 1.0)[:, None, None])
+    alone = {name: given[name] for name in ("time", "q_WB")}
+    for run in (given, alone, {name: values[2:] for name, values in given.items()}):
+        assert proofroll.judge(run, "pendulum", {"q_WB": 1e-3}).agrees
+
+
+@pytest.mark.parametrize("scene", ["inclined_plane", "pendulum"])
+def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> None:
+    """A file that run wrote is judged by what somebody left in it."""
+    run = proofroll.simulate(scene, "projection", until=0.2, every=0.02)
+    keep = ["p_WB", "v_WB", "w_WB", *(["q_WB"] if scene == "pendulum" else [])]
+    for names in (keep, keep[:1], keep[1:]):
+        write(run[names], path := tmp_path / "some.nc")
+        found = proofroll.judge(str(path), scene)
+        assert found.agrees, found
+        assert set(names) <= {item.judgement.observable for item in found.compared} | {"q_WB"}
+
+
 def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
     """Wherever a file ends before it should, it is told in one line."""
     write(proofroll.simulate("pendulum", "projection", until=0.1), whole := tmp_path / "whole.nc")
@@ -190,6 +244,8 @@ def test_what_is_not_judged_is_named() -> None:
     assert not proofroll.judge(run, "pendulum").unjudged
     state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB", "energy")}
     assert proofroll.judge(state, "pendulum").unjudged == {"energy": "it is taken from the state"}
+    of_places = proofroll.judge(state, "pendulum", {"positions": "1 %"}).unjudged
+    assert {name for name, why in of_places.items() if why == "no tolerance is given for it"} == {"v_WB", "w_WB"}
 
 
 def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:

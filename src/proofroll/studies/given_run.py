@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import from_samples
+from proofroll.core.dataset import from_samples, observe
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.core.several import REQUIRED
+from proofroll.running.recording import require_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +36,7 @@ class GivenRun:
     Attributes:
         dataset: with ``time``, and with all that follows from the state where that is given.
         units: of the variables that say theirs.
-        besides: variables that are none of the state, with why they are not judged where that is known already; none
+        besides: variables that are none of the state, and velocities, with why they are not judged where that is known already; none
             of a run of proofroll's own.
     """
 
@@ -82,15 +83,51 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
         raise InputError("run", "time", "give times in s that rise from 0 or later")
     if times[-1] == 0:
         raise InputError("run", "time", "it has only the start, t = 0 s, where nothing has moved; add samples after it")
+    _require_finite_state(dataset, scene)
     if made_of is not None:
-        return GivenRun(dataset, units, {})
+        if _whole(dataset, scene):
+            return GivenRun(dataset, units, {})
+        dataset = dataset.drop_attrs(deep=False)  # variables were left out: what is there is judged by itself
     names = [str(name) for name in dataset.data_vars]
     # a scene of several elements is judged by variables
     if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
         return GivenRun(dataset, units, dict.fromkeys(names))
     state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
-    besides = dict.fromkeys([name for name in names if name not in state], FROM_STATE)
+    besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in state], FROM_STATE)
+    besides |= dict.fromkeys(REQUIRED[1:])  # velocities: what is asked may be of places alone
     return GivenRun(_completed(dataset, scene, times, state), units, besides)
+
+
+def _whole(run: xr.Dataset, scene: Scene) -> bool:
+    """Whether a file that was once a run has all that its observables are made of."""
+    try:
+        observe(scene, run)
+    except (KeyError, AttributeError):  # of xarray, for a variable or an attribute of one that is not there
+        return False
+    return all(scene.label(element, name) in run for element in scene.elements for name in REQUIRED)
+
+
+def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
+    """Every place, velocity and orientation that is given is finite, and every quaternion of unit length.
+
+    Raises:
+        InputError: one is not; with the time of the first.
+    """
+    for element in scene.elements:
+        for own in element.sample_type.widths:
+            name = scene.label(element, own)
+            if name not in run or not np.issubdtype(run[name].dtype, np.number) or run[name].dims[:1] != ("time",):
+                continue
+            values = run[name].to_numpy().reshape(run.sizes["time"], -1)
+            bad = ~np.all(np.isfinite(values), axis=1)
+            if np.any(bad):
+                at = float(run["time"][int(np.argmax(bad))])
+                raise InputError("run", name, f"it is not finite at {at:.6g} s; leave it out, or correct it")
+            if own == "q_WB" and values.shape[1] % 4 == 0:
+                try:
+                    require_unit(values.reshape(-1, 4), "somewhere")
+                except Diverged as error:
+                    raise InputError("run", name, str(error)) from None
 
 
 def _dataset(run: Run) -> xr.Dataset:

@@ -16,6 +16,7 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_text import number
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
+from proofroll.core.several import REQUIRED
 from proofroll.core.truth import truth
 from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Doubt, Judgement, Verdict
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _USUAL = Tolerance(0.01, True)
+_LEAST = 0.01
 _MOST_TRUTHS = 64
 _truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
 
@@ -114,11 +116,12 @@ def judge(
     Args:
         run: from :func:`proofroll.simulate`, the path of a netCDF file, or arrays by name: ``time`` [s], and the state
             (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for each time; for
-            mechanisms ``q_WB``), or variables that the truth has, as ``q.hinge``, ``tip.x``, ``positions``, ``z``; in
-            the truth's units.
+            mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, as ``q.hinge``,
+            ``tip.x``, ``positions``, ``z``; in the truth's units.
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
-            one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity.
+            one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,
+            and of places, velocities and spins that are given.
         because: why that is close enough.
 
     Raises:
@@ -190,7 +193,7 @@ def _bounds(
         raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
     if given is None:
         main = [name for name in observed if scene.observables[name].headline]
-        return dict.fromkeys(main or able, _USUAL)
+        return dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
     if not isinstance(given, Mapping):
         if len(able) > 1 and scene.deciding not in able:
             raise InputError("tolerance", given, f"say of which variable: {', '.join(able)}")
@@ -200,6 +203,22 @@ def _bounds(
     for name in given:
         require_known("tolerance", name, able, "this trajectory has")
     return {name: _tolerance(name, text, _unit(reference, name)) for name, text in given.items()}
+
+
+def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
+    """What is given of the state, and is judged as it is: places, velocities and spins."""
+    states = {reference.scene.label(element, name) for element in reference.scene.elements for name in REQUIRED}
+    return [name for name in variables if name in states and _comparable(reference, name)]
+
+
+def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
+    """What a percentage of a variable refers to: its range, but no less than a hundredth of what is natural."""
+    natural = 0.0
+    for element in reference.scene.elements:
+        speed = 2 * np.pi / element.natural_time
+        own = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
+        natural = max(natural, own.get(unit, 0.0))
+    return max(reference.sizes.get(name, 0.0), float(np.ptp(true)), _LEAST * natural) or 1.0
 
 
 def _tolerance(name: str, given: object, unit: str) -> Tolerance:
@@ -235,7 +254,9 @@ def _compared(
         true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
             true, values = true[1:], values[1:]  # several engines define reactions only after a first step
-        scale, doubt = reference.sizes.get(name) or float(np.ptp(true)) or 1.0, Doubt.NONE
+        if truth_of.dims[-1:] == ("wxyz",) and values.shape == true.shape:  # q and -q are the same orientation
+            values = values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+        scale, doubt = _size(reference, name, true, _unit(reference, name)), Doubt.NONE
         own, between = 0.0, None
     found = judge_curve(
         name, _unit(reference, name), values, true,
