@@ -36,8 +36,8 @@ class GivenRun:
     Attributes:
         dataset: with ``time``, and with all that follows from the state where that is given.
         units: of the variables that say theirs.
-        besides: variables that are none of the state, and velocities, with why they are not judged where that is known already; none
-            of a run of proofroll's own.
+        besides: variables that are none of the state, and velocities, with why they are not judged where that is known
+            already; none of a run of proofroll's own.
     """
 
     dataset: xr.Dataset
