@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.rotations import Array, cross
 RANK = 1e-8
 NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
 State = TypeVar("State")
+_FOLLOWED = 0.3  # least determinant of a space's turn: 1 where it stays, 0 where a direction of it left
 _ZERO = 1e-9  # relative: a component of a null vector that is zero but for round-off
 
 
@@ -93,6 +94,32 @@ def least(matrix: Array, right: Array) -> Array:
 def rank_of(values: Array) -> int:
     """Number of singular values that are not zero but for round-off."""
     return int((values > RANK * values.max(initial=0.0)).sum())
+
+
+class RowSign:
+    """Sign of the product of the singular values of rows along a motion; it changes where the rows lose rank.
+
+    One matrix has none. From pose to pose the spaces of the singular vectors turn little, and carry it on.
+
+    Args:
+        rank: of the rows at a general pose.
+    """
+
+    def __init__(self, rank: int) -> None:
+        self._rank, self._before = rank, (np.zeros((0, 0)), np.zeros((0, 0)))
+
+    def changes(self, C: Array) -> bool:
+        """Whether rank was lost between the pose before and that of these rows, (rows, velocities).
+
+        Where the spaces turned too far in between, nothing is said.
+        """
+        U, _, Vt = np.linalg.svd(C, full_matrices=False)
+        left, right = U[:, : self._rank], Vt[: self._rank].T
+        (left_before, right_before), self._before = self._before, (left, right)
+        if not left_before.size:
+            return False
+        turned = np.linalg.det(left_before.T @ left), np.linalg.det(right_before.T @ right)
+        return bool(turned[0] * turned[1] < 0 and min(map(abs, turned)) > _FOLLOWED)
 
 
 def determinate(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> NDArray[np.bool_]:

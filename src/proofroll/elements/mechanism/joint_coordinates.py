@@ -16,7 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.analysis import analysed, reactions
+from proofroll.elements.mechanism.analysis import RowSign, analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered, integrated
@@ -36,7 +36,6 @@ class Solution:
         multipliers: of the loops' rows, the smallest in norm where they are redundant.
         motion, rows: kinematics.
         split: (L⁻ᵀV, Uᵀ/S) of the locked directions: −product with a residual is the correction that removes it.
-        smallest: of the singular values that count, relative to the largest; zero at a singular pose.
     """
 
     acceleration: Array
@@ -44,7 +43,6 @@ class Solution:
     motion: BodyMotion
     rows: Rows
     split: tuple[Array, Array] | None
-    smallest: float
 
 
 class JointCoordinates:
@@ -93,24 +91,33 @@ class JointCoordinates:
             raise Diverged("the mass matrix is singular, as where joints of massless bodies line up") from None
         free = into.T @ b
         if not self.rank:
-            return Solution(into @ free, np.zeros(0), motion, rows, None, 1.0)
+            return Solution(into @ free, np.zeros(0), motion, rows, None)
         U, S, Vt = np.linalg.svd(rows.C @ into, full_matrices=False)
         locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
         normal = -back @ rows.bias - locked @ free
         locked_into = into @ locked.T
-        smallest = float(S[self.rank - 1] / S[0])
-        return Solution(
-            into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back), smallest
-        )
+        return Solution(into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back))
+
+    def rows(self, q: Array) -> Rows:
+        """Constraints of the loops for coordinates (nq), at rest."""
+        return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
 
     def run(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853.
 
         Raises:
-            Diverged: the integration stops, e.g. at a singular pose.
+            Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
         """
         nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
-        states = integrated(self.rate, start, times, tolerance, self.eliminated, least=self._least(tolerance))
+        sign = RowSign(self.rank)
+
+        def corrected(y: Array) -> Array:
+            y = self.eliminated(y)
+            if self.rank and sign.changes(self.rows(y[:nq]).C):
+                raise Diverged("a step passes a singular pose of the loops")
+            return y
+
+        states = integrated(self.rate, start, times, tolerance, corrected, least=self._least(tolerance))
         return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
 
     def sensitivity(self) -> tuple[float, float]:

@@ -109,6 +109,9 @@ def integrated(
             if landing:
                 solver.h_abs = max(solver.h_abs, usual)
             if corrected is not None:
-                solver.y = corrected(solver.y)
+                try:
+                    solver.y = corrected(solver.y)
+                except Diverged as stopped:
+                    raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {stopped}") from None
                 solver.f = rate(solver.t, solver.y)
         yield solver.y.copy()

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.errors import Missing
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
@@ -27,6 +28,7 @@ from proofroll.truth.mechanism.maximal_equations import (
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 from proofroll.truth.mechanism.rolling_rows import RollingContact
 
+_BESIDE = 1e-9  # m, rad, and part of velocities: between round-off and what a growth of 1e7 makes large
 RANK = 1e-8  # see analysis.RANK; this route finds its own rank
 
 
@@ -115,6 +117,17 @@ class NumericEquations:
         u -= found.into @ (found.back @ (found.C @ u))
         return self.normalised(state)
 
+    def beside(self, state: Array, by: float) -> Array:
+        """A state moved by so much, m and rad, with velocities changed by as much of themselves, as the rows allow."""
+        e, state = self.equations, state.copy()
+        ways = by * (1.0 + np.modf(np.arange(1, e.nu + 1) * 0.6180339887498949)[0])  # golden ratio: no two alike
+        for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True):
+            state[at_x] += np.array(body.rate(state[at_x].tolist(), ways[at_u].tolist()), dtype=float)
+        state[e.nx : e.nx + e.nu] *= 1.0 + ways
+        for _ in range(3):  # Newton's method doubles the digits
+            state = self.eliminated(state)
+        return state
+
     def _matrix(self, rows: Sequence[ConstraintRow]) -> Array:
         C = np.zeros((len(rows), self.equations.nu))
         for number, row in enumerate(rows):
@@ -162,9 +175,28 @@ class MaximalCoordinates:
         Raises:
             Diverged: the integration stops.
         """
+        return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance))
+
+    def growth(self, times: Array) -> Array:
+        """How many times as far apart as at the start is a motion that starts beside this one, at the given times, s.
+
+        The start is moved in all ways that the rows allow, by far more than round-off, so that this hangs on none.
+
+        Raises:
+            Diverged: an integration stops.
+        """
         lean = self.lean
-        states = integrated(lean.rate, lean.equations.start(), times, tolerance, lean.eliminated)
-        return self.recorded(times, np.array(list(states)))
+        start = lean.equations.start()
+        starts = (start, lean.beside(start, _BESIDE))
+        try:
+            one, other = (self.taylor().run(times, each) for each in starts)
+        except Missing:
+            one, other = (self._dop853(each, times, _BESIDE * 1e-4) for each in starts)
+        apart: Array = np.abs(other - one)[:, : lean.equations.nx].max(axis=1) / _BESIDE
+        return apart
+
+    def _dop853(self, start: Array, times: Array, tolerance: float) -> Array:
+        return np.array(list(integrated(self.lean.rate, start, times, tolerance, self.lean.eliminated)))
 
     def at_start(self) -> Record:
         """Where this route places everything at time 0."""

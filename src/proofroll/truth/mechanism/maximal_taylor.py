@@ -52,14 +52,14 @@ class MaximalTaylor:
             opt_level=0,  # optimised, it takes two to ten times as long to compile, which a run does not earn back
         )
 
-    def run(self, times: Array) -> Array:
-        """States at the given times, s, (times, state).
+    def run(self, times: Array, start: Array | None = None) -> Array:
+        """States at the given times, s, (times, state), from the mechanism's own start or another.
 
         Raises:
             Diverged: the integration stops before the last.
         """
         integrator = self._integrator
-        integrator.state[:] = self._start
+        integrator.state[:] = self._start if start is None else start
         integrator.time = self._number(0)
         grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka begins its grid where it stands
         grid, first = (grid[1:], 0) if times[0] == 0 else (grid, 1)

@@ -34,7 +34,9 @@ class MechanismTruth:
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
         """See :func:`proofroll.truth.mechanism.two_routes.find_truth`."""
-        from proofroll.truth.mechanism.two_routes import find_truth  # a third of a second, which no ball needs
+        # a third of a second, which no ball needs
+        from proofroll.truth.mechanism.singular_poses import branching
+        from proofroll.truth.mechanism.two_routes import NUDGE, find_truth
 
         assert isinstance(element, MechanismElement)  # it covers it
         found = find_truth(element.mechanism, times)
@@ -52,9 +54,12 @@ class MechanismTruth:
         dataset.attrs["second_route"] = ", ".join(others)
         if found.checked_by is not None:
             dataset.attrs["second_route"] += f", {found.checked_by[0]}"
+        said = [branching(found.branches)]
         if np.isfinite(found.horizon):
             dataset.attrs["horizon"] = found.horizon
-            dataset.attrs["ill_posed"] = (
-                f"from {found.horizon:.4g} s on two precisions of one route differ: the motion is chaotic"
+            said.append(
+                f"from {found.horizon:.4g} s on a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
             )
+        if any(said):
+            dataset.attrs["ill_posed"] = "; ".join(filter(None, said))
         return dataset

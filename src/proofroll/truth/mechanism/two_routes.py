@@ -2,7 +2,8 @@
 
 Routes: joint coordinates (DOP853 with projection), maximal coordinates (Taylor series in doubles and in long doubles;
 DOP853 without heyoka), and closed forms where there are any. The best of them is the truth, the others are its error
-bar. Where the two precisions differ by more than :data:`CHAOS`, the question is ill-posed; that time is the horizon.
+bar. Where a start moved by :data:`NUDGE` leads farther away than :data:`CHAOS`, the question is ill-posed; that time is
+the horizon.
 """
 
 from __future__ import annotations
@@ -20,15 +21,14 @@ from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.singular_poses import branching, singular_poses, singular_poses_of
 
 FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does not bound it
-CHAOS = 1e-9  # m, 1 (of quaternions): where two precisions differ by more, no number of digits is worth comparing
-BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only after it has parted the two precisions
+CHAOS = 1e-9  # m, 1 (of quaternions): where motions that nobody can tell apart at the start differ by more
+NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: no scene file can say less
+BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only long after the horizon
 SAME_START = 1e-9  # m, 1: round-off of places leaves 1e-15 of them, a wrong formula much more
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
-# Of the smallest singular value just before and after: where it goes to zero like |t|, the lines through its values
-# on both sides meet at zero but for their curvature; at a mere minimum they meet near the minimum.
-_AT_ZERO = 0.2
 JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench")
 
 
@@ -42,6 +42,7 @@ class TwoRouteMotion:
             over bodies and components so far, in the field's unit, (times).
         differences: largest difference between the two routes, by field, up to the horizon.
         horizon: s; inf where it lies beyond the last time.
+        branches: times, s, at which the motion, known in closed form, passes singular poses of its loops.
         determinate: which components of the wrenches are, (joints + loops, 6).
         routes: what was computed, the one taken first.
         checked_by: a closed form that knows a part of the motion, and its largest difference from the truth.
@@ -51,6 +52,7 @@ class TwoRouteMotion:
     bars: dict[str, Array]
     differences: dict[str, float]
     horizon: float
+    branches: list[float]
     determinate: NDArray[np.bool_]
     routes: tuple[str, ...]
     checked_by: tuple[str, float] | None
@@ -77,7 +79,8 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         two, precise, name = _second(second, times, tolerance)
         # route 1 alone counts turns; all others are put on its
         two, precise = _matched(mechanism, one, two), _matched(mechanism, one, precise)
-        _check_branch(one, two, precise)
+        chaotic = second.growth(times) * NUDGE > CHAOS
+        _check_branch(one, precise, chaotic)
         routes: tuple[str, ...] = (name, "joint coordinates, DOP853")
         best = precise if exact is None else _matched(mechanism, one, exact)
     except Diverged as stopped:
@@ -85,13 +88,13 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
             poses = _singular(mechanism, float(times[-1]))
             raise Refused(f"no truth to the end: {stopped}; end before it{poses}") from None
         one = two = precise = _matched(mechanism, exact, first.run_rk4(times))
-        best, routes = exact, ("joint coordinates, RK4",)
+        best, routes, chaotic = exact, ("joint coordinates, RK4",), np.zeros(len(times), dtype=bool)
     if exact is not None and form is not None:
         routes = (f"closed form: {form.title}", *routes)
     _check_limits(mechanism, best)
     masked = replace(best, wrench=np.where(found.determinate, best.wrench, np.nan))
     bars, differences = {}, {}
-    late = np.flatnonzero(_apart(precise, two) > CHAOS)
+    late = np.flatnonzero(chaotic)
     horizon = float(times[late[0]]) if len(late) else np.inf
     rest = [_judged(mechanism, record) for record in (one, two, precise)]
     for field, values in _judged(mechanism, masked).items():
@@ -108,7 +111,8 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     checked = None
     if form is not None and form.motion is None:
         checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
-    return TwoRouteMotion(masked, bars, differences, horizon, found.determinate, routes, checked)
+    branches = [] if exact is None or form is None else singular_poses_of(form, first, float(times[-1]))
+    return TwoRouteMotion(masked, bars, differences, horizon, branches, found.determinate, routes, checked)
 
 
 def _judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
@@ -121,35 +125,10 @@ def _judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
 def _singular(mechanism: Mechanism, until: float) -> str:
     """Where singular poses lie on the way, as a clause; nothing where none is found."""
     try:
-        found = singular_poses(mechanism, until, min(5e-3, until / 200))
+        found = branching(singular_poses(mechanism, until, min(5e-3, until / 200)))
     except np.linalg.LinAlgError:  # steps of that size do not follow the motion
-        found = []
-    where = ", ".join(f"{time:.4g}" for time in found[:3]) + (", …" if len(found) > 3 else "")
-    return f" (singular poses near t = {where} s)" if found else ""
-
-
-def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> list[float]:
-    """Times, s, good to a fraction of the step, at which the loops' rows lose rank and the branch could change.
-
-    The motion until then, s, goes in steps of Runge-Kutta 4 with a fixed rank, which pass such poses.
-    """
-    if not mechanism.loops:
-        return []
-    equations, nq = JointCoordinates(mechanism), mechanism.nq
-    times = np.linspace(0.0, until, max(round(until / step), 5) + 1)
-    states = equations.rk4_states(times, float(times[1]))
-    sizes = np.array([equations.solve(y[:nq], y[nq:]).smallest for y in states])
-    found = []
-    for i in range(2, len(times) - 2):
-        before, after = sizes[i - 2 : i], sizes[i + 1 : i + 3]
-        if sizes[i] > before[1] or sizes[i] >= after[0]:
-            continue
-        down, up = before[1] - before[0], after[1] - after[0]
-        # both lines against steps from i: before[1] + down·(x + 1) and after[0] + up·(x - 1)
-        x = (before[1] + down - after[0] + up) / (up - down)
-        if abs(before[1] + down * (x + 1)) < _AT_ZERO * min(before[1], after[0]):
-            found.append(float(times[i] + x * times[1]))
-    return found
+        found = ""
+    return f" ({found})" if found else ""
 
 
 def _apart(one: Record, two: Record) -> Array:
@@ -174,13 +153,13 @@ def _check_start(first: JointCoordinates, second: MaximalCoordinates) -> None:
         )
 
 
-def _check_branch(one: Record, two: Record, precise: Record) -> None:
-    """Two routes that part while the precisions of one of them agree have taken different branches.
+def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
+    """Two routes that part without chaos have taken different branches.
 
     Raises:
         Diverged: they have.
     """
-    parted = np.flatnonzero((_apart(one, precise) > BRANCH) & (_apart(two, precise) < CHAOS))
+    parted = np.flatnonzero((_apart(one, precise) > BRANCH) & ~chaotic)
     if len(parted):
         raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")
 

@@ -1,9 +1,19 @@
+import re
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism.analysis import RowSign
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.truth.mechanism.closed_forms import closed_form
-from proofroll.truth.mechanism.two_routes import singular_poses
+from proofroll.truth.mechanism.plug_in import MechanismTruth
+from proofroll.truth.mechanism.singular_poses import singular_poses
+from proofroll.truth.mechanism.two_routes import find_truth
 
 
 def test_four_bar_passes_when_its_links_are_in_line(scene):
@@ -20,6 +30,50 @@ def test_four_bar_passes_when_its_links_are_in_line(scene):
 def test_regular_motion_passes_none(scene, name):
     """Minima of the singular value away from zero are not taken for singular poses."""
     assert singular_poses(scene(name), 0.4) == []
+
+
+@pytest.mark.parametrize("sizes", [[-0.2, -0.1, 0.1, 0.2], [0.2, 0.1, 0.1, 0.2]])
+def test_the_sign_of_rows_changes_where_they_lose_rank(sizes):
+    """A singular value that passes through zero is told from one that turns back before it, however it is turned."""
+    turned = [Rotation.from_rotvec([0.1 * k, 0.2, 0.3 * k]).as_matrix() for k in range(4)]
+    sign = RowSign(2)
+    rows = [np.array([[2.0, 0, 0], [0, size, 0]]) @ R for size, R in zip(sizes, turned, strict=True)]
+    assert [sign.changes(C) for C in rows] == [False, False, sizes[0] < 0, False]
+
+
+def parallelogram(damping):
+    """Rods of 1 m, 2 m, 1 m on joints 2 m apart, that turn at 3 rad/s towards the pose in which all are in line."""
+    rods = {name: Body(name, 1.0, (size / 2, 0, 0), (0.01, 0.1, 0.1)) for name, size in (("a", 1), ("b", 2), ("c", 1))}
+    joints = (
+        Joint("crank", "revolute", "world", "a", q0=(1.0,), v0=(-3.0,), damping=damping),
+        Joint("pin", "revolute", "a", "b", (1, 0, 0), q0=(-1.0,), v0=(3.0,)),
+        Joint("rocker", "revolute", "world", "c", (2, 0, 0), q0=(1.0,), v0=(-3.0,)),
+    )
+    loops = (Loop("loop", "revolute", "b", "c", (2, 0, 0), (1, 0, 0)),)
+    return Mechanism(tuple(rods.values()), joints, loops, gravity=(0.0, -9.81, 0.0))
+
+
+SAID = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank, where the motion may branch"
+
+
+def test_a_parallelogram_in_closed_form_says_where_it_may_branch():
+    """It goes on as the formula does, and the truth says from where on lengths decide; before that it says nothing."""
+    element = MechanismElement(parallelogram(0.0))
+    found = MechanismTruth.truth(element, np.array([0.0, 0.5, 1.0]), ())
+    assert re.match(SAID, found.attrs["ill_posed"])
+    assert "ill_posed" not in MechanismTruth.truth(element, np.array([0.0, 0.2]), ()).attrs
+
+
+def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
+    """Damped, no formula tells the branch."""
+    with pytest.raises(Refused, match=SAID):
+        find_truth(parallelogram(0.1), np.array([0.0, 0.5, 1.0]))
+
+
+def test_a_step_over_a_singular_pose_is_no_truth():
+    """An error control so coarse that it passes the pose without a stall is stopped there."""
+    with pytest.raises(Diverged, match=r"at t = 0\.\d+ s: a step passes a singular pose"):
+        JointCoordinates(parallelogram(0.1)).run(np.array([0.0, 0.5]), 1e-5)
 
 
 def test_a_tree_has_none(scene):

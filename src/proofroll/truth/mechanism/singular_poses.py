@@ -1,0 +1,55 @@
+"""Poses on the way at which the rows of loops lose rank: there the motion may branch, and no error control passes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from proofroll.elements.mechanism.analysis import RowSign, singular_values
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.closed_forms import ClosedForm
+
+_TURN = 0.02  # rad or m of the fastest coordinate between two poses of a closed form
+_FEW, _MOST = 50, 20_000  # poses
+
+
+def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> list[float]:
+    """Times, s, good to a fraction of the step, at which the rows of the loops lose rank.
+
+    The motion until then, s, goes in steps of Runge-Kutta 4 with a fixed rank, which pass such poses.
+    """
+    if not mechanism.loops:
+        return []
+    equations = JointCoordinates(mechanism)
+    times = np.linspace(0.0, until, max(round(until / step), 5) + 1)
+    return _passed(equations, times, (y[: mechanism.nq] for y in equations.rk4_states(times, float(times[1]))))
+
+
+def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: float) -> list[float]:
+    """The same along a motion in closed form until a time, s."""
+    if not equations.mechanism.loops or form.motion is None or not until:
+        return []
+    fastest = float(np.abs(form.motion(np.linspace(0.0, until, _FEW))[1]).max())
+    times = np.linspace(0.0, until, int(np.clip(until * fastest / _TURN, _FEW, _MOST)) + 1)
+    return _passed(equations, times, form.motion(times)[0])
+
+
+def branching(times: list[float]) -> str:
+    """A clause about singular poses; empty where there are none."""
+    where = ", ".join(f"{time:.4g}" for time in times[:3]) + (", …" if len(times) > 3 else "")
+    at = f"near t = {where} s the rows of the loops lose rank, where the motion may branch: lengths that differ by "
+    return at + "any amount lead elsewhere" if times else ""
+
+
+def _passed(equations: JointCoordinates, times: Array, poses: Iterable[Array]) -> list[float]:
+    sign, found, before = RowSign(equations.rank), [], 0.0
+    for k, q in enumerate(poses):
+        C = equations.rows(q).C
+        smallest = float(singular_values(C)[equations.rank - 1])
+        if sign.changes(C):  # a line through both values, of which one has the other sign
+            found.append(float(times[k - 1] + (times[k] - times[k - 1]) * before / (before + smallest)))
+        before = smallest
+    return found
