@@ -24,6 +24,9 @@ class RunContent:
     """A run.
 
     Attributes:
+        parameters: every parameter of the scene with its value, also those that nobody set.
+        asks: what was wanted besides the motion.
+        until, every: last time and sampling interval [s].
         final: variable -> value at the last sample; empty if there is none.
         units: of these.
         absent: variable without a value -> why.
@@ -35,11 +38,13 @@ class RunContent:
 
     scene: str
     parameters: dict[str, float]
+    asks: list[str]
     engine: str
     settings: dict[str, Any]
     status: str
     message: str
     until: float
+    every: float
     wall_seconds: float
     versions: dict[str, str]
     certificate: list[dict[str, Any]]
@@ -57,17 +62,18 @@ class RunContent:
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     """What came of a case."""
-    causes = []
-    if result.trajectory is None and result.certificate:
-        causes = diagnosed(load_scene(case.scene, asks=case.asks, **case.parameters), result.certificate)
+    scene = load_scene(case.scene, asks=case.asks, **case.parameters)
+    causes = diagnosed(scene, result.certificate) if result.trajectory is None and result.certificate else []
     content = RunContent(
         scene=case.scene,
-        parameters=case.parameters,
+        parameters=dict(scene.parameters),
+        asks=list(scene.asks),
         engine=case.engine.name,
         settings=case.engine.settings,
         status=result.status.value,
         message=result.message,
         until=case.until,
+        every=case.every,
         wall_seconds=result.wall_seconds,
         versions=result.versions,
         certificate=result.certificate,

@@ -5,14 +5,32 @@ from __future__ import annotations
 import io
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pytest
 import xarray as xr
 from rich.console import Console
 
+from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
 from proofroll.report.run import run_content, run_lines
 from proofroll.running.case import Result, Status
+
+
+def _case(scene: str, **parameters: float) -> Any:
+    engine = SimpleNamespace(name="e", settings={})
+    return SimpleNamespace(scene=scene, parameters=parameters, engine=engine, until=1.0, every=0.1, asks=())
+
+
+@pytest.mark.parametrize(("scene", "name", "value"), [("inclined_plane", "tilt", 0.2), ("pendulum", "mass", 2.0)])
+def test_all_numbers_of_the_scene_are_told(scene: str, name: str, value: float, tmp_path: Path) -> None:
+    """Parameters that nobody set stand in the document beside those that were set, for every kind of scene."""
+    content = run_content(_case(scene, **{name: value}), Result(Status.MISSING, "not installed"), tmp_path / "run.npz")
+    assert content.parameters == dict(load_scene(scene, **{name: value}).parameters)
+    assert content.parameters[name] == value
+    assert len(content.parameters) > 3
+    assert (content.until, content.every) == (1.0, 0.1)
 
 
 def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
@@ -22,7 +40,7 @@ def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
     held = {f"force.a_joint_{number}.z": nothing for number in range(9)}
     dataset = xr.Dataset(held | {"x": ("time", np.ones(2), units)}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
     write(dataset, tmp_path / "run.npz")
-    case = SimpleNamespace(scene="s", parameters={}, engine=SimpleNamespace(name="e", settings={}), until=1.0, asks=())
+    case = _case("pendulum")
     result = Result(Status.DONE, "reached 1 s", trajectory="run.npz", wall_seconds=0.1)
 
     content = run_content(case, result, tmp_path / "run.npz")
