@@ -13,7 +13,7 @@ from robot_templates import inertial, mjcf, spherical, urdf
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.plugins import parse_engine
-from proofroll.robots import reading
+from proofroll.robots import defining, reading
 from proofroll.robots.against import reading_of
 from proofroll.robots.judging import judged
 from proofroll.robots.layers import RobotTruth
@@ -226,7 +226,7 @@ def test_real_engines(
     place.mkdir()
     written = reading.write(file, place)
     if robot is None:
-        robot, _ = reading.compiled(robot_workers("mujoco"), file, written, 60)
+        robot, _ = defining.compiled(robot_workers("mujoco"), file, written, 60)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
     answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
@@ -397,7 +397,7 @@ def test_planted_causes_in_mjcf(
         files.append(open_robot(path))
         (tmp_path / f"{name}-given").mkdir()
         written = reading.write(files[-1], tmp_path / f"{name}-given")
-        robots.append(reading.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
+        robots.append(defining.compiled(robot_workers("mujoco"), files[-1], written, 60)[0])
     truth = RobotTruth.of(robots[0], random_states(robots[0], 5, 1))
     answer = reading.ReaderAnswer("1", "", {}, reading_of(robots[1], truth), "")
     row = judged(files[0], truth, 1e-14, parse_engine("planted"), answer)

@@ -15,7 +15,7 @@ from proofroll.core.errors import InputError, Missing
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
-from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened
+from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened, with_the_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.protocol import Request
@@ -99,8 +99,20 @@ def check(
                 found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))
             return found
 
+        def as_written(spec: EngineSpec, options: dict[str, bool], found: ImporterRow) -> str | None:
+            if not file.contained or found.version is None:
+                return None
+            own = dataclasses.replace(request, options=options)
+            try:
+                with lent.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
+                    given = reading.ask_as_written(worker, spec.name, own, path, Path(place), time_limit)
+            except WorkerDied as error:
+                return f"its process ended ({error})"
+            return None if given is None else with_the_copy(given, found)
+
         def told(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
             found = row(*item)
+            found = dataclasses.replace(found, as_written=as_written(*item, found))
             if progress is not None:
                 progress(found.engine)
             return found

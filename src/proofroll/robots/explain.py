@@ -98,7 +98,7 @@ class Search:
 
     def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str) -> _Step | None:
         robot = hypothesis.change(RobotEvidence(self.file, step.truth.robot, self.reading, self.recompiled))
-        if robot is None or robot is step.truth.robot or not robot.moving:
+        if robot is None or robot is step.truth.robot or (self.reading.joints and not robot.moving):
             return None
         truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
         found = differences(truth, self.reading)

@@ -14,12 +14,13 @@ from xml.etree.ElementTree import Element, fromstring, tostring
 import numpy as np
 
 from proofroll.core.errors import InputError
+from proofroll.core.number_text import counted
 from proofroll.core.plugins import EngineSpec, plain_name
-from proofroll.robots import reading
+from proofroll.robots import defining, reading
 from proofroll.robots.explain import Search
 from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences
 from proofroll.robots.model import Robot
-from proofroll.robots.protocol import Reading
+from proofroll.robots.protocol import Reading, Whole
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile, open_robot
 from proofroll.robots.urdf import read_urdf
@@ -71,8 +72,26 @@ def judged(
         layers=layers,
         causes=causes,
         unexplained=unexplained,
+        held=Whole(sum(answer.reading.dofs), sum(answer.reading.mass.values())),
         offending=_offending(truth, answer.reading),
     )
+
+
+# Of the mass: a file that MuJoCo wrote out has six digits.
+_SAME_MASS = 1e-4
+
+
+def with_the_copy(given: reading.AsWritten, row: ImporterRow) -> str:
+    """What an engine does with a file as it is, beside what it does with the copy that was compared."""
+    if given.whole is None:
+        return f"refused ({given.refused})"
+    if row.held is None:
+        return "read"
+    (velocities, mass), (own, weight) = (dataclasses.astuple(item) for item in (given.whole, row.held))
+    if velocities == own and abs(mass - weight) <= _SAME_MASS * max(abs(mass), abs(weight)):
+        return "read"
+    said = f"held with {counted(velocities, 'velocities')} and {mass:.6g} kg"
+    return f"{said}, the copy that is compared with {own} and {weight:.6g} kg"
 
 
 def _recompiler(file: RobotFile, workers: Workers | None) -> Callable[[Element], Robot | None]:
@@ -104,7 +123,7 @@ def _offending(truth: RobotTruth, held: Reading) -> list[str]:
 
 def meaning(
     file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
-) -> tuple[Robot, reading.Compiler | None]:
+) -> tuple[Robot, defining.Compiler | None]:
     """The robot that a file means, and the engine here that defines the format; None: we read it.
 
     An engine that defines the format is asked for no longer than ``time_limit`` [s], of the file as engines get it.
@@ -115,7 +134,7 @@ def meaning(
     if file.kind == "urdf":
         return read_urdf(file), None
     robot, by = _by_definer(
-        file.kind, file.path, workers, lambda worker: reading.compiled(worker, file, written, time_limit)
+        file.kind, file.path, workers, lambda worker: defining.compiled(worker, file, written, time_limit)
     )
     return robot.change(name=file.root.get("model", "robot")), by
 
@@ -133,14 +152,14 @@ def opened(
     """
 
     def expand(parts: Mapping[str, Element]) -> Element:
-        return _by_definer("mjcf", path, workers, lambda w: reading.expanded(w, path, parts, time_limit))[0]
+        return _by_definer("mjcf", path, workers, lambda w: defining.expanded(w, path, parts, time_limit))[0]
 
     return open_robot(path, base, root, expand)
 
 
 def _by_definer(
-    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, reading.Compiler]]
-) -> tuple[_Answer, reading.Compiler]:
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, defining.Compiler]]
+) -> tuple[_Answer, defining.Compiler]:
     """What the engine that defines a format answers.
 
     Raises:

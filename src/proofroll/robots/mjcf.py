@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
 from proofroll.robots.mjcf_meshes import Shapes, remove_height_fields, remove_meshes
-from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintFinding, read_xml, required_file
+from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintFinding, names_files_inside, read_xml, required_file
 
 # How deep files may include files.
 _DEEPEST = 8
@@ -39,14 +39,16 @@ _MACROS = {"replicate", "attach", "composite"}
 
 def stripped(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
-) -> tuple[Element, list[LintFinding]]:
+) -> tuple[Element, list[LintFinding], bool]:
     """A copy that names no file but meshes that exist in the folder ``inside``, and what was left out.
+
+    The third is true if all files that are named, looks included, lie in that folder.
 
     Raises:
         InputError: it includes a file outside the folder, or holds what the check does not cover.
     """
     parts: dict[str, Element] = {}
-    findings = _add(root, path, path.resolve(), inside, parts)
+    findings, contained = _add(root, path, path.resolve(), inside, parts)
     root = next(iter(parts.values()))
     macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
     if macros:
@@ -58,7 +60,7 @@ def stripped(
         root = expand(parts)
         findings.append(LintFinding("note", names, "written out by the engine that defines the format, to six digits"))
     name_all(root)
-    return root, findings
+    return root, findings, contained
 
 
 def _written_out(element: Element) -> float:
@@ -71,11 +73,17 @@ def _written_out(element: Element) -> float:
     return inside  # the engine says what is wrong
 
 
-def _add(root: Element, path: Path, place: Path, inside: Path, parts: dict[str, Element]) -> list[LintFinding]:
-    """Adds a file without looks and named files, and those that it attaches, by names that are free in one folder."""
+def _add(
+    root: Element, path: Path, place: Path, inside: Path, parts: dict[str, Element]
+) -> tuple[list[LintFinding], bool]:
+    """Adds a file without looks and named files, and those that it attaches, by names that are free in one folder.
+
+    The findings, and whether all files that are named lie in the folder ``inside``.
+    """
     root = copy.deepcopy(root)
     root.tag = "mujoco"
     _include(root, path, place.parent, inside, (place,))
+    contained = names_files_inside(root, place.parent, inside)
     for part in ("actuator", "extension"):
         for element in [*root.iter(part)]:
             element[:] = [child for child in element if part == "actuator" and child.tag != "plugin"]
@@ -97,8 +105,9 @@ def _add(root: Element, path: Path, place: Path, inside: Path, parts: dict[str, 
             raise InputError("<model file>", model.get("file"), f"more than {_MOST_MODELS} models are attached")
         model.attrib.setdefault("name", target.stem)
         model.set("file", f"{len(parts)}.xml")
-        findings += _add(read_xml(target), path, target, inside, parts)
-    return findings
+        noticed, within = _add(read_xml(target), path, target, inside, parts)
+        findings, contained = [*findings, *noticed], contained and within
+    return findings, contained
 
 
 def _include(element: Element, path: Path, folder: Path, inside: Path, open_files: tuple[Path, ...]) -> None:

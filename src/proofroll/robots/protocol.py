@@ -83,12 +83,23 @@ class Reading:
     remarks: tuple[str, ...] = ()
 
 
+@dataclasses.dataclass(frozen=True)
+class Whole:
+    """What an engine holds of a file as it is: the number of velocities, and the mass that joints carry [kg]."""
+
+    velocities: int
+    mass: float
+
+
 class RobotReader(Protocol):
     """An engine's importer.
 
     A reader whose engine defines a format names it as ``defines`` and has ``compiled(path)``, which returns what the
     engine makes of a file as a :class:`Robot`: that is what the file means; and ``expanded(path)``, a file's text with
     its macros written out.
+
+    A reader that has ``as_written(request)`` loads the file of the request as a user of the engine would, and returns a
+    :class:`Whole`: what is compared is a copy without looks, contacts and meshes that weigh nothing.
 
     Attributes:
         kinds: formats that it reads.
@@ -170,5 +181,6 @@ def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int,
     """Rates of an engine's joints in its order; of one that the file does not have, or has otherwise, zero."""
     count = len(next(iter(rates.values())))
     found = ((rates.get(name), np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True))
-    parts = [zero if rate is None or rate.shape[1] != zero.shape[1] else rate for rate, zero in found]
+    parts = [np.zeros((count, 0))]
+    parts += [zero if rate is None or rate.shape[1] != zero.shape[1] else rate for rate, zero in found]
     return np.concatenate(parts, axis=1)

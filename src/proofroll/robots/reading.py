@@ -6,12 +6,10 @@ import contextlib
 import copy
 import dataclasses
 import json
-import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
-from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, Missing, Refused, require_known
 from proofroll.files.json_data import plain
 from proofroll.robots.model import Mimic, Robot, RobotBody, RobotJoint
-from proofroll.robots.protocol import GROUP, Reading, Request
+from proofroll.robots.protocol import GROUP, Reading, Request, Whole
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates
 from proofroll.running.loading import here
@@ -77,11 +75,11 @@ class ReaderAnswer:
     refused: str
 
 
-class Compiler(NamedTuple):
-    """An engine that defines a format, and compiled a file of it, with its version."""
+class AsWritten(NamedTuple):
+    """How much an engine holds of a file as it is, or why it refuses it."""
 
-    engine: str
-    version: str
+    whole: Whole | None
+    refused: str
 
 
 def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit: float) -> ReaderAnswer:
@@ -93,7 +91,7 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     """
     asked, arrays = folder / "request.json", folder / "answer.npz"
     asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
-    told = worker.request(_call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
+    told = worker.request(call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
     reading = None
     if not told["refused"]:
         with np.load(arrays, allow_pickle=False) as found:
@@ -158,69 +156,41 @@ def _require_whole(reading: Reading, states: int) -> None:
                 raise _Flawed(f"{name} {joint}".strip() + f" has shape {np.shape(array)}, not {shape}")
 
 
-def compile_robot(path: str) -> dict[str, Any]:
-    """The worker's side: what a file means in a format that an engine defines."""
-    return _defined(Path(path), lambda reader: {"robot": plain(reader.compiled(Path(path)))})
-
-
-def expand_robot(path: str) -> dict[str, Any]:
-    """The worker's side: the text of a file in a format that an engine defines, its macros written out."""
-    return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
-
-
-def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
-    """What the engine that defines MJCF answers, and which it is; or why there is no answer."""
-    from proofroll.running.worker import one_line
-
-    for name in reader_names():
-        try:
-            reader = load_reader(name)
-        except Missing:
-            continue
-        if getattr(reader, "defines", None) == "mjcf":
-            by = Compiler(name, reader.version())
-            try:
-                with contextlib.chdir(path.parent):  # where an engine may leave its log
-                    return answer(reader) | {"by": by}
-            except Exception as error:
-                return {"message": f"{' '.join(by)} says: {one_line(error)}"}
-    return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
-
-
-def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
-    """The robot that an MJCF means, and by whom it was compiled.
+def ask_as_written(
+    worker: Worker, engine: str, request: Request, original: Path, folder: Path, time_limit: float
+) -> AsWritten | None:
+    """Has the file itself read in the worker; None: the reader does not offer that.
 
     Raises:
-        InputError: the engine that defines the format cannot compile it, or is not installed.
-        WorkerDied: it crashed or took too long.
+        WorkerDied: the process crashed or took longer than ``time_limit`` [s].
     """
-    told = worker.request(_call(compile_robot, path=str(written)), time_limit)
-    if "robot" not in told:
-        raise InputError("file", file.path, f"it has no meaning: {told['message']}")
-    robot = robot_from(told["robot"])
-    for name, part in (*robot.bodies.items(), *((joint.name, joint) for joint in robot.joints)):
-        for key, value in vars(part).items():
-            endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
-            if endless and key not in {"lower", "upper"}:  # which most joints have not
-                raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
-    return robot, Compiler(*told["by"])
+    asked = folder / "as_written.json"
+    content = {name: getattr(request, name) for name in ("kind", "base", "base_joint", "options", "gravity")}
+    asked.write_text(json.dumps(plain(content) | {"path": str(original.resolve())}), encoding="utf-8")
+    told = worker.request(call(read_as_written, engine=engine, asked=str(asked)), time_limit)
+    return AsWritten(Whole(*told["whole"]) if told["whole"] else None, told["refused"]) if "whole" in told else None
 
 
-def expanded(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
-    """An MJCF with its macros written out, and by whom; ``parts`` are the file and those that it attaches, by name.
+def read_as_written(engine: str, asked: str) -> dict[str, Any]:
+    """The worker's side: how much an engine holds of a file as it is."""
+    reader = load_reader(here(engine))
+    if not hasattr(reader, "as_written"):
+        return {}
+    content = json.loads(Path(asked).read_text(encoding="utf-8"))
+    content["path"], content["gravity"] = Path(content["path"]), np.array(content["gravity"])
+    nothing = RobotStates({}, {}, {}, {}, {})
+    request = Request(**content, children={}, states=nothing, torques={}, robot=Robot("", {}, ()))
+    try:
+        with contextlib.chdir(Path(asked).parent):  # where an engine may leave its log
+            whole = reader.as_written(request)
+    except Exception as error:  # whatever an importer raises is its refusal
+        return {"whole": None, "refused": words_of(error)}
+    return {"whole": [whole.velocities, whole.mass], "refused": ""}
 
-    Raises:
-        InputError: the engine that defines the format cannot do that, or is not installed.
-        WorkerDied: it crashed or took too long.
-    """
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for part, content in parts.items():
-            (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
-        told = worker.request(_call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
-    if "text" not in told:
-        raise InputError("file", path, f"its macros cannot be written out: {told['message']}")
-    return ElementTree.fromstring(told["text"]), Compiler(*told["by"])
+
+def words_of(error: BaseException) -> str:
+    """Kind and text of an engine's exception in one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"[:400]
 
 
 def write(file: RobotFile, folder: Path) -> Path:
@@ -246,9 +216,9 @@ def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
     return found
 
 
-def _call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str, Any]:
-    """A request to a worker for one of the functions above."""
-    return {"do": "call", "function": f"{__name__}:{function.__name__}", "arguments": arguments}
+def call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str, Any]:
+    """A request to a worker for a function of a module."""
+    return {"do": "call", "function": f"{function.__module__}:{function.__name__}", "arguments": arguments}
 
 
 def robot_from(data: Mapping[str, Any]) -> Robot:

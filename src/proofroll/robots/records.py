@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from proofroll.robots.explain import RobotCause
+from proofroll.robots.protocol import Whole
 from proofroll.robots.robot_file import LintFinding
 
 
@@ -31,6 +32,8 @@ class ImporterRow:
         layers: those that it offers.
         causes: of its differences.
         unexplained: the first layer that they leave open.
+        held: how much it holds of the copy that is compared, which has no looks, no contacts and only meshes with mass.
+        as_written: what its importer does with the file as it is, where that is asked.
         offending: joints whose carried body it holds differently, or lacks.
     """
 
@@ -43,6 +46,8 @@ class ImporterRow:
     layers: Mapping[str, HeldLayer] = field(default_factory=dict)
     causes: Sequence[RobotCause] = ()
     unexplained: str | None = None
+    held: Whole | None = None
+    as_written: str | None = None
     offending: Sequence[str] = ()
 
     @property

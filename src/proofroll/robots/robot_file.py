@@ -44,6 +44,7 @@ class RobotFile:
         root: the content that engines get; of MJCF with all includes.
         base: ``fixed`` or ``free``: what carries the root of a URDF; of MJCF the file says so itself.
         findings: what was left out or changed on the way.
+        contained: whether all files that it names, looks included, lie in the folder that files are read from.
     """
 
     path: Path
@@ -51,6 +52,7 @@ class RobotFile:
     root: Element
     base: str = "fixed"
     findings: tuple[LintFinding, ...] = ()
+    contained: bool = True
 
 
 # Content of a file and of those that it attaches, by their names -> what an engine makes of macros in it.
@@ -82,15 +84,16 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
 
     root = read_xml(path)
     if root.tag == "robot":
+        contained = names_files_inside(root, path.resolve().parent, inside)
         kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, findings), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
+        kind, (root, findings, contained), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
     if count > MOST_BODIES:
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
-    return RobotFile(path, kind, root, base, tuple(findings))
+    return RobotFile(path, kind, root, base, tuple(findings), contained)
 
 
 class _Builder(TreeBuilder):
@@ -162,6 +165,19 @@ def file_inside(folder: Path, name: str, inside: Path) -> Path | None:
     except (OSError, ValueError):  # a loop of links; a name with a null character
         return None
     return target if target.is_relative_to(inside) and target != inside else None
+
+
+# Attributes that name a file, the folders of an MJCF's files, and how others than paths are recognised.
+_FILES = ("file", "filename", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
+_FOLDERS = ("assetdir", "meshdir", "texturedir")
+_ADDRESS = "://"
+
+
+def names_files_inside(root: Element, folder: Path, inside: Path) -> bool:
+    """True if all files that are named lie in the folder ``inside`` or below, wherever they are looked for."""
+    folders = {folder, *(folder / element.get(key, "") for element in root.iter("compiler") for key in _FOLDERS)}
+    names = {name for element in root.iter() for key in _FILES if (name := element.get(key)) and _ADDRESS not in name}
+    return all(file_inside(place, name, inside) is not None for place in folders for name in names)
 
 
 def required_file(folder: Path, element: Element, inside: Path) -> Path:

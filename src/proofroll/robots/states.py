@@ -43,7 +43,7 @@ class RobotStates:
 
     def stacked(self, rates: dict[str, Array], robot: Robot) -> Array:
         """Velocities or accelerations in the order of a robot's joints, shape (states, velocities)."""
-        return np.concatenate([rates[joint.name] for joint in robot.moving], axis=1)
+        return np.concatenate([np.zeros((self.count, 0)), *(rates[joint.name] for joint in robot.moving)], axis=1)
 
     def completed(self, robot: Robot) -> RobotStates:
         """States in which the joints of a robot that these do not have are at rest at coordinates 0."""

@@ -79,7 +79,14 @@ def lines(content: RobotCheck) -> Iterator[str]:
 
 
 def verdict_lines(content: RobotCheck) -> Iterator[str]:
-    """What each engine does, with proof."""
+    """What each engine does, with proof, and with the file as it is."""
+    written: dict[str, list[str]] = {}
+    for row in content.engines:
+        if row.as_written:
+            written.setdefault(row.as_written, []).append(row.engine)
+    if written:
+        said = "; ".join(f"{', '.join(names)}: {words}" for words, names in written.items())
+        yield from wrapped(f"The file as it is: {said}.")
     for row in content.engines:
         for sentence in sentences(row):
             yield from wrapped(sentence)

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.engines.mujoco.robot_compiled import body_of, matrix, robot_of
 from proofroll.engines.mujoco.running import mass_matrix
 from proofroll.robots.model import Array, Robot, RobotBody, composed
-from proofroll.robots.protocol import AtState, Reading, Request, evaluate
+from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 
 class MujocoRobots:
@@ -50,6 +50,17 @@ class MujocoRobots:
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
         return str(spec.to_xml())
+
+    def as_written(self, request: Request) -> Whole:
+        """Of the file itself, loaded from its path."""
+        spec = mujoco.MjSpec.from_file(str(request.path))
+        for option, on in request.options.items():
+            if option == "boundmass":
+                spec.compiler.boundmass, spec.compiler.boundinertia = (1e-6, 1e-8) if on else (0.0, 0.0)
+            else:
+                setattr(spec.compiler, option, on)
+        model = _with_base(spec, request).compile()
+        return Whole(int(model.nv), float(model.body_mass[model.body_weldid != 0].sum()))
 
     def read(self, request: Request) -> Reading:
         """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
@@ -99,11 +110,16 @@ def _compile(request: Request) -> Any:
         extra = f"<mujoco>{compiler}</mujoco>" if request.kind == "urdf" else compiler
         text = text[: text.rindex(end)] + extra + end
     if request.kind == "urdf" and request.base == "free":
-        spec = mujoco.MjSpec.from_string(text)
+        return _with_base(mujoco.MjSpec.from_string(text), request).compile()
+    return mujoco.MjModel.from_xml_string(text)
+
+
+def _with_base(spec: Any, request: Request) -> Any:
+    """The robot with a free joint below its root where that is asked."""
+    if request.kind == "urdf" and request.base == "free":
         bodies = spec.worldbody.bodies if hasattr(spec.worldbody, "bodies") else [spec.worldbody.first_body()]
         bodies[0].add_freejoint().name = request.base_joint
-        return spec.compile()
-    return mujoco.MjModel.from_xml_string(text)
+    return spec
 
 
 def _at(

@@ -11,7 +11,7 @@ import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
 from proofroll.robots.model import Array
-from proofroll.robots.protocol import AtState, Reading, Request, evaluate
+from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 
 class PinocchioRobots:
@@ -25,6 +25,11 @@ class PinocchioRobots:
     def version(self) -> str:
         """Version of the package."""
         return importlib.metadata.version("pin")
+
+    def as_written(self, request: Request) -> Whole:
+        """Of the file itself, loaded from its path."""
+        model = _build(request)
+        return Whole(int(model.nv), float(sum(body.mass for body in list(model.inertias)[1:])))
 
     def read(self, request: Request) -> Reading:
         """The model, evaluated by crba, rnea and aba."""

@@ -81,7 +81,8 @@ class MaximalEquations:
     def __init__(self, mechanism: Mechanism, allow_planar: bool, rolling: Sequence[RollingContact] = ()) -> None:
         for joint in mechanism.joints:
             if joint.friction:
-                raise Refused(f"joint {joint.name} has dry friction; no route of the truth follows its switching")
+                said = "switches; no route follows it (of robots: friction=0)"
+                raise Refused(f"dry friction in joint {joint.name} {said}")
         self.mechanism, self.bodies = mechanism, made_bodies(mechanism, allow_planar)
         self.x_slices = slices(body.nx for body in self.bodies)
         self.u_slices = slices(body.nu for body in self.bodies)

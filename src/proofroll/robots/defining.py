@@ -1,0 +1,108 @@
+"""What a file means in a format that an engine defines: asked of that engine, in a process of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import tempfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element
+
+import numpy as np
+
+from proofroll.core.errors import InputError, Missing, Refused
+from proofroll.files.json_data import plain
+from proofroll.robots.model import Robot
+from proofroll.robots.reading import call, load_reader, reader_names, robot_from, words_of
+from proofroll.robots.robot_file import RobotFile
+from proofroll.running.process import Worker
+
+
+class Compiler(NamedTuple):
+    """An engine that defines a format, and compiled a file of it, with its version."""
+
+    engine: str
+    version: str
+
+
+def compile_robot(path: str, original: str | None) -> dict[str, Any]:
+    """The worker's side: what a file means in a format that an engine defines; ``original`` is what it is a copy of."""
+
+    def answer(reader: Any) -> dict[str, Any]:
+        try:
+            return {"robot": plain(reader.compiled(Path(path)))}
+        except Refused:
+            raise
+        except Exception as error:
+            if original is None:
+                raise
+            reader.compiled(Path(original))  # its error says more of the file than that of the copy
+            said = f"it is read, but not its copy without looks and contacts; please report this: {words_of(error)}"
+            raise Refused(said) from None
+
+    return _defined(Path(path), answer)
+
+
+def expand_robot(path: str) -> dict[str, Any]:
+    """The worker's side: the text of a file in a format that an engine defines, its macros written out."""
+    return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
+
+
+def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
+    """What the engine that defines MJCF answers, and which it is; or why there is no answer."""
+    for name in reader_names():
+        try:
+            reader = load_reader(name)
+        except Missing:
+            continue
+        if getattr(reader, "defines", None) == "mjcf":
+            by = Compiler(name, reader.version())
+            try:
+                with contextlib.chdir(path.parent):  # where an engine may leave its log
+                    return answer(reader) | {"by": by}
+            except Refused as error:
+                return {"uncovered": str(error)}
+            except Exception as error:
+                return {"message": f"{' '.join(by)} refuses it: {words_of(error)}"}
+    return {"message": "no engine that defines MJCF is installed: pip install 'proofroll[mujoco]'"}
+
+
+def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
+    """The robot that an MJCF means, and by whom it was compiled.
+
+    Raises:
+        InputError: the engine that defines the format cannot compile it, or is not installed.
+        WorkerDied: it crashed or took too long.
+    """
+    original = str(file.path.resolve()) if file.contained else None
+    told = worker.request(call(compile_robot, path=str(written), original=original), time_limit)
+    if "uncovered" in told:
+        raise InputError("file", file.path, told["uncovered"])
+    if "robot" not in told:
+        raise InputError("file", file.path, f"it has no meaning: {told['message']}")
+    robot = robot_from(told["robot"])
+    for name, part in (*robot.bodies.items(), *((joint.name, joint) for joint in robot.joints)):
+        for key, value in vars(part).items():
+            endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
+            if endless and key not in {"lower", "upper"}:  # which most joints have not
+                raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
+    return robot, Compiler(*told["by"])
+
+
+def expanded(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
+    """An MJCF with its macros written out, and by whom; ``parts`` are the file and those that it attaches, by name.
+
+    Raises:
+        InputError: the engine that defines the format cannot do that, or is not installed.
+        WorkerDied: it crashed or took too long.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for part, content in parts.items():
+            (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
+        told = worker.request(call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
+    if "text" not in told:
+        raise InputError("file", path, f"its macros cannot be written out: {told['message']}")
+    return ElementTree.fromstring(told["text"]), Compiler(*told["by"])
