@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from typing import Annotated
 
 import typer
 
@@ -48,3 +49,23 @@ def mutants(scheduler: Scheduler = None, as_json: Json = False) -> None:
     said = f"{len(rows)} mutants tried, {detected} detected, {named} named."
     show(content, as_json, lambda: [mutant_table(rows), said])
     raise typer.Exit(OK if detected == len(rows) and named >= ENOUGH * len(rows) else CONTRADICTED)
+
+
+@drill.command()
+def referee(
+    first: Annotated[int, typer.Option(help="Number of the first random mechanism.")] = 0,
+    count: Annotated[int, typer.Option(help="How many.", min=1)] = 20,
+    as_json: Json = False,
+) -> None:
+    """Hold truths of random mechanisms against a solver of its own; exit 1 on an error beyond its bar or a refusal."""
+    from proofroll_drill.referee.holding import hold
+
+    rows = []
+    with progress_bar("mechanisms", total=count) as advance:
+        for seed in range(first, first + count):
+            rows.append(hold(seed))
+            advance(f"mechanism {seed}")
+    sound = sum(row.sound for row in rows)
+    content = {"tried": len(rows), "sound": sound, "mechanisms": rows}
+    show(content, as_json, lambda: [*(row.text for row in rows), f"{len(rows)} mechanisms tried, {sound} sound."])
+    raise typer.Exit(OK if sound == len(rows) else CONTRADICTED)

@@ -1,0 +1,1 @@
+"""A referee of truths: random mechanisms, solved by equations that share nothing with the package's."""

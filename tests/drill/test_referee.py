@@ -1,0 +1,73 @@
+"""The referee: that both routes start where it does, that truths hold against it, and that it notices a wrong one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.assembly import check_start
+from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.record import Record, gathered
+from proofroll.truth.mechanism import maximal_taylor
+from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll_drill.referee.holding import errors, hold
+from proofroll_drill.referee.random_mechanisms import STYLES, random_mechanism
+
+STARTS = range(40)
+
+
+def starts(mechanism: Mechanism) -> list[Record]:
+    """Both routes at time 0."""
+    first = JointCoordinates(mechanism)
+    return [gathered(np.zeros(1), [first.sample(*mechanism.start())]), MaximalCoordinates(mechanism).at_start()]
+
+
+@pytest.mark.parametrize("seed", STARTS)
+def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
+    """Poses, velocities, energy and determinate reactions at t = 0, all frames turned, by formulas of its own."""
+    _, mechanism = random_mechanism(seed)
+    check_start(mechanism)
+    for record in starts(mechanism):
+        found = errors(mechanism, record, analysed(mechanism).determinate)
+        assert max(found[name][0] for name in ("p_WB", "q_WB", "v_WB", "w_WB", "q")) < 1e-13
+        assert max(found[name][0] for name in ("energy", "wrench")) < 1e-10
+
+
+def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
+    """Those that start above leave no kind out; planar ones are planar to the second route, loops are loops."""
+    found = {style: [random_mechanism(seed)[1] for seed in STARTS if seed % 4 == k] for k, style in enumerate(STYLES)}
+    assert {joint.kind for each in found["tree"] for joint in each.joints} == FACTS.keys()
+    assert len({each.loops[0].kind for each in found["loop"]}) >= 4
+    for mechanism in found["planar tree"] + found["planar loop"]:
+        turning = any(joint.kind in {"revolute", "planar"} for joint in mechanism.joints)
+        assert not turning or {type(body) for body in made_bodies(mechanism, allow_planar=True)} == {Planar}
+
+
+@pytest.mark.parametrize("seed", [5, 10])
+def test_no_error_of_a_truth_lies_beyond_its_bar(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A loop in space and a planar tree, every quantity, over a short time; `drill referee` has any number."""
+    monkeypatch.setattr(maximal_taylor, "heyoka", None)
+    held = hold(seed, until=0.02)
+    assert held.sound, held.text
+    assert set(held.worst) == {"p_WB", "q_WB", "v_WB", "w_WB", "q", "energy", "wrench"}
+
+
+def test_the_referee_notices_what_is_wrong() -> None:
+    """A mass that is a millionth too large shows in the reactions, a turned frame in the poses."""
+    _, mechanism = random_mechanism(10)
+    heavier = replace(mechanism.bodies[0], mass=mechanism.bodies[0].mass * (1 + 1e-6))
+    turned = replace(mechanism.joints[0], orientation=(0.1, 0.2, 0.3))
+    wrong = [
+        replace(mechanism, bodies=(heavier, *mechanism.bodies[1:])),
+        replace(mechanism, joints=(turned, *mechanism.joints[1:])),
+    ]
+    record = [starts(each)[0] for each in wrong]
+    known = analysed(mechanism).determinate
+    assert errors(mechanism, record[0], known)["wrench"][0] > 1e-8
+    assert errors(mechanism, record[1], known)["p_WB"][0] > 1e-2
