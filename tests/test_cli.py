@@ -613,15 +613,24 @@ def test_a_map_of_stability(proofroll: Proofroll, tmp_path: Path) -> None:
 
 
 def test_a_reader_that_stops_reading() -> None:
-    """Output into a pipe that is closed early, as by head, is no error."""
-    done = subprocess.run(
-        f"{sys.executable} -m proofroll.cli scenes --json | head -c 10",
-        shell=True,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stderr == ""
+    """Output into a pipe that is closed early, as by head, is no error, while a command writes or at its end."""
+    for words in ("scenes --json", "scenes", "--version"):
+        reader, writer = os.pipe()
+        os.close(reader)
+        asked = [sys.executable, "-m", "proofroll.cli", *words.split()]
+        done = subprocess.run(asked, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+        os.close(writer)
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_width_of_nothing(command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch) -> None:
+    """COLUMNS=0, as some shells say of a window of unknown size, is taken for 80."""
+    shown = {}
+    for width in ("0", "80"):
+        monkeypatch.setenv("COLUMNS", width)
+        shown[width] = command_line("findings", "--list")
+    assert shown["0"] == shown["80"]
+    assert shown["0"][1].strip()
 
 
 def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:

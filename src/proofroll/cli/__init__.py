@@ -9,6 +9,7 @@ import signal
 import sys
 import warnings
 from functools import cache
+from importlib.metadata import EntryPoint
 from types import FrameType
 from typing import Annotated, Any
 
@@ -32,7 +33,7 @@ from proofroll.cli.run import run
 from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
-from proofroll.core.announced import announced
+from proofroll.core.announced import broken, leave_out, loaded
 from proofroll.core.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(
@@ -46,12 +47,33 @@ for _command in (scenes, run, judge, plot, replay, export, findings, cite, *_STU
     app.command()(_command)
 app.add_typer(new, name="new")
 app.add_typer(engines, name="engines")
-for _point in announced("proofroll.commands"):
-    _added = _point.load()
-    if isinstance(_added, typer.Typer):
-        app.add_typer(_added, name=_point.name)
-    else:
-        app.command(_point.name)(_added)
+
+
+def _add_announced() -> None:
+    """Adds the commands of other packages, and of parts of this one; what is none is left out."""
+    with warnings.catch_warnings(action="ignore"):  # they are told at the end, a line each
+        for point, added in loaded("proofroll.commands"):
+            if isinstance(added, typer.Typer):
+                app.add_typer(added, name=point.name)
+            else:
+                _add_command(point, added)
+
+
+def _add_command(point: EntryPoint, added: Any) -> None:
+    if not callable(added):
+        leave_out(point, "is no command: neither a function nor a typer.Typer")
+        return
+    alone = typer.Typer()
+    alone.command()(added)
+    try:  # or a parameter of which no option can be made would end all commands
+        typer.main.get_command(alone)
+    except Exception as error:
+        leave_out(point, f"is no command ({type(error).__name__}: {error})")
+        return
+    app.command(point.name)(added)
+
+
+_add_announced()
 
 
 @app.callback(invoke_without_command=True)
@@ -140,13 +162,25 @@ def main() -> None:
         code = ENGINE if isinstance(error, (Missing, WorkerDied, Refused)) else USAGE
     except (KeyboardInterrupt, typer.Abort):
         code = INTERRUPTED
-    except BrokenPipeError:
-        code = OK  # the reader of our output has seen enough
-    except OSError as error:
-        place = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
-        complain(f"{place} ({error.strerror or error})")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in the buffers would be tried again at the end
-        code = USAGE
+    except (OSError, SystemExit) as error:
+        code = _unwritten(error)
+    for said in broken.values():
+        complain(said)
     if code == INTERRUPTED:
         complain("interrupted; cases that were finished and stored will be reused")
     sys.exit(code or OK)
+
+
+def _unwritten(error: OSError | SystemExit) -> Any:
+    """The exit code where output cannot be written; a reader who closed a pipe has seen enough."""
+    if isinstance(error, SystemExit):
+        if not isinstance(error.__context__, BrokenPipeError):
+            return error.code  # of a command
+        error = error.__context__  # typer tells that as a failure
+    # what is left in the buffers would be tried again at the end
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    if isinstance(error, BrokenPipeError):
+        return OK
+    place = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
+    complain(f"{place} ({error.strerror or error})")
+    return USAGE

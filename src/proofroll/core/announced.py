@@ -3,13 +3,37 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
+
+# Entry points that could not be loaded -> a sentence that names the package; the command line tells them.
+broken: dict[EntryPoint, str] = {}
 
 
 def announced(group: str) -> tuple[EntryPoint, ...]:
     """The entry points of a group, by name; nothing is loaded."""
     return tuple(sorted(_everything().select(group=group), key=lambda point: point.name))
+
+
+def loaded(group: str) -> list[tuple[EntryPoint, Any]]:
+    """The entry points of a group with what they name; one that cannot be loaded is left out, with a warning."""
+    found = []
+    for point in announced(group):
+        try:
+            found.append((point, point.load()))
+        except (Exception, SystemExit) as error:  # whatever a package does when it is imported
+            leave_out(point, f"cannot be loaded ({type(error).__name__}: {error})")
+    return found
+
+
+def leave_out(point: EntryPoint, why: str) -> None:
+    """Notes that an entry point is not used, and why; once."""
+    if point not in broken:
+        package = point.dist.name if point.dist else "a package"
+        said = f"{package} announces {point.value} as {point.name} ({point.group}), which {why}"
+        broken[point] = f"{said}; it is left out: update or uninstall {package}"
+        warnings.warn(broken[point], RuntimeWarning, stacklevel=2)
 
 
 # Entry points by the ``sys.path`` that they were looked up for: a file of every installed package is read for them.

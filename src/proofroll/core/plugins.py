@@ -11,7 +11,7 @@ from importlib.metadata import EntryPoint, PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import announced, loaded
 from proofroll.core.element import ElementKind
 from proofroll.core.engine_abilities import SupportsFrom
 from proofroll.core.errors import InputError, Missing, ProofrollError, place, require_known
@@ -103,7 +103,7 @@ def _installed(requirement: str) -> bool:
 @cache
 def load_element_kinds() -> tuple[type[ElementKind], ...]:
     """Every kind of element that some installed package announces, by name."""
-    return tuple(point.load() for point in announced(ELEMENTS))
+    return tuple(kind for _, kind in loaded(ELEMENTS))
 
 
 def require_engine(name: str) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import loaded
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.dataset import joined, off_grid_apart
@@ -70,7 +70,7 @@ class FindsEdges(Protocol):
 @cache
 def load_truths() -> tuple[type[ElementTruth], ...]:
     """All that some installed package announces, by name."""
-    return tuple(point.load() for point in announced(TRUTHS))
+    return tuple(kind for _, kind in loaded(TRUTHS))
 
 
 _NONE = np.zeros(0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import loaded
 from proofroll.core.errors import ProofrollError
 
 STUDY_FOLDERS = "proofroll.study_folders"
@@ -27,4 +27,4 @@ def data_folder(kind: str) -> Path:
 @cache
 def study_folders() -> tuple[Path, ...]:
     """The folders of comparisons and other studies: ``comparisons``, and those of modules that packages announce."""
-    return (data_folder("comparisons"), *(Path(point.load().__file__).parent for point in announced(STUDY_FOLDERS)))
+    return (data_folder("comparisons"), *(Path(module.__file__).parent for _, module in loaded(STUDY_FOLDERS)))

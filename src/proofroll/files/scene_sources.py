@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import loaded
 
 GROUP = "proofroll.scene_sources"
 
@@ -56,5 +56,5 @@ def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
 
 @cache
 def _sources() -> dict[str, type[SceneSource]]:
-    found = (point.load() for point in announced(GROUP))
+    found = (source for _, source in loaded(GROUP))
     return {ending: source for source in found for ending in source.endings}

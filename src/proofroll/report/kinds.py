@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import loaded
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,7 +88,7 @@ class ReportKind(Protocol):
 @cache
 def report_kinds() -> tuple[type[ReportKind], ...]:
     """All that some installed package announces, by name."""
-    return tuple(point.load() for point in announced(GROUP))
+    return tuple(kind for _, kind in loaded(GROUP))
 
 
 def kind_of(scene: Scene) -> type[ReportKind] | None:

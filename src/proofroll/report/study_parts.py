@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import loaded
 from proofroll.core.errors import ProofrollError, require_known
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
@@ -117,7 +117,7 @@ class Part(Protocol):
 @cache
 def part_kinds() -> tuple[type[Part], ...]:
     """All that some installed package announces, in the order of a report."""
-    return tuple(sorted((point.load() for point in announced(GROUP)), key=lambda kind: kind.order))
+    return tuple(sorted((kind for _, kind in loaded(GROUP)), key=lambda kind: kind.order))
 
 
 def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:

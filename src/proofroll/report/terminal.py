@@ -49,6 +49,7 @@ def console() -> Screen:
         out.width = min(out.width, WIDTH)
     elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
         out.width = WIDTH
+    out.width = out.width or 80  # COLUMNS=0 says that nobody knows
     return out
 
 

@@ -3,7 +3,7 @@
 from functools import cache
 from typing import Any
 
-from proofroll.core.announced import announced
+from proofroll.core.announced import loaded
 from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
@@ -17,4 +17,4 @@ __all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolv
 @cache
 def surface_kinds() -> tuple[type[Any], ...]:
     """All kinds that a scene can name, here and in other packages: dataclasses that follow :class:`Surface`."""
-    return (Cylinder, Plane, Bowl, Cone, Torus, *(point.load() for point in announced("proofroll.surfaces")))
+    return (Cylinder, Plane, Bowl, Cone, Torus, *(kind for _, kind in loaded("proofroll.surfaces")))

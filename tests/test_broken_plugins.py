@@ -1,0 +1,57 @@
+"""Packages that announce what cannot be loaded: every command says so in a line, and works."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_WRONG = {
+    "raises": "raise ValueError('ouch')",
+    "quits": "import sys; sys.exit(3)",
+    "lacks": "import no_such_module",
+    "number": "thing = 3",
+    "untyped": "def thing(value: dict[str, int]) -> None:\n    '''Do nothing.'''",
+}
+_GROUPS = ("elements", "truths", "surfaces", "report_kinds", "report_parts", "study_folders")
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> dict[str, str]:
+    """An environment with a package whose announcements are all wrong."""
+    info = tmp_path / "bad_plugin-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bad-plugin\nVersion: 1.0\n")
+    for name, text in _WRONG.items():
+        (tmp_path / f"bad_{name}.py").write_text(text)
+    lines = [f"[proofroll.commands]\n{name} = bad_{name}:thing" for name in _WRONG]
+    lines += [
+        f"[proofroll.{group}]\n{name} = bad_{name}:thing" for group in _GROUPS[1:] for name in ("raises", "quits")
+    ]
+    (info / "entry_points.txt").write_text("\n".join(lines))
+    return os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        (["--version"], "proofroll "),
+        (["--help"], "stability"),
+        (["run", "inclined_plane", "--engine", "reduced", "--until", "0.1"], "omega1"),
+        (["check", "inclined_plane"], "is sound"),
+    ],
+)
+def test_every_command_works(words: list[str], shown: str, broken: dict[str, str]) -> None:
+    """Whatever a package does when it is loaded, commands do their work, and each announcement is told in one line."""
+    asked = [sys.executable, "-m", "proofroll", *words]
+    done = subprocess.run(asked, capture_output=True, text=True, env=broken, check=False)
+    assert done.returncode == 0
+    assert shown in done.stdout
+    told = done.stderr.splitlines()
+    assert all(line.startswith("proofroll: bad-plugin announces bad_") for line in told)
+    assert len([line for line in told if "(proofroll.commands)" in line]) == len(_WRONG)
+    for name, why in (("raises", "(ValueError: ouch)"), ("quits", "(SystemExit: 3)"), ("number", "is no command")):
+        assert any(f"bad_{name}:thing" in line and why in line for line in told)
