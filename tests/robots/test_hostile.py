@@ -56,6 +56,12 @@ HOSTILE = {
     "includes itself": (mjcf(extra='<include file="robot.xml"/>'), "include each other"),
     "includes nothing": (mjcf(extra='<include file="absent.xml"/>'), "no such file"),
     "plug-in": (mjcf(extra='<plugin plugin="x"/>'), "does not cover"),
+    "xacro": (
+        urdf(extra='<xacro:macro xmlns:xacro="http://www.ros.org/wiki/xacro" name="m"/>'),
+        "<xacro:macro>: run xacro",
+    ),
+    "xacro without its name": (urdf(extra="<xacro:m/>"), "run xacro first"),
+    "a value for xacro": (urdf(tip=inertial(mass="${2 * m}")), r"<mass value> is '\$\{2 \* m\}': run xacro first"),
     "comment without end": ("<!-- -- <robot/>", "no XML"),
     "infinite repetition": (mjcf(extra='<replicate count="1000000"><geom size="1"/></replicate>'), "does not cover"),
 }

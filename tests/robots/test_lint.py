@@ -107,3 +107,12 @@ def test_planted_in_mjcf(name: str, tmp_path: Path) -> None:
 def test_free_joints_that_say_it_themselves(extra: str, tmp_path: Path) -> None:
     """A free joint whose own attributes say what acts on it, or that inherits nothing, is left alone."""
     assert not [item for item in _mjcf_findings(extra, SPRUNG, tmp_path) if "default class" in item.what]
+
+
+def test_loops_of_an_mjcf_are_told(tmp_path: Path) -> None:
+    """Constraints that close loops or hold bodies are a warning that counts them; coupled joints are none of these."""
+    path = tmp_path / "robot.xml"
+    held = '<connect body1="upper" body2="lower" anchor="0 0 1"/><weld body1="upper"/><joint joint1="k1"/>'
+    path.write_text(mjcf().replace("</mujoco>", f"<equality>{held}</equality></mujoco>"))
+    found = [item for item in lint(open_robot(path), Robot("", {}, ())) if item.where == "equality"]
+    assert [(item.level, item.what.partition(":")[0]) for item in found] == [("warning", "1 <connect>, 1 <weld>")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterator
 from xml.etree.ElementTree import Element
 
@@ -116,6 +117,18 @@ def _urdf_joint(joint: Element) -> Iterator[_Noticed]:
         yield "warning", where, "a fixed joint cannot follow another; some engines refuse the file"
 
 
+def _closed(file: RobotFile) -> Iterator[_Noticed]:
+    """Constraints other than coupled joints."""
+    closing = Counter(item.tag for part in file.root.iter("equality") for item in part if item.tag != "joint")
+    if closing:
+        kinds = ", ".join(f"{number} <{tag}>" for tag, number in closing.items())
+        yield (
+            "warning",
+            "equality",
+            f"{kinds}: what these close or hold is not compared; the tree is checked as if open",
+        )
+
+
 def _mjcf(file: RobotFile) -> Iterator[_Noticed]:
     for compiler in file.root.iter("compiler"):
         for name, what in (
@@ -132,6 +145,7 @@ def _mjcf(file: RobotFile) -> Iterator[_Noticed]:
         for name in ("density", "viscosity"):
             if option.get(name) not in {None, "0"}:
                 yield "note", "option", f"{name}: forces of the medium are not compared"
+    yield from _closed(file)
     if next(file.root.iter("tendon"), None) is not None:
         yield "note", "tendon", "springs and damping of tendons are not compared"
     if any(body.get("gravcomp") for body in file.root.iter("body")):

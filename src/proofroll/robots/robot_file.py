@@ -84,6 +84,7 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
 
     root = read_xml(path)
     if root.tag == "robot":
+        _require_plain(root, path)
         contained = names_files_inside(root, path.resolve().parent, inside)
         kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
@@ -94,6 +95,21 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
     if count > MOST_BODIES:
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
     return RobotFile(path, kind, root, base, tuple(findings), contained)
+
+
+def _require_plain(root: Element, path: Path) -> None:
+    """Raises InputError if a URDF is a template that xacro has not yet been run on."""
+    tag = next((str(element.tag) for element in root.iter() if _XACRO in str(element.tag)), None)
+    if tag is not None:
+        raise InputError("file", path, f"it has <xacro:{tag.rpartition('}')[2]}>: {_RUN_XACRO}")
+    for element in root.iter():
+        for key, value in element.attrib.items():
+            if "${" in value or "$(" in value:
+                raise InputError("file", path, f"<{element.tag} {key}> is {value!r}: {_RUN_XACRO}")
+
+
+_XACRO = "xacro"
+_RUN_XACRO = "run xacro first: xacro FILE > robot.urdf"
 
 
 class _Builder(TreeBuilder):
@@ -144,6 +160,8 @@ def read_xml(path: Path) -> Element:
     except _TooMuch as error:
         raise InputError("file", path, str(error)) from None
     except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that does not exist
+        if b"<xacro:" in text:  # whose prefix is declared nowhere
+            raise InputError("file", path, f"it has <xacro:…>: {_RUN_XACRO}") from None
         raise InputError("file", path, f"this is no XML: {error}") from None
 
 

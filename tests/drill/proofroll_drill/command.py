@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -69,3 +70,19 @@ def referee(
     content = {"tried": len(rows), "sound": sound, "mechanisms": rows}
     show(content, as_json, lambda: [*(row.text for row in rows), f"{len(rows)} mechanisms tried, {sound} sound."])
     raise typer.Exit(OK if sound == len(rows) else CONTRADICTED)
+
+
+@drill.command()
+def robots(
+    folders: Annotated[list[Path], typer.Argument(help="Folders that hold robot files and all that these name.")],
+    every: Annotated[int, typer.Option(min=1, help="Check every n-th file of each folder.")] = 1,
+    states: Annotated[int, typer.Option(min=1, help="Random states that are compared.")] = 5,
+    as_json: Json = False,
+) -> None:
+    """Check all robot files in folders, those of other packages say; exit 1 if one breaks the check."""
+    from proofroll_drill.robot_files import checked_files, lines, outcome_table
+
+    with progress_bar("files") as advance:
+        found = list(checked_files(folders, every, states, advance))
+    show({"files": found}, as_json, lambda: [outcome_table(found), *lines(found)])
+    raise typer.Exit(CONTRADICTED if any(item.outcome == "traceback" for item in found) else OK)
