@@ -14,7 +14,7 @@ _WRONG = {
     "quits": "import sys; sys.exit(3)",
     "lacks": "import no_such_module",
     "number": "thing = 3",
-    "untyped": "def thing(value: dict[str, int]) -> None:\n    '''Do nothing.'''",
+    "untyped": "def thing(value: int | str) -> None:\n    '''Do nothing.'''",
 }
 _GROUPS = ("elements", "truths", "surfaces", "report_kinds", "report_parts", "study_folders")
 
