@@ -124,14 +124,22 @@ class RowSign:
 
 def determinate(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> NDArray[np.bool_]:
     """Which components of the wrenches of joints and then loops no null vector of Cᵀ changes, (joints + loops, 6)."""
+    found: NDArray[np.bool_] = freedom(tree, motion, rows, rank) <= _ZERO
+    return found
+
+
+def freedom(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> Array:
+    """How much all null vectors of Cᵀ together change each component of the wrenches, relative to the most changed.
+
+    It does not hang on which basis of the null vectors is found. Shape (joints + loops, 6).
+    """
     mechanism = tree.mechanism
-    mask = np.ones((len(mechanism.joints) + len(mechanism.loops), 6), dtype=bool)
-    if len(rows.residual) == rank:
-        return mask
-    for null in np.linalg.svd(rows.C, full_matrices=True)[0][:, rank:].T:
-        wrenches = np.concatenate(reactions(tree, motion, rows, null, np.zeros((len(mechanism.bodies) + 1, 6))))
-        mask &= np.abs(wrenches) <= _ZERO * np.abs(wrenches).max()
-    return mask
+    squares = np.zeros((len(mechanism.joints) + len(mechanism.loops), 6))
+    if len(rows.residual) > rank:
+        for null in np.linalg.svd(rows.C, full_matrices=True)[0][:, rank:].T:
+            none = np.zeros((len(mechanism.bodies) + 1, 6))
+            squares += np.concatenate(reactions(tree, motion, rows, null, none)) ** 2
+    return np.asarray(np.sqrt(squares / (squares.max(initial=0.0) or 1.0)), dtype=np.float64)
 
 
 def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, loads: Array) -> tuple[Array, Array]:

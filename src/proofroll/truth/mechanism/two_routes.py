@@ -28,6 +28,7 @@ CHAOS = 1e-9  # m, 1 (of quaternions): where motions that nobody can tell apart 
 NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: no scene file can say less
 BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only long after the horizon
 SAME_START = 1e-9  # m, 1: round-off of places leaves 1e-15 of them, a wrong formula much more
+AT_LIMIT = 1e-9  # rad, m: a joint that swings to its very limit passes it by round-off, 1e-14
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
 JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench")
 
@@ -165,14 +166,14 @@ def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> N
 
 
 def _check_limits(mechanism: Mechanism, record: Record) -> None:
-    """No joint leaves its limits, for no route follows a stop.
+    """No joint leaves its limits but for round-off, as one that swings back to where it started; none follows a stop.
 
     Raises:
         Refused: one does.
     """
     for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
         if joint.limits is not None:
-            low, high = joint.limits
+            low, high = joint.limits[0] - AT_LIMIT, joint.limits[1] + AT_LIMIT
             beyond = np.flatnonzero((record.q[:, at] < low).any(axis=1) | (record.q[:, at] > high).any(axis=1))
             if len(beyond):
                 time = record.time[beyond[0]]

@@ -177,7 +177,7 @@ def test_dry_friction_is_refused():
     )
     with pytest.raises(Refused, match="dry friction in joint j"):
         JointCoordinates(mechanism).run(np.array([0.1]))
-    with pytest.raises(Refused, match="joint j has dry friction"):
+    with pytest.raises(Refused, match="dry friction in joint j"):
         MaximalCoordinates(mechanism)
 
 

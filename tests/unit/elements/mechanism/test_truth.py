@@ -127,6 +127,15 @@ def test_a_joint_that_reaches_its_limit_is_refused(scene):
             assert find_truth(mechanism, times).horizon == np.inf
 
 
+def test_a_joint_that_swings_to_its_very_limit_stays_within(scene):
+    """A pendulum from rest at its limit comes back to it, by round-off above or below: that does not decide."""
+    pytest.importorskip("heyoka")
+    free = scene("pendulum", angle=0.5)
+    for off in (-1e-12, 0.0, 1e-12):
+        mechanism = replace(free, joints=(replace(free.joints[0], limits=(-0.5 + off, 0.5 + off)),))
+        assert find_truth(mechanism, np.linspace(0, 1.0, 3)).horizon == np.inf
+
+
 def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
     """Should one route change its branch without a word, the difference is not taken for an error bar."""
     pytest.importorskip("heyoka")
