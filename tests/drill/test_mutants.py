@@ -97,7 +97,7 @@ def test_everybody_is_told_the_same_cause(
     assert ran[1], ran[2]
     (cause,) = json.loads(ran[1])["diagnosis"]
     assert mutant.named[0] in cause["sentence"]
-    assert f"cause: the engine moves a ball with a {mutant.named[0]}" in str(told.value)
+    assert f"cause: the engine's model has {mutant.named[0]}" in str(told.value)
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert [item["sentence"] for item in report["comparisons"][0]["rows"][0]["diagnosis"]] == [cause["sentence"]]
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

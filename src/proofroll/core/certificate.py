@@ -134,7 +134,7 @@ def first_difference(lines: list[Line]) -> str | None:
             continue
         if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        found, expected = _told_apart(*_worst(line))
+        found, expected = told_apart(*worst_numbers(line))
         where = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
@@ -150,16 +150,16 @@ def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
     return [str(line["quantity"]) for line in lines if line["standing"] == Standing.NOT_REPORTED]
 
 
-def _worst(line: Line) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """What was found and expected; of more numbers than a person reads only those that are furthest from each other."""
-    if len(line.found) <= _SHOWN or len(line.found) != len(line.expected):
+def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """What was found and expected; of more numbers than ``most`` only those that are furthest from each other."""
+    if len(line.found) <= most or len(line.found) != len(line.expected):
         return line.found, line.expected
     apart = np.abs(np.array(line.found) - np.array(line.expected))
     worst = int(np.argmax(np.where(np.isnan(apart), 0.0, apart)))
     return (line.found[worst],), (line.expected[worst],)
 
 
-def _told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
+def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
     """Both as text, with so many digits that they are not the same."""
     for digits in range(6, 18):
         one, other = (", ".join(f"{value:.{digits}g}" for value in values) for values in (found, expected))

@@ -33,6 +33,7 @@ class Observable:
         column: whether a trade-off shows it beside what decides, where nobody says which quantities it shows.
         audit: whether it holds the reactions that an engine reports against the motion that it made.
         hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
+        difference_of: variable of which it is a small difference, so that it has its round-off; empty: of none.
         absent: why no run of the scene has it, and what to change; empty: runs have it.
     """
 
@@ -49,6 +50,7 @@ class Observable:
     audit: bool = False
     hangs_on_events: bool = True
     absent: str = ""
+    difference_of: str = ""
 
     @property
     def shown(self) -> str:

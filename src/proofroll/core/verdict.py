@@ -108,6 +108,7 @@ def judge(
     own_bar: float = 0.0,
     sampled_bar: float = np.inf,
     between: tuple[FloatArray, FloatArray] | None = None,
+    magnitude: float = 0.0,
 ) -> Judgement:
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
@@ -127,11 +128,12 @@ def judge(
             an error that may come of this alone is no difference.
         sampled_bar: how far its samples leave that open; no run excuses itself by more.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
+        magnitude: of the numbers of which the curve is a difference, as positions are of a gap: it has their round-off.
     """
     error = largest_difference(values, true)
     off_grid = 0.0 if between is None else largest_difference(*between)
     hidden = off_grid > max(tolerance, _BETWEEN * error)
-    round_off = _ROUND_OFF * max(scale, float(np.max(np.abs(true), initial=0.0)))
+    round_off = _ROUND_OFF * max(scale, magnitude, float(np.max(np.abs(true), initial=0.0)))
     shown_unit = "" if unit == "1" else f" {unit}"
     rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
     if limit is not None:

@@ -162,6 +162,7 @@ def _judgements(
             own_bar=reference.own_bar(name, trajectories[1.0]),
             sampled_bar=reference.sampled_bar,
             between=reference.between(name, trajectories[1.0]),
+            magnitude=reference.magnitude(name),
         )
         judgements.append(judgement)
     return judgements

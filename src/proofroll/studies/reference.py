@@ -140,6 +140,14 @@ class Reference:
         said = np.isfinite(true)
         return None if turned is None else (turned[said], true[said])
 
+    def magnitude(self, name: str) -> float:
+        """Of the numbers of which an observable is a small difference; 0: of none."""
+        for element in self.scene.elements:
+            for item in element.observables:
+                if item.difference_of and self.scene.label(element, item.name) == name:
+                    return float(np.max(np.abs(part(self.scene, element, self.dataset)[item.difference_of].to_numpy())))
+        return 0.0
+
     def own_bar(self, name: str, dataset: xr.Dataset) -> float:
         """How far a run leaves open what it shows of an observable: half the width of its widest event."""
         item = self.scene.observables[name]

@@ -358,3 +358,26 @@ def test_verdicts_are_ordered_from_best_to_worst() -> None:
         "agrees", "unconfirmed", "incomplete", "converges", "ill-posed", "not-judged", "another-scene",
         "refused", "differs", "failed",
     ]  # fmt: skip
+
+
+def test_a_limit_of_events_that_are_not_the_truths_says_so() -> None:
+    """Where a ladder gives more events than there are, no number stands for how far the limit is off."""
+    three = np.array([0.1, 0.2, 0.3])
+    found = judge(
+        "event_times", "s", three, TRUE[:2], truth_error_bar=0.0, tolerance=1e-3, scale=1.0,
+        limit=Limit(three, 9e-13, 2.0), ladder=True,
+    )  # fmt: skip
+    assert found.verdict == Verdict.DIFFERS
+    assert "not as many values as the truth" in found.reason
+    assert "–" not in found.reason
+
+
+@pytest.mark.parametrize(("magnitude", "remarks"), [(0.0, 1), (1.0, 0)])
+def test_round_off_of_large_numbers_in_their_difference_is_not_remarked(magnitude: float, remarks: int) -> None:
+    """A gap of 3e-16 m of a ball a metre from the origin is no other limit, though the gap itself is small."""
+    gap = np.full(TRUE.shape, 3e-16)
+    found = judge(
+        "gap", "m", gap, 0 * TRUE, truth_error_bar=1e-18, tolerance=1e-6, scale=1e-4,
+        limit=Limit(gap, 0.0, float("nan")), ladder=True, magnitude=magnitude,
+    )  # fmt: skip
+    assert len(found.remarks) == remarks

@@ -42,6 +42,7 @@ class Evidence:
         lines: of the certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
         run, truth: the element's variables, at the same times; None: the engine was not run.
         step: of the engine [s], or None.
+        settled: observables that were judged and found right: nothing about them is to be explained.
         found: what hypotheses have found in it, see :func:`proofroll.core.diagnosis.fitting.once`.
     """
 
@@ -50,6 +51,7 @@ class Evidence:
     run: xr.Dataset | None = None
     truth: xr.Dataset | None = None
     step: float | None = None
+    settled: frozenset[str] = frozenset()
     found: dict[Any, Sequence[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
 
@@ -59,7 +61,8 @@ class Cause:
 
     Attributes:
         id: of the hypothesis.
-        says: what the engine does, as a clause.
+        says: what the engine does, as a clause; empty: a method's own error does it as well, so that it accuses nobody,
+            and is no proof of anything else.
         quantity, unit: of the difference that it closes.
         before, after: difference without and with the hypothesis, in ``unit``.
         remedy: what an author looks at.
@@ -67,6 +70,7 @@ class Cause:
         covers: further quantities that it explains, of which no other cause is looked for.
         closes: largest part of the difference that it may leave.
         alternative: whether it explains what another cause explains as well: from outside the two look the same.
+        explains: how many independent numbers of the difference it closes; None: as many as there are samples.
     """
 
     id: str
@@ -80,11 +84,13 @@ class Cause:
     covers: tuple[str, ...] = ()
     closes: float = CLOSES
     alternative: bool = False
+    explains: int | None = None
 
     @property
     def proven(self) -> bool:
-        """Whether it closes the difference."""
-        return bool(self.before > 0 and self.after <= self.closes * self.before)
+        """Whether it closes the difference, of more independent numbers than it has free ones."""
+        enough = self.explains is None or self.explains > self.fitted
+        return bool(enough and self.before > 0 and np.isfinite(self.after) and self.after <= self.closes * self.before)
 
     @property
     def left(self) -> float:
@@ -135,7 +141,8 @@ class ExplainsRuns(Protocol):
 def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause]:
     """The proven causes, the best first: with the fewest fitted numbers, then with the smallest part left.
 
-    Of those that explain the same quantity few more are kept, if they do so as well: as alternatives.
+    Of those that explain the same quantity few more are kept, if they do so as well: as alternatives. A number that was
+    fitted proves nothing where another fitted number does as well.
     """
     proven = [cause for item in hypotheses for cause in item.test(evidence) if cause.proven]
     proven.sort(key=lambda cause: (cause.fitted, cause.left))
@@ -146,7 +153,8 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
             found.append(cause)
         elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
             found.append(dataclasses.replace(cause, alternative=True))
-    return sorted(found, key=lambda cause: cause.alternative)
+    known = [cause for cause in found if cause.says and not any(_unsure(cause, other) for other in proven)]
+    return sorted(known, key=lambda cause: cause.alternative)
 
 
 def _rivals(cause: Cause, first: Cause) -> bool:
@@ -154,6 +162,11 @@ def _rivals(cause: Cause, first: Cause) -> bool:
     as_good = cause.fitted == first.fitted and cause.left <= _AS_GOOD * first.left
     whole = cause.quantity == first.quantity or first.quantity in cause.covers
     return as_good and whole and cause.id != first.id
+
+
+def _unsure(cause: Cause, other: Cause) -> bool:
+    """Whether a fitted cause is one of several that explain the same as well."""
+    return cause.fitted > 0 and _rivals(other, cause)
 
 
 def hypotheses_of(element: Element) -> Sequence[Hypothesis]:

@@ -12,6 +12,8 @@ from proofroll.core.diagnosis import apart
 from proofroll.core.diagnosis.fitting import fitted
 
 _SPLINE = 5
+# Fewer samples tell no time; where there are few, fewer at the ends are left out.
+_FEWEST, _MANY, _END = 9, 18, 2
 _SHIFTS = 6
 # A clock that is further off than this is another fault [relative].
 _PACE = 0.25
@@ -19,7 +21,7 @@ _PACE = 0.25
 
 def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
     """What both say throughout, shape (time, numbers); None: too few samples."""
-    if len(time) < 3 * (_SPLINE + 1):
+    if len(time) < _FEWEST:
         return None
     flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
     known = np.isfinite(flat).all(0) & np.isfinite(held).all(0)
@@ -34,9 +36,10 @@ def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, f
     if found is None:
         return None
     flat, held = found
-    inner = slice(_SPLINE, -_SPLINE)
+    end = _SPLINE if len(time) >= _MANY else _END
+    inner = slice(end, -end)
     flat, curve = flat[inner], make_interp_spline(time, held, k=_SPLINE)
-    rate, delay, reach = curve.derivative(), 0.0, time[_SPLINE] - time[0]
+    rate, delay, reach = curve.derivative(), 0.0, time[end] - time[0]
     for _ in range(_SHIFTS):
         slope = rate(time[inner] - delay)
         square = float(np.sum(slope**2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import wraps
+from functools import cached_property, wraps
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -21,6 +21,9 @@ _STEP = 1e-4
 # A step that is coarse for a motion changes its equations as a factor near one does (Hairer, Lubich and Wanner 2006,
 # chapter IX: modified equations); a factor that nobody makes by mistake says nothing nearer to one than this.
 _METHOD = 1e-2
+# Part of the largest change from which on a number is changed at all.
+_CHANGED = 1e-6
+_TINY = np.finfo(float).tiny
 # Numbers that mistakes make: a fitted factor this near to one of them is taken to be it.
 _NEAR = 2e-3
 _NOTHING = 1e-5
@@ -79,6 +82,11 @@ def telling(factor: float) -> bool:
     return known_factor(factor) is not None or abs(factor - 1) > _METHOD
 
 
+def possible(factor: float, signed: bool) -> bool:
+    """Whether a number of a scene can have this factor; only of what is ``signed`` the sign is mistaken, in whole."""
+    return factor >= 0 or (signed and known_factor(factor) is not None)
+
+
 @dataclass(frozen=True)
 class Residuals(Generic[M]):
     """What models of an element leave of a difference.
@@ -89,7 +97,9 @@ class Residuals(Generic[M]):
         before: largest that the scene's own model leaves.
         closes: part of it that a proof may leave.
         covers: quantities that follow from the model.
-        alone: whether there is but one equation, which any one number closes.
+        plain: the scene's own model.
+        others: models that differ from it in one number each; what they change together is all that can be told apart.
+        contradicted: whether something that the engine says, and that holds, speaks against a model.
     """
 
     left: Callable[[M | None], FloatArray]
@@ -98,7 +108,31 @@ class Residuals(Generic[M]):
     before: float
     closes: float
     covers: tuple[str, ...]
-    alone: bool = False
+    plain: M
+    others: Callable[[], Sequence[M]]
+    contradicted: Callable[[M], bool] = lambda _: False
+
+    @cached_property
+    def _changes(self) -> FloatArray:
+        """What the other models change of what is left, each by its size, shape (numbers, models)."""
+        at = self.left(self.plain)
+        changed = np.stack([self.left(model) - at for model in self.others()], axis=-1)
+        return np.asarray(changed / (np.linalg.norm(changed, axis=0) + _TINY))
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is but one equation, which any one number closes."""
+        return len(self.left(self.plain)) < 2
+
+    def explained(self, model: M | None) -> int:
+        """How many independent numbers a model changes: as many as it and the other models tell apart among them."""
+        change = self.left(model) - self.left(self.plain)
+        size = np.abs(change)
+        if not np.all(np.isfinite(size)) or not np.any(size):
+            return 0
+        all_of_them = np.column_stack([change / np.linalg.norm(change), self._changes])
+        values = np.linalg.svd(all_of_them[size > _CHANGED * np.max(size)], compute_uv=False)
+        return int(np.sum(values > self.closes * np.max(values)))
 
     def largest(self, model: M | None) -> float:
         """What a model leaves at most."""
@@ -109,9 +143,14 @@ class Residuals(Generic[M]):
         return fitted(lambda x: self.left(model(x)), start, 1.0)
 
     def cause(self, name: str, says: str, model: M | None, remedy: str, number: int) -> Cause:
-        """That the engine moves by this model."""
+        """That the engine moves by this model, in which so many numbers were fitted."""
         after = self.largest(model)
-        return Cause(name, says, self.quantity, self.unit, self.before, after, remedy, number, self.covers, self.closes)
+        closes = after <= self.closes * self.before
+        if closes and (model is None or self.contradicted(model)):
+            after = np.inf
+        explains = self.explained(model) if number and closes else None
+        proof = self.quantity, self.unit, self.before, after, remedy, number, self.covers, self.closes
+        return Cause(name, says, *proof, explains=explains)
 
 
 def once(residuals: Callable[[Evidence], Iterator[Residuals[M]]]) -> Callable[[Evidence], Sequence[Residuals[M]]]:
@@ -145,8 +184,6 @@ def any_gravity(
         g = gravity_of(element)
         for held in residuals(evidence):
             at = held.left(falling(element, g))
-            if len(at) <= 3:
-                continue
             slopes = [held.left(falling(element, g + axis)) - at for axis in np.eye(3)]
             found = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
             found = np.where(np.abs(found) < 1e-6 * max(float(np.max(np.abs(found))), 1e-300), 0.0, found)

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause
+from proofroll.core.certificate import Line, told_apart, worst_numbers
+from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
+from proofroll.core.diagnosis.fitting import said_factor
 
 # Differences that are left in units of what a line allows; an engine that is soft there says so in its tolerance.
 _EXACT = 1e-6
+# So many numbers of a line are shown in a cause; of more the one that is furthest off.
+_SHOWN = 3
+# Numbers of one line are one factor times the scene's to this part.
+_ALIKE = 1e-9
+# Lines that the first steps of an engine give, see :mod:`proofroll.core.first_steps`.
+DERIVED = " of the first steps"
 
 
 def differing(lines: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
@@ -45,11 +54,52 @@ def left(
     return np.concatenate(parts)
 
 
+def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothesis:
+    """That a model was built of other numbers than the scene's, as its certificate says.
+
+    Args:
+        given: quantities that an engine is given.
+        covers: what follows from them.
+    """
+
+    @hypothesis(
+        "built", "the engine's own model, read back, holds other numbers than the scene: its certificate says so"
+    )
+    def test(evidence: Evidence) -> Iterator[Cause]:
+        wrong = [line for line in differing(evidence.lines) if line["quantity"] in given]
+        if not wrong or all(_is_single(line) for line in wrong):
+            return
+        worst = max(wrong, key=lambda line: float(line["difference"]))
+        says = f"the engine's model has {' and '.join(_otherwise(line) for line in wrong)}"
+        remedy = (
+            "give the engine the scene's number, once, in its unit and about the point and axes that the engine takes"
+        )
+        name = f"at time 0 {worst['quantity']}, relative"
+        yield Cause("built", says, name, "1", worst["difference"], 0.0, remedy, covers=covers)
+
+    return test
+
+
+def _otherwise(line: Mapping[str, Any]) -> str:
+    """A number that was built otherwise: by which factor, if it is one, and both numbers."""
+    found, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
+    own = {field.name: line[field.name] for field in dataclasses.fields(Line)}
+    one, other = told_apart(*worst_numbers(Line(**own), _SHOWN))
+    shown = f"{one} instead of {other}{'' if line['unit'] == '1' else ' ' + line['unit']}"
+    square = float(expected @ expected) if found.shape == expected.shape else 0.0
+    factor = float(found @ expected) / square if square else 0.0
+    alike = square > 0 and bool(np.max(np.abs(found - factor * expected)) <= _ALIKE * np.max(np.abs(expected)))
+    return f"{line['quantity']} {said_factor(factor)} ({shown})" if alike else f"{line['quantity']} {shown}"
+
+
+def _is_single(line: Mapping[str, Any]) -> bool:
+    """Whether what was found is the float32 of what is expected, and not only by being equal to it."""
+    return np.array_equal(np.float32(line["expected"]), np.asarray(line["found"])) and any(line["expected"])
+
+
 def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
     """The cause that the engine computes with 24 bits: what differs is the float32 of what is expected."""
-    wrong = differing(lines)
-    same = [np.array_equal(np.float32(line["expected"]), np.asarray(line["found"])) for line in wrong]
-    exact = [line for line, alike in zip(wrong, same, strict=True) if alike and any(line["expected"])]
+    exact = [line for line in differing(lines) if _is_single(line)]
     if exact:
         before = max(line["difference"] for line in exact)
         name, says = str(exact[0]["quantity"]), "what the engine holds are single-precision numbers (float32)"

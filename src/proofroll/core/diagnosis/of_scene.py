@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 # So many causes are told; where more close something, the first ones do it best.
 _MOST = 3
 _WRONG = frozenset({Verdict.DIFFERS, Verdict.CONVERGES})
+_RIGHT = frozenset({Verdict.AGREES, Verdict.UNCONFIRMED})
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,8 @@ def diagnosed(
         truth, shorter = common_span(scene, truth, {0: run})
         run = shorter[0]
     judged = list(judgements)
-    wrong = [item.observable for item in judged if item.verdict in _WRONG]
+    wrong = {item.observable for item in judged if item.verdict in _WRONG}
+    right = {item.observable for item in judged if item.verdict in _RIGHT}
     found, seen = [], what_is_right(scene, judged)
     for element in scene.elements:
         ending = f".{element.name}" if len(scene.elements) > 1 else ""
@@ -80,7 +82,8 @@ def diagnosed(
             continue
         ran = None if run is None else part(scene, element, run)
         true = None if truth is None else part(scene, element, truth)
-        evidence = Evidence(element, own, ran, true, step)
+        settled = frozenset(name.removesuffix(ending) for name in right if name.endswith(ending))
+        evidence = Evidence(element, own, ran, true, step, settled)
         found += [Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]]
     return found
 
@@ -95,7 +98,7 @@ def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
         known = scene.observables.get(item.observable)
         if known is None or (known.role == Role.RESIDUAL and not known.hangs_on_events):
             continue
-        if item.verdict in {Verdict.AGREES, Verdict.UNCONFIRMED}:
+        if item.verdict in _RIGHT:
             right.append(known)
         elif item.verdict in _WRONG:
             wrong.append(known)

@@ -30,6 +30,10 @@ _EXACT = 1e-3
 # A step in an otherwise constant curve fits any shift: that a time is another shows where the curve changes, at this
 # many samples at least, each by this part of the largest difference.
 _SEEN, _FEW = 6, 1e-2
+# A difference within so many bars of the truth is none.
+_BARS = 10.0
+# Part of the largest number of a matrix from which on a component has a share.
+_SHARE = 1e-9
 _SIGN = "an engine may give what acts on the other body: look at whose vector it is"
 
 
@@ -41,10 +45,11 @@ class Reported:
         name: of the variable, e.g. ``w_WB``.
         what: in words, e.g. ``the angular velocity``.
         unit: its unit.
-        said, true: values, shape (time, …, 3).
+        said, true: values, shape (time, …, 3); NaN where the equations do not determine them.
         time: [s], shape (time,).
         frames: name -> rotations whose columns are the frame's axes in the world, shape (time, …, 3, 3).
         least: size below which the quantity stands still, in its unit.
+        bar: how far the truth itself is known, in its unit.
     """
 
     name: str
@@ -55,12 +60,23 @@ class Reported:
     time: FloatArray
     frames: Mapping[str, FloatArray] = field(default_factory=dict)
     least: float = 0.0
+    bar: float = 0.0
+
+    @property
+    def size(self) -> float:
+        """Of the quantity."""
+        return max(float(np.nanmax(np.abs(self.true), initial=0.0)), self.least)
+
+    @property
+    def differs(self) -> bool:
+        """Whether there is a difference beyond round-off and what is not known of the truth."""
+        known = self.said.shape == self.true.shape and above_round_off(self.before, self.size)
+        return known and self.before > _BARS * self.bar
 
     def after_start(self) -> Reported:
         """Without time 0 where that is right: an engine may give there what it was given."""
         said, true = self.said, self.true
-        size = max(float(np.max(np.abs(true), initial=0.0)), self.least)
-        if len(said) < 2 or said.shape != true.shape or above_round_off(apart(said[0], true[0]), size):
+        if len(said) < 2 or said.shape != true.shape or above_round_off(apart(said[0], true[0]), self.size):
             return self
         frames = {key: frame[1:] for key, frame in self.frames.items()}
         return replace(self, said=said[1:], true=true[1:], time=self.time[1:], frames=frames)
@@ -71,16 +87,31 @@ class Reported:
         return apart(self.said, self.true)
 
     def cause(
-        self, kind: str, says: str, explained: FloatArray, remedy: str, number: int = 0, closes: float = CLOSES
+        self,
+        kind: str,
+        says: str,
+        explained: FloatArray,
+        remedy: str,
+        number: int = 0,
+        closes: float = CLOSES,
+        explains: int | None = None,
     ) -> Cause:
-        """That the engine said ``explained`` instead of the truth."""
-        proof = self.name, self.unit, self.before, apart(self.said, explained)
-        return Cause(f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes)
+        """That the engine said ``explained`` instead of the truth, as far as that is determined.
+
+        What is said where it is not is left aside, and what differs there proves nothing.
+        """
+        partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
+        aside = partly & (np.isnan(explained) | np.isnan(self.said))
+        said, true, explained = (np.where(aside, np.nan, each) for each in (self.said, self.true, explained))
+        before, after = apart(said, true), apart(said, explained)
+        if before < self.before / 2:
+            after = np.inf  # most of the difference is in what is left aside
+        proof = self.name, self.unit, before, after
+        return Cause(f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes, explains=explains)
 
     def causes(self, step: float | None) -> Iterator[Cause]:
         """All of this module, as far as there is a difference."""
-        size = float(np.max(np.abs(self.true), initial=self.least))
-        if self.said.shape != self.true.shape or not above_round_off(self.before, size):
+        if not self.differs:
             return
         sign = self.cause("sign", f"{self.name} has the wrong sign: it is minus {self.what}", -self.true, _SIGN)
         for causes in (
@@ -102,7 +133,7 @@ class Reported:
             local = into(frame, self.true)
             yield self.cause("frame", f"{self.name} looks like {self.what} in {name}", local, remedy)
             yield self.cause("frame", f"{self.name} looks like minus {self.what} in {name}", -local, remedy)
-            turned = np.einsum("...ij,...j->...i", frame, self.true)
+            turned = product(frame, self.true)
             yield self.cause("frame", f"{self.name} looks turned by {name} once too often", turned, remedy)
 
     def _axes(self) -> Iterator[Cause]:
@@ -116,39 +147,45 @@ class Reported:
                 where = "" if frame is None else f" in {name}"
                 shown = ", ".join("-" * (s < 0) + "xyz"[k] for k, s in zip(order, signs, strict=True))
                 says = f"{self.name} has other axes or signs{where}: its x, y, z are the true {shown}"
-                explained = changed if frame is None else np.einsum("...ij,...j->...i", frame, changed)
+                explained = changed if frame is None else product(frame, changed)
                 yield self.cause("axes", says, explained, f"look at the signs and the order of axes of {self.name}")
 
     def _scaled(self, step: float | None) -> Iterator[Cause]:
-        square = float(np.sum(self.true**2))
+        square = float(np.nansum(self.true**2))
         if not square:
             return
-        factor = float(np.sum(self.said * self.true)) / square
+        factor = float(np.nansum(self.said * self.true)) / square
         impulse = bool(step) and abs(factor - (step or 0.0)) < 1e-3 * (step or 0.0)
         known = impulse or known_factor(factor) is not None
-        if np.count_nonzero(self.true) < 2 and not known:
-            return  # some factor takes any number to any other
         times = "times the step, as an impulse" if impulse else said_factor(factor)
         says = f"{self.name} is {self.what} {times}"
-        closes = CLOSES if known else _EXACT
-        yield self.cause("scaled", says, factor * self.true, f"look at the unit of {self.name}", 1, closes)
+        remedy = f"look at the unit of {self.name}"
+        if known:
+            yield self.cause("scaled", says, factor * self.true, remedy)
+        else:  # some factor takes any number to any other
+            sizes = np.abs(self.true[np.abs(self.true) > _EXACT * self.size])
+            yield self.cause("scaled", says, factor * self.true, remedy, 1, _EXACT, _distinct(sizes, self.size))
 
     def _clamped(self) -> Iterator[Cause]:
         """A limit is held exactly, as a unit is."""
-        limit = float(np.max(np.abs(self.said)))
-        sizes = np.linalg.norm(self.true, axis=-1, keepdims=True)
-        longest = float(np.max(np.linalg.norm(self.said, axis=-1)))
+        limit = float(np.nanmax(np.abs(self.said), initial=0.0))
+        sizes = np.linalg.norm(np.nan_to_num(self.true), axis=-1, keepdims=True)
+        longest = float(np.max(np.linalg.norm(np.nan_to_num(self.said), axis=-1)))
         shorter = self.true * np.minimum(1.0, longest / np.where(sizes > 0, sizes, 1.0))
-        for what, at, largest, explained in (
-            (f"each component of {self.name}", "", limit, np.clip(self.true, -limit, limit)),
-            (self.name, "a length of ", longest, shorter),
+        each = np.abs(self.true)
+        for what, at, largest, explained, true in (
+            (f"each component of {self.name}", "", limit, np.clip(self.true, -limit, limit), each),
+            (self.name, "a length of ", longest, shorter, sizes),
         ):
             remedy = f"find what limits {self.name} to {largest:.6g} {self.unit}"
             says = f"{what} is clamped at {at}{largest:.6g} {self.unit}"
-            yield self.cause("clamped", says, explained, remedy, 1, _EXACT)
+            above = true[true > largest] - largest
+            explains = _distinct(above, float(np.max(above, initial=0.0)))
+            yield self.cause("clamped", says, explained, remedy, 1, _EXACT, explains)
 
     def _late(self, step: float | None) -> Iterator[Cause]:
-        differs = np.max(np.abs(self.said - self.true).reshape(len(self.time), -1), axis=-1) > _FEW * self.before
+        off = np.nan_to_num(np.abs(self.said - self.true))
+        differs = np.max(off.reshape(len(self.time), -1), axis=-1) > _FEW * self.before
         shift = late(self.time, self.said, self.true) if np.count_nonzero(differs) >= _SEEN else None
         if shift is None:
             return
@@ -159,5 +196,21 @@ class Reported:
 
 
 def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Components along the axes of frames."""
-    return np.asarray(np.einsum("...ji,...j->...i", frame, vectors))
+    """Components along the axes of frames; NaN where they hang on one that is NaN."""
+    return product(np.swapaxes(frame, -1, -2), vectors)
+
+
+def product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Matrices times vectors, NaN where a component that is NaN has a share in it."""
+    unknown = np.isnan(vectors)
+    size = float(np.max(np.abs(matrices), initial=0.0))
+    found = np.einsum("...ij,...j->...i", matrices, np.where(unknown, 0.0, vectors))
+    lost = np.einsum("...ij,...j->...i", np.abs(matrices) > _SHARE * size, unknown.astype(float)) > 0
+    return np.where(lost, np.nan, found)
+
+
+def _distinct(values: FloatArray, size: float) -> int:
+    """How many of some numbers are not the same: one that comes again is one number."""
+    if not values.size or not size:
+        return 0
+    return 1 + int(np.sum(np.diff(np.sort(values, axis=None)) > _EXACT * size))

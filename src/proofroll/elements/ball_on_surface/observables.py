@@ -58,6 +58,8 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
     bounded = np.isfinite(body.contact.mu_static)
     never = "" if bounded else "without bounded friction the ball never slips; --set mu_static=…"
 
+    apart = "m", "distance of the ball from the wall"
+
     def residual(name: str, unit: str, meaning: str, floor: float, **more: Any) -> Observable:
         return Observable(name, unit, meaning, Role.RESIDUAL, floor=floor, hangs_on_events=False, **more)
 
@@ -71,9 +73,9 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         residual("force_audit", "N", "reported minus recomputed contact force", force, asked_for=False, audit=True),
         residual("rate_audit", "m/s", "velocities minus the rates of position and attitude", speed, asked_for=False),
         # A ball that flies is followed in its distance, too, which decides.
-        Observable("gap", "m", "distance of the ball from the wall", Role.MOTION, floor=a, headline=True, decides=True)
+        Observable("gap", *apart, Role.MOTION, floor=a, headline=True, decides=True, difference_of="p_WB")
         if flies
-        else residual("gap", "m", "distance of the ball from the wall", a),
+        else residual("gap", *apart, a, difference_of="p_WB"),
         # Without a bound on friction nothing slips; with one the true ball does, and is followed.
         Observable(
             "slip",

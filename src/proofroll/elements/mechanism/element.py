@@ -183,11 +183,11 @@ class MechanismElement:
         if self.conservative:
             meaning = "energy now minus energy at the start"
             floor = force * self.length
-            found.append(
-                Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", floor, column=True, hangs_on_events=False)
-            )
+            never: dict[str, Any] = {"hangs_on_events": False, "difference_of": "energy"}
+            found.append(Observable("energy_error", "J", meaning, Role.RESIDUAL, "ΔE", floor, column=True, **never))
         meaning = "how far joints and loops are open"
-        found.append(Observable("drift", "m", meaning, Role.RESIDUAL, floor=a, asked_for=False, hangs_on_events=False))
+        never = {"hangs_on_events": False, "difference_of": "p_WB"}
+        found.append(Observable("drift", "m", meaning, Role.RESIDUAL, floor=a, asked_for=False, **never))
         return tuple(found)
 
     def step_numbers(self, h: float, truth: xr.Dataset | None) -> Sequence[StepNumber]:

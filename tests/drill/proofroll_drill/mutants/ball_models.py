@@ -60,7 +60,7 @@ class ToldInertia(Honest):
     """The same, and its certificate says so."""
 
     fault = "inertia counted twice, and read back"
-    named = ("moment of inertia",)
+    named = ("inertia counted twice",)
 
     def misread(self, scene: Scene) -> Scene:
         """Twice."""

@@ -130,14 +130,14 @@ class Impulse(ToldBall):
 
 
 class Clamped(ToldBall):
-    """No component of the spin is beyond 100 rad/s."""
+    """No component of the spin is beyond 60 rad/s: two of three get there, one of them by another way at each time."""
 
-    fault = "spin clamped at 100 rad/s"
+    fault = "spin clamped at 60 rad/s"
     named = ("clamped",)
 
     def misreport(self, sample: BallSample) -> BallSample:
         """After the first step."""
-        return dataclasses.replace(sample, w_WB=np.clip(sample.w_WB, -100, 100) if self.t else sample.w_WB)
+        return dataclasses.replace(sample, w_WB=np.clip(sample.w_WB, -60, 60) if self.t else sample.w_WB)
 
 
 class Single(ToldBall):

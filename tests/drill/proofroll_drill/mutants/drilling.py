@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.certificate import certify, first_difference
+from proofroll.core.certificate import first_difference
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Diverged
+from proofroll.core.first_steps import certificate as certificate_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
@@ -27,6 +28,7 @@ from proofroll_drill.mutants import (
     ball_samples,
     ball_settings,
     mechanism_models,
+    mechanism_numbers,
     mechanism_samples,
     mechanism_settings,
 )
@@ -40,6 +42,7 @@ MODULES: tuple[ModuleType, ...] = (
     ball_samples,
     ball_settings,
     mechanism_models,
+    mechanism_numbers,
     mechanism_samples,
     mechanism_settings,
 )
@@ -97,7 +100,7 @@ def tried(kind: type[Mutant]) -> Mutated:
     scene, reference = _reference(kind)
     settings = dataclasses.replace(kind.presets[kind.formulation]["default"], dt=STEP)
     engine = kind.build(scene, settings)
-    certificate = certify(engine, scene)
+    certificate = certificate_of(kind, engine, scene, settings)
     lines = [line.as_dict() for line in certificate]
     by = first_difference(certificate) or ""
     if by:

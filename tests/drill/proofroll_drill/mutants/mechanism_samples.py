@@ -24,11 +24,18 @@ class ToldMechanism(Mutant):
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
-        self.com = np.array([body.com for body in self.element.mechanism.bodies])
+        mechanism = self.element.mechanism
+        self.com = np.array([body.com for body in mechanism.bodies])
+        self.ends = [(mechanism.body_index[each.b], np.array(each.position_b)) for each in mechanism.connections]
 
     def events(self) -> list[Any]:
         """None."""
         return []
+
+    def of_children(self, sample: MechanismSample) -> Rotation:
+        """How the child of each joint and loop is turned."""
+        turns = np.concatenate([_turns(sample).as_matrix(), np.eye(3)[None]])
+        return Rotation.from_matrix(turns[[body for body, _ in self.ends]])
 
 
 def _turns(sample: MechanismSample) -> Rotation:
@@ -93,7 +100,7 @@ class BodyReaction(ToldMechanism):
     def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Turned back."""
         assert sample.joint_force is not None
-        return dataclasses.replace(sample, joint_force=_turns(sample).inv().apply(sample.joint_force))
+        return dataclasses.replace(sample, joint_force=self.of_children(sample).inv().apply(sample.joint_force))
 
 
 class Swapped(ToldMechanism):
@@ -119,8 +126,31 @@ class AboutCentre(ToldMechanism):
         """Of each child."""
         assert sample.joint_force is not None
         assert sample.joint_torque is not None
-        arm = _turns(sample).apply(self.com)
+        coms = np.concatenate([self.com, np.zeros((1, 3))])
+        arm = self.of_children(sample).apply(np.array([coms[body] - at for body, at in self.ends]))
         return dataclasses.replace(sample, joint_torque=sample.joint_torque - np.cross(arm, sample.joint_force))
+
+
+class LoopReaction(BodyReaction):
+    """The same in loops, of which not every component is determined."""
+
+    fault = "reactions of loops in body axes"
+    scene = CRANK
+
+
+class LoopSwapped(Swapped):
+    """The same in loops."""
+
+    fault = "reactions of loops in another order"
+    scene = CRANK
+
+
+class LoopAboutCentre(AboutCentre):
+    """The same in loops."""
+
+    fault = "moments of loops about the centres of mass"
+    scene: ClassVar[Any] = ("andrews_squeezer", {})
+    until, every = 0.012, 0.001
 
 
 class Unnormalised(ToldMechanism):

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import known_factor, said_factor, telling
+from proofroll.core.diagnosis.fitting import known_factor, possible, said_factor, telling
+from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, held_against, is_bounded
 from proofroll.elements.ball_on_surface.model import RollingBall
 
@@ -40,8 +41,8 @@ def number(
     value: Callable[[RollingBall], float],
     change: Callable[[RollingBall, float], RollingBall],
     remedy: str,
-    possible: Callable[[float], bool] = lambda _: True,
     only: Callable[[RollingBall], bool] = lambda _: True,
+    signed: bool = False,
 ) -> Hypothesis:
     """That a number of the scene is another one in the engine.
 
@@ -51,8 +52,8 @@ def number(
         value: of the scene; None or 0: the scene has none of it.
         change: the ball with another value.
         remedy: what to look at.
-        possible: whether there can be such a value.
         only: whether the scene has it.
+        signed: whether its sign can be mistaken.
     """
 
     @hypothesis(name, "one factor on this number of the scene closes accelerations and forces at every sample")
@@ -63,21 +64,25 @@ def number(
             return
 
         def law(factor: float) -> Law | None:
-            return Law(change(body, factor * scene)) if possible(factor * scene) else None
+            try:
+                return Law(change(body, factor * scene))
+            except InputError:
+                return None  # there is no such ball
 
         for held in held_against(evidence):
-            factor = _snapped(held.fit(law, 1.0))
-            if telling(factor):
+            factor, fitted = _snapped(held.fit(law, 1.0))
+            if possible(factor, signed):
                 said = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
-                says = f"the engine moves a ball with {what} {said}"
-                yield held.cause(name, says, law(factor), remedy, 1)
+                says = f"the engine moves a ball with {what} {said}" if telling(factor) else ""
+                yield held.cause(name, says, law(factor), remedy, fitted)
 
     return test
 
 
-def _snapped(factor: float) -> float:
+def _snapped(factor: float) -> tuple[float, int]:
+    """The factor that a mistake makes, if it is one, and how many numbers are then fitted."""
     known = known_factor(factor)
-    return known[0] if known else factor
+    return (known[0], 0) if known else (factor, 1)
 
 
 def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy: str) -> Hypothesis:
@@ -114,7 +119,6 @@ NUMBERS: tuple[Any, ...] = (
         lambda body: body.ball.inertia_ratio,
         lambda body, x: _ball(body, inertia_ratio=x),
         "give the engine the scene's inertia, about the centre, once",
-        lambda x: x > 0,
     ),
     number(
         "mass",
@@ -122,7 +126,6 @@ NUMBERS: tuple[Any, ...] = (
         lambda body: body.ball.mass,
         lambda body, x: _ball(body, mass=x),
         "give the engine the scene's mass, once",
-        lambda x: x > 0,
     ),
     number(
         "gravity",
@@ -130,6 +133,7 @@ NUMBERS: tuple[Any, ...] = (
         lambda body: float(np.linalg.norm(body.gravity)),
         lambda body, x: dataclasses.replace(body, gravity=body.gravity * (x / float(np.linalg.norm(body.gravity)))),
         "give the engine the scene's gravity: an acceleration in the world, its sign and its unit",
+        signed=True,
     ),
     number(
         "rolling resistance",
@@ -138,6 +142,7 @@ NUMBERS: tuple[Any, ...] = (
         _resisting,
         "the moment is f N against the rolling, f a length in metres",
         only=has_resistance,
+        signed=True,
     ),
     number(
         "kinetic friction",
@@ -145,7 +150,6 @@ NUMBERS: tuple[Any, ...] = (
         lambda body: body.contact.mu_kinetic,
         _friction,
         "while it slips the friction is the kinetic coefficient times N",
-        lambda x: x >= 0,
         only=is_bounded,
     ),
     load("damping", "the velocity is damped at a rate of {value:.4g} per second", _damps_velocity, _DAMPING),

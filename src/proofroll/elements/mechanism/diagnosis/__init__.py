@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis.fitting import any_gravity
+from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.elements.mechanism.diagnosis.equations import Change
-from proofroll.elements.mechanism.diagnosis.held import held_against
+from proofroll.elements.mechanism.diagnosis.held import COVERED, GIVEN, held_against
 from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
+from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.said import SAID
 from proofroll.elements.mechanism.diagnosis.structure import loop_lacks_row, lost_coupling, other_axis
 
@@ -18,8 +20,12 @@ GRAVITY = any_gravity(
     lambda element: np.array(element.mechanism.gravity),
     lambda element, gravity: Change(element.mechanism, gravity=gravity),
 )
+BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED)
 HYPOTHESES: tuple[Any, ...] = (
     *SAID,
+    reactions,
+    reactions_at_start,
+    BUILT,
     other_axis,
     *FACTORS_OF_ALL,
     of_each_body,

@@ -16,6 +16,7 @@ from scipy.interpolate import make_interp_spline
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
+from proofroll.core.diagnosis.lines import DERIVED
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -24,6 +25,7 @@ from proofroll.elements.mechanism.rotations import skews
 _DEGREE, _ENDS, _SAMPLES = 7, 5, 16
 _DEPENDENT = 1e-7
 _GONE = 1e-9
+_TURNS = 0.1
 _CONSISTENT = 1e-3
 
 
@@ -211,29 +213,38 @@ def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
     return Placed(mechanism, dataset["time"].to_numpy(), *parts)
 
 
+def is_motion(dataset: Any) -> bool:
+    """Whether all poses and velocities of a run are numbers, and its quaternions are of rotations."""
+    parts = [dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB")]
+    return all(np.all(np.isfinite(part)) for part in parts) and bool(
+        np.all(np.linalg.norm(parts[-1], axis=-1) > _TURNS)
+    )
+
+
 def of_run(mechanism: Mechanism, dataset: Any) -> MechanismStates | None:
     """The states of a run away from its ends; None: too few samples for its accelerations, or not all are numbers."""
+    if dataset.sizes["time"] <= _DEGREE + 2 * _ENDS or not is_motion(dataset):
+        return None
     placed = placed_of(mechanism, dataset)
-    if len(placed.time) <= _DEGREE + 2 * _ENDS or not np.all(np.isfinite(placed.q_WB)):
-        return None
-    if np.any(np.linalg.norm(placed.q_WB, axis=-1) < 0.1):
-        return None
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
     acceleration = make_interp_spline(placed.time, twists, k=_DEGREE).derivative()(placed.time)
     which = np.unique(np.linspace(_ENDS, len(placed.time) - 1 - _ENDS, _SAMPLES).astype(int))
     return MechanismStates(mechanism, placed, acceleration, which)
 
 
-def of_start(evidence: Evidence) -> MechanismStates | None:
-    """The start with the accelerations of the certificate; None: it does not say them."""
+def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | None:
+    """The start with the accelerations of the certificate; None: it does not say them.
+
+    Those of the first steps alone if ``derived``, else where the engine does not say its own.
+    """
     element = evidence.element
     lines = {line["quantity"]: line for line in evidence.lines}
     rows = []
     for name in ("acceleration", "angular acceleration"):
-        line = lines.get(name)
+        line = None if derived else lines.get(name)
         if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
-            line = lines.get(f"{name} of the first steps")
-        if line is None or not line["found"]:
+            line = lines.get(name + DERIVED)
+        if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
             return None
         rows.append(np.reshape(line["found"], (len(element.bodies), 3)))
     return MechanismStates(

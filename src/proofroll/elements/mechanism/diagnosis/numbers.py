@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, said_factor, telling
+from proofroll.core.diagnosis.fitting import Residuals, possible, said_factor, telling
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.held import best, held_against
 from proofroll.elements.mechanism.model import Mechanism
@@ -22,16 +22,20 @@ def factor_of_all(
     change: Callable[[Mechanism, float], Change],
     has: Callable[[Mechanism], bool],
     remedy: str,
+    signed: bool = True,
 ) -> Hypothesis:
-    """That a number of all bodies or joints, of a mechanism that has such, has a factor on it in the engine."""
+    """That a number of all bodies or joints, of a mechanism that has such, has a factor on it in the engine.
+
+    ``signed``: whether its sign can be mistaken; nothing has a negative mass.
+    """
 
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
     def test(evidence: Evidence) -> Iterator[Cause]:
         mechanism = evidence.element.mechanism
         for held in held_against(evidence) if has(mechanism) else ():
             factor, fitted = best(held, lambda x: change(mechanism, x))
-            if telling(factor):
-                says = f"the engine moves it with {what} {said_factor(factor)}"
+            if possible(factor, signed):
+                says = f"the engine moves it with {what} {said_factor(factor)}" if telling(factor) else ""
                 yield held.cause(name, says, change(mechanism, factor), remedy, fitted)
 
     return test
@@ -53,8 +57,10 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
         lambda m: any(m.gravity),
         "give the engine the scene's gravity: an acceleration in the world, its sign and its unit",
     ),
-    factor_of_all("mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once"),
-    factor_of_all("inertia", "all inertias", _inertias, lambda m: bool(m.bodies), "give each body its inertia once"),
+    factor_of_all("mass", "all masses", _masses, lambda m: bool(m.bodies), "give each body its mass once", False),
+    factor_of_all(
+        "inertia", "all inertias", _inertias, lambda m: bool(m.bodies), "give each body its inertia once", False
+    ),
     factor_of_all(
         "joint damping",
         "the damping of the joints",
@@ -82,6 +88,7 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
         lambda m, x: Change(m, armature=x),
         lambda m: any(joint.armature for joint in m.joints),
         "give the joints their armature",
+        False,
     ),
     factor_of_all(
         "springs",
@@ -132,12 +139,11 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
 
             for what, change in (("mass", heavier), ("inertia", stiffer)):
                 factor, number = best(held, change)
-                if not telling(factor):
+                if not possible(factor, False):
                     continue
                 says = f"the engine moves the body {body.name} with its {what} {said_factor(factor)}"
-                yield held.cause(
-                    f"{what} of {body.name}", says, change(factor), f"give {body.name} its {what} once", number
-                )
+                says, remedy = says if telling(factor) else "", f"give {body.name} its {what} once"
+                yield held.cause(f"{what} of {body.name}", says, change(factor), remedy, number)
         yield from _reordered(held, mechanism, inertia)
         if np.any(com):
             yield from _about_origin(held, mechanism, mass, com, inertia)
@@ -168,8 +174,9 @@ def _about_origin(
     for sign, words in ((1.0, "with Steiner's part added once more"), (-1.0, "with Steiner's part taken away")):
         says = f"the inertia is about the wrong point: that about the centre of mass {words}"
         for which in (np.ones(len(mass)), *np.eye(len(mass))):
-            change = Change(mechanism, inertia=inertia + sign * which[:, None, None] * steiner)
-            yield held.cause("point of inertia", says, change, remedy, 0)
+            moved = inertia + sign * which[:, None, None] * steiner
+            if np.min(np.linalg.eigvalsh(moved)) >= 0:
+                yield held.cause("point of inertia", says, Change(mechanism, inertia=moved), remedy, 0)
     says = "the weights act at the origins of the bodies' frames, not at the centres of mass"
     yield held.cause(
         "place of weight", says, Change(mechanism, weight_at_origin=True), "put the weight at the centre of mass", 0
@@ -183,21 +190,23 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Damping or armature in one joint or in all, that the scene does not have."""
     mechanism = evidence.element.mechanism
     for held in held_against(evidence):
-        if held.alone:
-            continue
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
         each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
+        own = {key: [getattr(j, key) for j in mechanism.joints for _ in range(j.nv)] for key in ("armature", "damping")}
         if len(each) > 1:
             each = [("every joint", np.ones(mechanism.nv)), *each]
         for where, which in each:
-            for what, key in (("an armature (rotor inertia)", "added_armature"), ("damping", "added_damping")):
+            for what, has in (("an armature (rotor inertia)", "armature"), ("damping", "damping")):
+                key = f"added_{has}"
                 at = held.left(Change(mechanism))
                 slope = held.left(Change(mechanism, **{key: which})) - at
                 square = float(slope @ slope)
                 if not square:
                     continue
                 value = -float(slope @ at) / square
+                if np.any(own[has] + value * which < 0):
+                    continue
                 says = f"{where} has {what} of {value:.4g} more than the scene gives it"
-                remedy = f"set {key.removeprefix('added_')} of the joints yourself, also where it is zero"
+                remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
                 yield held.cause(f"{what} in {where}", says, change, remedy, 1)

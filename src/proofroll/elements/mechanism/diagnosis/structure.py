@@ -10,7 +10,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import both
-from proofroll.elements.mechanism.diagnosis.equations import Change, of_run, placed_of
+from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of
 from proofroll.elements.mechanism.diagnosis.held import COVERED, held_against
 from proofroll.elements.mechanism.model import Mechanism
 
@@ -21,7 +21,7 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
     mechanism = evidence.element.mechanism
     yield from _axes_at_start(evidence)
     found = both(evidence)
-    if found is None:
+    if found is None or not is_motion(found[0]):
         return
     placed = placed_of(mechanism, found[0])
     for joint in mechanism.joints:

@@ -1,0 +1,170 @@
+"""Hypotheses about the reactions that an engine tells: on which body, at which joint, about which point, in which axes.
+
+In a loop not every component is determined. What is said of those is left aside, by components in the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis.samples import both
+from proofroll.core.diagnosis.vectors import Reported, product
+from proofroll.elements.mechanism.diagnosis.equations import placed_of
+from proofroll.elements.mechanism.diagnosis.said import BODY
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
+from proofroll.elements.mechanism.rotations import skews
+
+# Joints of which nothing can be compared are so many sizes of the forces apart.
+_FAR = 1e3
+# Reactions that differ by this part of the difference to be explained are the same.
+_SAME = 1e-2
+PARENT = "the axes of the parent body"
+_KINDS = (
+    ("force", "N", "the force on the child at the joint"),
+    ("torque", "N m", "the moment on the child at the joint"),
+)
+
+
+@dataclass(frozen=True)
+class Reactions:
+    """Forces or moments of all joints and loops, said and true.
+
+    Attributes:
+        told: those of the connections that are known on both sides, shape (time, connections, 3).
+        which: their indices among the mechanism's connections.
+        placed: the bodies at these times.
+        force: the true forces of the same connections.
+    """
+
+    told: Reported
+    which: list[int]
+    placed: Placed
+    force: FloatArray
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Whose they are."""
+        return self.placed.mechanism
+
+    def causes(self, step: float | None) -> Iterator[Cause]:
+        """What can have happened to them."""
+        if self.told.differs:
+            yield from self.told.causes(step)
+            yield from self._of_other_joints()
+            if self.told.name == "torque":
+                yield from self._about_other_points()
+
+    def _of_other_joints(self) -> Iterator[Cause]:
+        """That reactions stand at other joints than those whose they are."""
+        said, true = self.told.said, self.told.true
+        off = np.abs(said[:, :, None] - true[:, None])
+        shared = np.any(np.isfinite(off), axis=(0, 3))
+        distance = np.where(shared, np.max(np.nan_to_num(off), axis=(0, 3)), np.inf)
+        order = linear_sum_assignment(np.minimum(distance, _FAR * self.told.size))[1].tolist()
+        if order == list(range(len(order))):
+            return
+        names = [self.mechanism.connections[k].name for k in self.which]
+        sure = np.sum(distance <= _SAME * self.told.before, axis=1) == 1  # two joints may carry the same
+        moves = [(i, j) for i, j in enumerate(order) if i != j and sure[i]]
+        moved = "; ".join(f"at {names[i]} stands that of {names[j]}" for i, j in moves)
+        says = f"the {self.told.name} is of another joint{': ' if moved else ''}{moved}"
+        yield self.told.cause("other joint", says, true[:, order], "look at the order of joints in the engine")
+
+    def _about_other_points(self) -> Iterator[Cause]:
+        """That moments are about the centre of mass of the child, or about the world's origin."""
+        coms = {body.name: body.com for body in self.mechanism.bodies}
+        ends = [self.mechanism.connections[k] for k in self.which]
+        at = np.stack([self.placed.point(end.b, end.position_b) for end in ends], axis=1)
+        centre = np.stack([self.placed.point(end.b, coms.get(end.b, (0, 0, 0))) for end in ends], axis=1)
+        for where, arm in (("centre of mass of the child", at - centre), ("origin of the world", at)):
+            moved = self.told.true + product(skews(arm.reshape(-1, 3)).reshape(*arm.shape, 3), self.force)
+            says = f"torque is the moment about the {where}, not at the joint"
+            yield self.told.cause("point of moment", says, moved, "give the moment at the joint")
+
+
+def _reactions(
+    evidence: Evidence,
+    placed: Placed,
+    said: Mapping[str, FloatArray],
+    true: Mapping[str, FloatArray],
+    bars: Mapping[str, float],
+) -> Iterator[Reactions]:
+    """Forces and moments, of shape (time, connections, 3), of the connections of which something is known."""
+    element = evidence.element
+    ends = element.mechanism.connections
+    bodies = element.mechanism.body_index
+    force = sum(body.mass for body in element.mechanism.bodies) * element.first_motion.scale
+    for kind, unit, what in _KINDS:
+        known = np.isfinite(true[kind])
+        heard = np.all(np.isfinite(said[kind]) | ~known, axis=(0, 2)) & np.any(known, axis=(0, 2))
+        which = np.flatnonzero(heard).tolist()
+        if not which or f"{kind}s" in evidence.settled:
+            continue
+        frames = {
+            name: np.stack([placed.R_WB[:, bodies[ends[k].b if name == BODY else ends[k].a]] for k in which], axis=1)
+            for name in (BODY, PARENT)
+        }
+        own = np.where(known, said[kind], np.nan)[:, which], true[kind][:, which]
+        least = force if kind == "force" else force * element.length
+        told = Reported(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
+        yield Reactions(told, which, placed, true["force"][:, which])
+
+
+@hypothesis(
+    "reactions",
+    "the true wrench on the child at the joint with another sign, frame, point, joint or time is what is said",
+)
+def reactions(evidence: Evidence) -> Iterator[Cause]:
+    """Forces and moments of joints and loops along the run, as far as they are determined."""
+    found = both(evidence)
+    if found is None:
+        return
+    run, truth = (data.isel(time=slice(1, None)) for data in found)
+    names = [each.name for each in evidence.element.mechanism.connections]
+    said, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
+    bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
+    for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), said, true, bars):
+        yield from each.causes(evidence.step)
+
+
+@hypothesis(
+    "reactions at time 0", "as along the run, for the forces and moments of the certificate, if nothing else differs"
+)
+def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
+    """Forces and moments at time 0."""
+    lines = {str(line["quantity"]): line for line in evidence.lines}
+    if {name for name, line in lines.items() if not line["holds"]} - {"forces", "torques"}:
+        return
+    shape, said, true = (1, len(evidence.element.mechanism.connections), 3), {}, {}
+    for kind, _, _ in _KINDS:
+        line = lines.get(f"{kind}s")
+        empty = np.full(shape, np.nan)
+        whole = line is not None and np.size(line["found"]) == empty.size
+        said[kind] = np.reshape(line["found"], shape) if line is not None and whole else empty
+        true[kind] = np.reshape(line["expected"], shape) if line is not None else empty
+        if line is not None and line["holds"]:
+            said[kind] = np.full(shape, np.nan)
+    for each in _reactions(evidence, evidence.element.start, said, true, {}):
+        yield from each.causes(evidence.step)
+
+
+def _stacked(data: Any, kind: str, names: list[str]) -> FloatArray:
+    """Shape (time, connections, 3); NaN where it is not said or not determined."""
+    empty = np.full(data.sizes["time"], np.nan)
+    rows = [
+        [data[f"{kind}.{name}.{a}"].to_numpy() if f"{kind}.{name}.{a}" in data else empty for a in "xyz"]
+        for name in names
+    ]
+    return np.moveaxis(np.array(rows, dtype=np.float64), -1, 0)
+
+
+def _bar(truth: Any, name: str) -> float:
+    return float(truth[name].attrs.get("error_bar", 0.0)) if name in truth else 0.0

@@ -1,0 +1,67 @@
+"""Causes of planted faults that look like others: numbers that are read back or not, and reactions at time 0."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import pytest
+
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed
+from proofroll_drill.mutants import mechanism_numbers as numbers
+from proofroll_drill.mutants import mechanism_samples as samples
+from proofroll_drill.mutants.base import Mutant
+from proofroll_drill.mutants.drilling import tried
+
+TOPS = (
+    numbers.StandardGravity, numbers.HeavierTop, numbers.StifferTop, numbers.AxialTop, numbers.TransverseTop,
+    numbers.HigherTop, numbers.AsideTop,
+)  # fmt: skip
+REACTIONS = (
+    samples.OnParent, samples.BodyReaction, samples.Swapped, samples.AboutCentre,
+    samples.LoopReaction, samples.LoopSwapped, samples.LoopAboutCentre,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", TOPS)
+def test_a_number_that_is_read_back_is_the_cause(kind: type[Mutant]) -> None:
+    """Where the certificate names the number that was built otherwise, that number is told, and nothing else is."""
+    found = tried(kind)
+    assert found.named
+    assert found.said.startswith("the engine's model has")
+    assert ";" not in found.said
+
+
+@pytest.mark.parametrize("kind", REACTIONS)
+def test_reactions_that_are_told_wrongly_at_time_0_are_named(kind: type[Mutant]) -> None:
+    """The certificate's forces and moments show sign, axes, joint and point, in trees and in loops."""
+    found = tried(kind)
+    assert found.named, found.said
+
+
+class SilentBall(Mutant):
+    """One per cent of inertia too much, of which the engine says nothing."""
+
+    fault = "inertia 1.01 times, and nothing is said of it"
+    scene = ("inclined_plane", {})
+
+    def misread(self, scene: Scene) -> Scene:
+        """A little stiffer."""
+        ball = scene.elements[0].ball  # type: ignore[attr-defined]  # it is a ball
+        return changed(scene, ball=dataclasses.replace(ball, inertia_ratio=1.01 * ball.inertia_ratio))
+
+    def built(self) -> Any:
+        """Nothing but how close to the wall it is."""
+        found = self.inner.built()
+        kept = ("regularised", "gap", "mu_static", "mu_kinetic", "rolling_resistance")
+        return dataclasses.replace(
+            found, **{item.name: None for item in dataclasses.fields(found) if item.name not in kept}
+        )
+
+
+def test_three_free_numbers_do_not_explain_two() -> None:
+    """A ball whose friction and first steps show a little more inertia is not told that gravity points elsewhere."""
+    found = tried(SilentBall)
+    assert found.detected
+    assert not found.said

@@ -1,0 +1,57 @@
+"""What is told of a mechanism's run that is the truth, but for one thing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+
+
+def _told(scene: Scene, run: object, true: object, settled: frozenset[str] = frozenset()) -> list[str]:
+    (element,) = scene.elements
+    evidence = Evidence(element, [], run, true, 2e-3, settled)  # type: ignore[arg-type]  # datasets
+    return [cause.says for cause in diagnose(evidence, hypotheses_of(element))]
+
+
+def test_one_step_early_is_told_of_few_samples() -> None:
+    """Eleven samples of a loop that ends a step early tell the step, and no limit of a speed."""
+    scene, times = load_scene("four_bar"), np.arange(11) * 0.05
+    early = truth(scene, times + 2e-3 * (times > 0)).assign_coords(time=times)
+    (said,) = _told(scene, early, truth(scene, times))
+    assert said.startswith("every sample is one step (0.002 s) early")
+
+
+def test_round_off_of_a_moment_that_is_zero_has_no_cause() -> None:
+    """Moments of 1e-15 N m that an engine gives as zero are not left out."""
+    scene, times = load_scene("double_pendulum"), np.arange(0, 0.12, 0.006)
+    true = truth(scene, times)
+    run = true.copy(deep=True)
+    for name in (name for name in true.data_vars if str(name).startswith("torque.")):
+        true[name] = true[name] * 0 + 1.6e-15
+        run[name] = run[name] * 0
+    assert _told(scene, run, true) == []
+
+
+def test_reactions_that_were_judged_right_are_not_accused() -> None:
+    """A difference of forces within their tolerance is none, whatever would close it."""
+    scene, times = load_scene("pendulum"), np.arange(0, 0.12, 0.006)
+    true = truth(scene, times)
+    run = true.copy(deep=True)
+    for name in (name for name in true.data_vars if str(name).startswith("force.")):
+        run[name] = run[name] * 2
+    assert any("counted twice" in said for said in _told(scene, run, true))
+    assert _told(scene, run, true, frozenset({"forces"})) == []
+
+
+@pytest.mark.parametrize("name", ["p_WB", "v_WB", "w_WB", "q_WB"])
+def test_what_is_not_finite_is_no_cause(name: str) -> None:
+    """A run with NaN from some time on is looked at without a failure of linear algebra, and accused of nothing."""
+    scene, times = load_scene("double_pendulum"), np.arange(0, 0.12, 0.006)
+    true = truth(scene, times)
+    run = true.copy(deep=True)
+    run[name][10:] = np.nan
+    assert _told(scene, run, true) == []
