@@ -28,6 +28,7 @@ class Observable:
         floor: least size to which a relative tolerance refers, in its unit; None: it has no size of its own, so that a
             tolerance must be absolute.
         headline: whether summaries show it: the motion, and the forces that a person asks for first.
+        watched: whether a first look judges it though no summary shows it.
         decides: whether a trade-off, a stability map and a recommendation go by it where nobody says by what.
         asked_for: whether a person may ask for a recommendation by it.
         column: whether a trade-off shows it beside what decides, where nobody says which quantities it shows.
@@ -44,6 +45,7 @@ class Observable:
     symbol: str = ""
     floor: float | None = None
     headline: bool = False
+    watched: bool = False
     decides: bool = False
     asked_for: bool = True
     column: bool = False

@@ -55,8 +55,10 @@ def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None =
 
 def bounds(scene: Scene) -> dict[str, Tolerance]:
     """One per cent of what moves; where that has no size of its own, a thousandth of its unit."""
-    moves = {key: item for key, item in scene.observables.items() if item.headline and item.role is Role.MOTION}
+    all_of = {key: item for key, item in scene.observables.items() if item.role is Role.MOTION}
+    moves = {key: item for key, item in all_of.items() if item.headline}
     moves = moves or {scene.deciding: scene.observable(scene.deciding)}
+    moves |= {key: item for key, item in all_of.items() if item.watched}
     return {
         key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
         for key, item in moves.items()

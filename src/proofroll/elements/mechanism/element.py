@@ -173,6 +173,17 @@ class MechanismElement:
                 found.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )
+        speed = _LEAST * self._speed
+        found += [
+            Observable(
+                "v_WB", "m/s", "velocities of the origins of the bodies' frames", Role.MOTION,
+                floor=speed, asked_for=False, watched=True,
+            ),
+            Observable(
+                "w_WB", "rad/s", "angular velocities of the bodies", Role.MOTION,
+                floor=speed / self.length, asked_for=False, watched=True,
+            ),
+        ]  # fmt: skip
         found.append(Observable("attitudes", "1", "quaternions of the bodies", Role.MOTION, floor=1.0, asked_for=False))
         if np.any(self.analysis.determinate[:, :3]):
             meaning = "determinate components of the forces on children"
