@@ -33,6 +33,7 @@ class Limit:
         shown: whether the differences shrink, so that there is a limit to speak of.
         saturated: whether two tolerances gave the same run: something else limits its steps, as samples at which they
             end, and no limit of small ones follows.
+        beside: what one step beside its events does to the finest curve (:mod:`proofroll.core.beside_events`).
     """
 
     values: FloatArray
@@ -40,6 +41,7 @@ class Limit:
     order: float
     shown: bool = True
     saturated: bool = False
+    beside: float = 0.0
 
 
 def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None) -> Limit:

@@ -199,17 +199,20 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
     flat = bar <= truth_bar + round_off
     settled = limit.shown or flat or bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
-    finding, leaves = LimitFinding.NOT_SHOWN, error - bar > tolerance
+    doubted = bar + limit.beside
+    finding, leaves = LimitFinding.NOT_SHOWN, error - doubted > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitFinding.WITHIN
-    elif leaves and not limit.saturated and (limit.shown or flat or error - bar / _FLAT > tolerance):
+    elif leaves and not limit.saturated and (limit.shown or flat or error - doubted / _FLAT > tolerance):
         finding = LimitFinding.ANOTHER
-    wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + round_off
+    wrong = finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + limit.beside + round_off
     told = "no order" if order is None else f"order {order:.3g}"
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
     if not np.isfinite(error):
         text = "it has not as many values as the truth"
-    elif limit.saturated:
+    elif limit.beside > bar:
+        text += f"; one step beside an event does {number(limit.beside, 1)}{unit}"
+    if limit.saturated:
         text += "; two tolerances give the same run, for something else limits its steps, as near samples do"
     return _Ladder(finding, error, bar, order, leaves, wrong, text)
 

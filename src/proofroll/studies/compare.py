@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.beside_events import beside_events
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, richardson, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
+from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict, judge
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -155,7 +157,7 @@ def _judgements(
             truth_error_bar=bar,
             tolerance=tolerance.absolute(scale),
             scale=scale,
-            limit=_limit(run, name, curves),
+            limit=_with_events(run, name, _limit(run, name, curves), reference, trajectories),
             ladder=_has_ladder(run, curve),
             lost=lost,
             doubt=reference.doubt(name),
@@ -182,6 +184,27 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) 
     if not stepped:
         return tightest(values)
     return richardson(values, run.row.ladder, run.facts.order)
+
+
+def _with_events(
+    run: Planned, name: str, limit: Limit | None, reference: Reference, trajectories: dict[float, xr.Dataset]
+) -> Limit | None:
+    """The limit with what one step beside an event does to its finest run."""
+    if limit is None or not isinstance(run.facts, EngineFacts):
+        return limit
+    factor = run.row.ladder[-1]
+    finest, times = trajectories[factor], reference.dataset["time"].to_numpy()
+    step = run.facts.step
+    if reference.scene.observables[name].role is Role.EVENT:
+        return replace(limit, beside=2 * reference.own_bar(name, finest))
+    times = times[len(times) - len(limit.values) :] if len(limit.values) <= len(times) else times
+    if len(times) != len(limit.values):
+        return limit  # what has a time of its own for each value
+    events = reference.events_of(finest)
+    late = max((event.time_high - event.time_low for event in events), default=0.0)
+    if step is not None:
+        late = min(late, step * factor)
+    return replace(limit, beside=beside_events(times, limit.values, [event.time for event in events], late))
 
 
 def _lost(run: Planned, results: dict[str, Result]) -> str:

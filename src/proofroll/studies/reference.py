@@ -130,7 +130,7 @@ class Reference:
             return None
         times, known = dataset[BETWEEN].to_numpy(), self.dataset[BETWEEN].to_numpy()
         grid = self.dataset["time"].to_numpy()
-        happened = [event.time for run in (dataset, self.dataset) for event in self._events(run)]
+        happened = [event.time for run in (dataset, self.dataset) for event in self.events_of(run)]
         alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
         both = np.isin(times, known) & alone & (times < grid[-1])
         values, true = dataset[own].to_numpy()[both], self.dataset[own].to_numpy()[np.isin(known, times[both])]
@@ -153,7 +153,7 @@ class Reference:
         item = self.scene.observables[name]
         if item.role != Role.EVENT or item.name == EVENT_ORDER:
             return 0.0
-        return max((event.time_high - event.time_low for event in self._events(dataset)), default=0.0) / 2
+        return max((event.time_high - event.time_low for event in self.events_of(dataset)), default=0.0) / 2
 
     @property
     def sampled_bar(self) -> float:
@@ -163,9 +163,10 @@ class Reference:
     @property
     def events(self) -> list[Event]:
         """Of all elements."""
-        return self._events(self.dataset)
+        return self.events_of(self.dataset)
 
-    def _events(self, dataset: xr.Dataset) -> list[Event]:
+    def events_of(self, dataset: xr.Dataset) -> list[Event]:
+        """Of all elements, in another run."""
         return [event for item in self.scene.elements for event in events_of(part(self.scene, item, dataset))]
 
 

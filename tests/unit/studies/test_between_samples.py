@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from proofroll.core.plugins import load_engine
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
+from proofroll.studies import first_look
 from proofroll.studies.judging import Judged, judge
 
 EVERY, UNTIL = 0.02, 0.4
@@ -79,6 +83,35 @@ def test_what_is_wrong_between_the_samples_differs(scene: str, name: str, change
     wrong = [item.judgement for item in found.compared if not item.agrees]
     assert name in [item.observable for item in wrong]
     assert all("so the error is between them" in item.reason for item in wrong)
+
+
+VELOCITIES: dict[str, Change] = {
+    "v_WB": lambda s: replace(s, v_WB=np.asarray(s.v_WB) + 7),
+    "w_WB": lambda s: replace(s, w_WB=3 * np.asarray(s.w_WB)),
+}
+
+
+@pytest.mark.parametrize("name", VELOCITIES)
+def test_velocities_of_mechanisms_are_judged(name: str) -> None:
+    """7 m/s too much, or three times the spin, in every sample but the first is no agreement, at its places or none."""
+    engine, settings = HONEST["double_pendulum"]
+    liar = lying(engine, VELOCITIES[name], everywhere=True)
+    run = simulate("double_pendulum", liar, until=UNTIL, every=EVERY, **settings)
+    bounds = first_look.bounds(load_scene("double_pendulum"))
+    assert {"positions", "v_WB", "w_WB"} <= bounds.keys()
+    found = judge(run, "double_pendulum", dict.fromkeys(bounds, "1 %"))
+    assert [item.judgement.observable for item in found.compared if not item.agrees] == [name]
+
+
+COMPARISONS = sorted((Path(__file__).parents[3] / "comparisons").rglob("*.toml"))
+JUDGES_PLACES = [path for path in COMPARISONS if '\npositions = "' in path.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("path", JUDGES_PLACES, ids=lambda path: path.stem)
+def test_every_claim_about_places_is_one_about_velocities(path: Path) -> None:
+    """Whoever says how far places may be off in a comparison of this project says it of velocities and spins too."""
+    for band in load_comparison(str(path)).bands.values():
+        assert "positions" not in band.bounds or {"v_WB", "w_WB"} <= band.bounds.keys()
 
 
 def test_the_times_are_on_the_grid_of_the_steps() -> None:

@@ -17,7 +17,7 @@ from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Judgement, Verdict
+from proofroll.core.verdict import Judgement, LimitFinding, Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
@@ -310,6 +310,28 @@ def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) ->
     events = dict.fromkeys(("first_slip", "event_order", "event_times"), Verdict.ILL_POSED)
     assert verdicts == events | dict.fromkeys(("z", "energy_balance", "gap"), Verdict.AGREES)
     assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 2e-3])
+def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Path, tolerance: float) -> None:
+    """An event that ends with the same step on each rung of a ladder is known to that step, within tolerance or not."""
+    row = dataclasses.replace(ROW, ladder=[2.0, 1.0, 0.5])
+    base = claim([row], [], {"first_slip": Tolerance(tolerance, False, "s")})
+    slipping = {"speed": 4.0, "mu_static": 0.15}
+    comparison = dataclasses.replace(base, vary={}, points=[slipping], until=1.0)
+
+    def late(factor: float) -> Answer:
+        def answer(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+            ends = dataset["event_time"] + 3e-4
+            return dataset.assign(event_time=ends, event_low=ends - 1e-3 * factor, event_high=ends)
+
+        return answer
+
+    (run,) = judged(tmp_path, comparison, late(1.0), rungs={factor: late(factor) for factor in (2.0, 0.5)}).runs
+    (found,) = run.judgements
+    assert found.error == pytest.approx(3e-4)
+    assert found.limit is not LimitFinding.ANOTHER
+    assert not found.remarks
 
 
 def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> None:

@@ -1,0 +1,48 @@
+"""What it does to a curve where an event comes up to a step late, as it does where events end with steps.
+
+Steps of a ladder share many of their ends, so an event may be as late in each of its runs: these then differ by less
+than each is off, and their differences say nothing of that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+
+# Samples on each side of an event through which a parabola is laid.
+_SIDE = 3
+
+
+def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float], late: float) -> float:
+    """How far the curve may be off where each event is late.
+
+    At an event a curve jumps in its value, slope or curvature (places, velocities and forces where friction switches);
+    a sample in between is off by the jump itself, and what follows by what the jumps make of the delay until the end.
+
+    Args:
+        times: of the curve [s], shape (time,).
+        curve: shape (time, …).
+        events: when they happened [s].
+        late: by how much each may be [s].
+    """
+    found = 0.0
+    for event in events:
+        index = int(np.searchsorted(times, event))
+        sides = slice(max(index - _SIDE, 0), index), slice(index, index + _SIDE)
+        if min(len(times[side]) for side in sides) < _SIDE:
+            continue
+        before, after = (_taylor(times[side] - event, curve[side]) for side in sides)
+        value, slope, bend = np.max(np.abs(after - before), axis=1)
+        found += late * float(slope + bend * (times[-1] - event))
+        if np.any(np.abs(times - event) <= late):
+            found += float(value)
+    return found
+
+
+def _taylor(t: FloatArray, values: FloatArray) -> FloatArray:
+    """Value, slope and curvature at t = 0 of the parabola through three samples, shape (3, components)."""
+    made = np.linalg.solve(t[:, None] ** np.arange(_SIDE), values.reshape(_SIDE, -1))
+    return np.asarray(made * [[1.0], [1.0], [2.0]])
