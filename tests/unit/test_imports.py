@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import proofroll
+from proofroll.core.engine import Sample
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.plugins import load_element_kinds
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
@@ -169,7 +170,7 @@ def test_the_harness_names_no_observable_and_no_failure_of_an_element() -> None:
     elements = [
         item for kind in load_element_kinds() for scene in kind.conformance_scenes().values() for item in scene.elements
     ]
-    known = {item.name for element in elements for item in element.observables} - {EVENT_ORDER}
+    known = {item.name for element in elements for item in element.observables} - {EVENT_ORDER, *Sample.widths}
     known |= {name for element in elements for name in (*element.failures, *element.failing_events)}
     wrong = [
         f"{file.relative_to(ROOT)} names {text}"
