@@ -181,6 +181,12 @@ def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):
     assert {"speed", "gravity", "horizon"} <= {axis.name for axis in file_for(path).axes}
 
 
+def test_an_element_outside_ascii(robot):
+    """A robot file whose elements have names outside ASCII is a scene as any other."""
+    path = robot("arm.urdf", urdf(first='<größe wert="1"/>'))
+    assert len(load_scene(path).elements[0].mechanism.joints) == 3
+
+
 def test_a_robot_of_the_gallery():
     """The whole ur5 of a package falls in Pinocchio as the truth says."""
     pytest.importorskip("heyoka")

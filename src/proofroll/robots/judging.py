@@ -104,7 +104,7 @@ def _recompiler(file: RobotFile, workers: Workers | None) -> Callable[[Element],
             return meaning(changed, reading.write(changed, Path(folder)), TIME_LIMIT, workers)[0]
         return None
 
-    return lambda root: None if file.kind == "urdf" else compiled(tostring(root))
+    return lambda root: None if file.kind == "urdf" else compiled(tostring(root, "utf-8"))
 
 
 def _offending(truth: RobotTruth, held: Reading) -> list[str]:

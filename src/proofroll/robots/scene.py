@@ -120,7 +120,7 @@ class RobotScenes:
 
 def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
     file = opened(path, base)
-    return file, meant(file.path, file.kind, base, tostring(file.root))
+    return file, meant(file.path, file.kind, base, tostring(file.root, "utf-8"))
 
 
 def _names(robot: Robot) -> dict[str, str]:

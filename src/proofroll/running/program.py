@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import os
 import subprocess
 from collections.abc import Mapping
@@ -39,6 +40,10 @@ def path_of(name: str) -> Path | None:
     if not path.is_file() or not os.access(path, os.X_OK):
         raise InputError("engine", name, f"{path} is no program; give the path of one that can be executed")
     return path
+
+
+# Settings that trade speed for accuracy, the first that there is.
+_RESOLUTIONS = ("dt", "rtol")
 
 
 class Pipe:
@@ -193,6 +198,9 @@ def engine(name: str) -> type[Program]:
     if told["name"] != plain_name(name):
         raise InputError("engine", name, f"{path.name} is {told['name']}; write {told['name']}@{place_of(name)}")
     try:
+        for formulation, item in told["formulations"].items():
+            for preset, values in item["presets"].items():
+                _require_values(f"{path.name}: preset {preset} of {formulation}", values)
         settings = _settings(told["formulations"])
         return type(
             "Program",
@@ -215,6 +223,15 @@ def engine(name: str) -> type[Program]:
         raise ProofrollError(said) from None
 
 
+def _require_values(where: str, values: Mapping[str, Any]) -> None:
+    """Raises ProofrollError for the first setting of a preset that no run could take."""
+    for key, value in values.items():
+        if not isinstance(value, (bool, int, float, str)):
+            raise ProofrollError(f"{where}: {key} = {json.dumps(value)}: give a number, a text, true or false")
+        if key in _RESOLUTIONS and (isinstance(value, (bool, str)) or not 0 < value < math.inf):
+            raise ProofrollError(f"{where}: {key} = {json.dumps(value)}: give a positive number")
+
+
 def _settings(formulations: Mapping[str, Any]) -> type[Any]:
     """The class of a program's settings: formulation, preset, and all that its presets name."""
     values: dict[str, Any] = {}
@@ -228,6 +245,6 @@ def _settings(formulations: Mapping[str, Any]) -> type[Any]:
         (key, float if isinstance(value, (int, float)) and not isinstance(value, bool) else type(value), value)
         for key, value in values.items()
     ]
-    resolution = next((key for key in ("dt", "rtol") if key in values), None)
+    resolution = next((key for key in _RESOLUTIONS if key in values), None)
     own = {"resolution": resolution, "order": property(lambda self: orders[self.formulation])}
     return dataclasses.make_dataclass("Settings", fields, frozen=True, namespace=own)

@@ -109,3 +109,21 @@ def test_a_program_that_is_no_engine_says_so(
     program = tmp_path / "rod" if text is None else script(tmp_path / "rod", text)
     with pytest.raises(error, match=says):
         engine(f"rod@program:{program}")
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"dt": 0}, "dt = 0: give a positive number"),
+        ({"dt": "x"}, 'dt = "x": give a positive number'),
+        ({"rtol": None}, "rtol = null: give a number"),
+        ({"dt": 1e-3, "law": [1]}, "law = \\[1\\]: give a number, a text, true or false"),
+    ],
+)
+def test_a_preset_that_no_run_could_take(tmp_path: Path, values: dict[str, Any], says: str) -> None:
+    """A preset with a step that is none is told in a line that names the program, the preset and the value."""
+    formulations = {"one": {"provides": [], "order": 1, "presets": {"matched": values}}}
+    described = json.dumps({"protocol": 1, "name": "rod", "version": "1", "formulations": formulations})
+    program = script(tmp_path / "rod", f"read -r line; echo '{described}'")
+    with pytest.raises(ProofrollError, match=f"rod: preset matched of one: {says}"):
+        engine(f"rod@program:{program}")
