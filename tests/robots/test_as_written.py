@@ -35,6 +35,13 @@ def test_read(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_what_no_joint_moves_has_no_part(tmp_path: Path) -> None:
+    """A body that is only set, and what is fixed to the world, is no mass that joints carry."""
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf(extra='<body name="goal" mocap="true"><geom size="0.1"/></body>'))
+    assert _rows(path, "mujoco")["mujoco"].as_written == "read"
+
+
 def test_refused(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file whose looks are missing is compared without them, and the refusal of the file as it is is told once."""
     path = tmp_path / "robot.xml"

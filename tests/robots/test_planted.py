@@ -44,6 +44,12 @@ LOOSE = '<body name="loose"><freejoint/><geom size="0.1 0.2 0.3" type="box"/></b
 FLYING = """<mujoco model="f"><worldbody><body name="b" pos="0.2 0.3 1" euler="90 20 0"><freejoint name="f"/>
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/></body></worldbody></mujoco>"""
 FLOOR = '<worldbody><geom type="plane" size="0 0 0.05"/></worldbody><actuator>'
+FREE = '<joint name="free" type="free" damping="0.5"/>'
+WORLD_ROOT = urdf().replace(
+    "</robot>",
+    '<link name="world"/><joint name="to" type="fixed"><parent link="world"/><child link="base"/>'
+    '<origin xyz="0 0 0.3" rpy="0.4 0 0"/></joint></robot>',
+)
 HIDDEN = 'contype="0" conaffinity="0"'
 _OWN = '<inertial pos="0.1 0.02 0" mass="1.5" {}/>'
 _SLIM = 'diaginertia="0.01 0.02 0.021"'
@@ -185,6 +191,11 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("two joints", mjcf(second=TWO), "pinocchio", set()),
     ("two joints", mjcf(second=TWO), "mujoco", set()),
     ("free body", mjcf(extra=LOOSE), "mujoco", set()),
+    ("damped free body", mjcf(extra=LOOSE.replace("<freejoint/>", FREE)), "exudyn", set()),
+    ("damped free body", mjcf(extra=LOOSE.replace("<freejoint/>", FREE)), "mujoco", set()),
+    *[("huge damping", mjcf(joint='damping="1e11"'), name, set()) for name in ("mujoco", "exudyn")],
+    ("root called world", urdf().replace('"base"', '"world"'), "mujoco", set()),
+    ("fixed to world", WORLD_ROOT, "mujoco", set()),
     ("turned free body", FLYING, "mujoco", set()),
     ("turned free body", FLYING, "pinocchio", {"free_body_offset"}),
     ("free body", FLYING.replace("90 20 0", "0 0 0"), "pinocchio", set()),

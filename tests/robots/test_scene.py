@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -198,3 +199,22 @@ def test_a_robot_of_the_gallery():
     times = np.array([0.0, 0.1])
     run = simulate(scene, "pinocchio", until=0.1, every=0.1)
     assert float(np.abs(run.positions - truth(scene, times).positions).max()) < 1e-9
+
+
+def test_what_is_advised_is_followed_to_the_end(
+    proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Compare and report of a robot with dry friction end with friction=0, also where couplings=0 has no object."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "rough.urdf"
+    path.write_text(urdf(second='<dynamics friction="2"/>', kinds=("fixed", "prismatic", "fixed")))
+    given = (str(path), "--engine", "projection", "--set", "friction=0", "--set", "couplings=0")
+    code, out, said = proofroll("compare", *given)
+    assert code == 0, said
+    assert "1 agrees" in out
+    code, out, said = proofroll("report", *given)
+    assert code == 0, said
+    assert "--set friction=0 --set couplings=0" in (tmp_path / "out" / "report.json").read_text()
+    code, _, said = proofroll("report", "--set", "friction=0")
+    assert code == 2
+    assert "studies have their own points" in " ".join(said.split())

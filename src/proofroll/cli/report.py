@@ -29,6 +29,7 @@ def report(
         typer.Argument(help="Comparisons, other studies, scenes, robot files; all studies by default."),
     ] = None,
     engine: options.Engines = None,
+    settings: options.Set = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
@@ -39,16 +40,21 @@ def report(
 
     The files are there after the first comparison, and are written again after all of them and after each further
     study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
-    says so, and the report names the command that makes it whole.
+    says so, and the report names the command that makes it whole. --set is for scenes and robot files.
     """
+    from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names
     from proofroll.report.growing_report import begun
     from proofroll.report.study_parts import all_parts, parts_of
     from proofroll.running.worker_pool import Workers
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
-    workers = Workers()
-    loaded = [asked(name, {}, workers) for name in names]
+    workers, assigned = Workers(), options.assignments(settings)
+    if assigned and (parts or not studies):
+        raise InputError(
+            "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
+        )
+    loaded = [asked(name, assigned, workers) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
     options.require_pages()
@@ -56,7 +62,7 @@ def report(
     tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))
     total = len(keys) + bool(loaded)
-    command = _command(studies or [], engine or [], out)
+    command = _command(studies or [], engine or [], settings or [], out)
     outcomes: list[Outcome] = []
     if loaded:
         stage = _begin(1, total, "comparisons")
@@ -81,11 +87,13 @@ def report(
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
 
 
-def _command(studies: list[str], engines: list[str], out: Path) -> str:
+def _command(studies: list[str], engines: list[str], settings: list[str], out: Path) -> str:
     """The command that makes the report again."""
     words = ["proofroll", "report", *studies]
     for name in engines:
         words += ["--engine", name]
+    for setting in settings:
+        words += ["--set", setting]
     return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 

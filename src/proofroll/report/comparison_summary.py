@@ -40,7 +40,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         scene=comparison.scene,
         observables={
             name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
-            for name, item in load_scene(comparison.scene).observables.items()
+            for name, item in load_scene(comparison.scene, **outcome.runs[0].parameters).observables.items()
         },
         until=comparison.until,
         every=comparison.every,

@@ -84,12 +84,14 @@ class RobotTruth:
     @cached_property
     def inverse(self) -> Array:
         """What gives the accelerations of the states where there are no passive forces, shape (states, n)."""
-        return self.torque(self.states.stacked(self.states.acceleration, self.robot)) - self.passive
+        return self._without_passive(self.states.stacked(self.states.acceleration, self.robot))
 
     def torque(self, acceleration: Array) -> Array:
         """What gives these accelerations, shape (states, n)."""
-        d = self.dynamics
-        return np.asarray(np.einsum("sij,sj->si", d.M, acceleration)) + d.h + self.passive
+        return self._without_passive(acceleration) + self.passive
+
+    def _without_passive(self, acceleration: Array) -> Array:
+        return np.asarray(np.einsum("sij,sj->si", self.dynamics.M, acceleration)) + self.dynamics.h
 
     @cached_property
     def torques(self) -> dict[str, Array]:

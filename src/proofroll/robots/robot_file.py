@@ -85,6 +85,8 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
     root = read_xml(path)
     if root.tag == "robot":
         _require_plain(root, path)
+        if base == "free":
+            urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
         kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:

@@ -58,8 +58,7 @@ class RobotScenes:
         if any(joint.lower is not None or joint.upper is not None for joint in robot.moving):
             parameters["limits"] = (0, "1", "whether the joints have their stops (1) or turn through them (0)", _SWITCH)
             left_out.append("stops of joints (unless limits=1)")
-        if next(_couplings(file, robot), None) is not None:
-            parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", _SWITCH)
+        parameters["couplings"] = (1, "1", "whether what couples joints besides the tree is asked for", _SWITCH)
         if any(body.impossible for body in robot.bodies.values()):
             words = "whether each link must be a body that can be (1), or what a joint moves as a whole (0)"
             parameters["possible"] = (1, "1", words, _SWITCH)

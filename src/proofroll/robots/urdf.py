@@ -55,6 +55,20 @@ def stripped(root: Element) -> tuple[Element, list[LintFinding]]:
     return root, findings
 
 
+def rename_world(root: Element) -> None:
+    """Gives the root link another name where it is called as what does not move: some engines would not free it."""
+    carried = {child.get("link") for joint in root.iter("joint") for child in joint.findall("child")}
+    taken = {link.get("name") for link in root.iter("link")}
+    if "world" in taken - carried:
+        name = next(name for number in range(len(taken) + 1) if (name := "world_link" + "_" * number) not in taken)
+        for link in root.findall("link"):
+            if link.get("name") == "world":
+                link.set("name", name)
+        for parent in (parent for joint in root.iter("joint") for parent in joint.findall("parent")):
+            if parent.get("link") == "world":
+                parent.set("link", name)
+
+
 def read_urdf(file: RobotFile) -> Robot:
     """The robot.
 

@@ -76,7 +76,8 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
         raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
-    resolved, truth_facts = row_facts(comparison, numbered, load_scene(comparison.scene).requires, workers)
+    asked = scene_at(comparison, next(iter(comparison.variations(rows[0])), {}))
+    resolved, truth_facts = row_facts(comparison, numbered, asked.requires, workers)
     comparison = settled(comparison)
     rungs = _rungs(rows, resolved, workers)
     truths: dict[str, Case] = {}

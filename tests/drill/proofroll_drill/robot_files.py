@@ -18,7 +18,7 @@ from proofroll.running.worker_pool import Workers
 # Worst first.
 OUTCOMES = ("traceback", "unexplained", "refused", "known causes", "clean", "part of a file")
 # Of a file that only others include.
-_PARTS = ("nothing in it moves", "it has no links")
+_PARTS = ("nothing in it moves", "it has no links", "'mujocoinclude'")
 
 
 @dataclasses.dataclass(frozen=True)

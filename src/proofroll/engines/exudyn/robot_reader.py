@@ -43,12 +43,15 @@ class ExudynRobots:
             tree.put(q, np.zeros_like(q), np.zeros_like(q))
             g = -tree.force()
             tree.put(q, v, np.zeros_like(q))
-            passive, M = tree.damping * v, tree.mass_matrix()
-            h = -tree.force() - passive
+            tree.damp(0.0)
+            h, M = -tree.force(), tree.mass_matrix()
+            tree.damp(1.0)
             frames.append(tree.frames())
 
+            free = -np.linalg.solve(T.T, tree.free_damping * np.linalg.solve(T, v))
+
             def forward(torque: Array) -> Array:
-                tree.put(q, v, torque)
+                tree.put(q, v, torque + free)
                 return np.asarray(np.linalg.solve(M, tree.force()))
 
             return AtState(T, drift, M, g, h, None, forward)
@@ -78,7 +81,11 @@ class _Tree:
         if any(joint.kind == "spherical" for joint in self.robot.moving):
             raise Refused("the tree of Exudyn has no spherical joint")
         self.turn = {joint.name: _turn(joint) for joint in self.robot.moving}
-        self.damping = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
+        damping: Array = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
+        turns: Array = np.concatenate([np.full(joint.dofs, joint.kind == "free") for joint in self.robot.moving])
+        # Of a free joint it acts on the velocities of the body, not on the rates of the tree's angles.
+        self.free_damping: Array = turns * damping
+        self.damping: Array = damping - self.free_damping
         self.link: dict[str, int] = {}
         rows = [row for joint in self.robot.moving for row in self._rows(joint)]
         kinds, parents, turns, offsets, masses, coms, inertias = zip(*rows, strict=True)
@@ -155,6 +162,10 @@ class _Tree:
         self.mbs.systemData.SetODE2Coordinates(list(q))
         self.mbs.systemData.SetODE2Coordinates_t(list(v))
         self.mbs.SetObjectParameter(self.tree, "jointForceVector", list(torque))
+
+    def damp(self, part: float) -> None:
+        """Sets the damping of joints in parts of the file's."""
+        self.mbs.SetObjectParameter(self.tree, "jointDControlVector", list(part * self.damping))
 
     def force(self) -> Array:
         """Right-hand side: what M times the accelerations is equal to, damping included."""

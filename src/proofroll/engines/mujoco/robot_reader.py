@@ -16,6 +16,12 @@ from proofroll.engines.mujoco.running import mass_matrix
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
+# Springs and dampers; MuJoCo up to 3.3 has one flag for both.
+_PASSIVE = sum(
+    int(getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", 0))
+    for name in (("SPRING", "DAMPER") if hasattr(mujoco.mjtDisableBit, "mjDSBL_DAMPER") else ("PASSIVE",))
+)
+
 
 class MujocoRobots:
     """What MuJoCo's compiler makes of a robot file."""
@@ -60,7 +66,8 @@ class MujocoRobots:
             else:
                 setattr(spec.compiler, option, on)
         model = _with_base(spec, request).compile()
-        return Whole(int(model.nv), float(model.body_mass[model.body_weldid != 0].sum()))
+        moved = model.body_dofnum[model.body_weldid] > 0
+        return Whole(int(model.nv), float(model.body_mass[moved].sum()))
 
     def read(self, request: Request) -> Reading:
         """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
@@ -153,7 +160,10 @@ def _at(
 
     def inverse(acceleration: Array) -> Array:
         data.qacc[:] = acceleration
+        flags = model.opt.disableflags
+        model.opt.disableflags |= _PASSIVE  # else it is added and taken away again, with round-off of its own size
         mujoco.mj_inverse(model, data)
+        model.opt.disableflags = flags
         return np.array(data.qfrc_inverse + data.qfrc_passive)
 
     def forward(torque: Array) -> Array:
