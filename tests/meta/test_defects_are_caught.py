@@ -33,7 +33,7 @@ HIDDEN = {
     "hidden_resistance": ({"gamma", "F2", "energy_balance"}, {"gap", "slip"}),
     "hidden_friction": ({"F2", "F3", "force_audit"}, {"gamma", "z", "N", "energy_balance"}),
     "hidden_rate": ({"rate_audit"}, {"gamma", "z", "N", "F2", "F3", "gap"}),
-    "hidden_period": ({"rate_audit"}, {"gamma", "z", "N", "F2", "F3", "energy_balance", "force_audit", "gap", "slip"}),
+    "hidden_period": ({"rate_audit", "z", "energy_balance"}, {"gamma", "N", "F2", "F3", "force_audit", "gap", "slip"}),
     "hidden_clock": ({"gamma", "z"}, {"gap", "slip"}),
 }
 SOUND = "hidden_none"

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import from_samples, observe
+from proofroll.core.dataset import BETWEEN, from_samples, observe
 from proofroll.core.errors import Diverged, InputError
+from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.several import REQUIRED
 from proofroll.running.recording import require_unit
@@ -87,7 +88,8 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
     if made_of is not None:
         if _whole(dataset, scene):
             return GivenRun(dataset, units, {})
-        dataset = dataset.drop_attrs(deep=False)  # variables were left out: what is there is judged by itself
+        # Variables were left out: what there is on the grid is judged by itself.
+        dataset = dataset.drop_dims(BETWEEN, errors="ignore").drop_attrs(deep=False)
     names = [str(name) for name in dataset.data_vars]
     # a scene of several elements is judged by variables
     if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
@@ -99,12 +101,13 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
 
 
 def _whole(run: xr.Dataset, scene: Scene) -> bool:
-    """Whether a file that was once a run has all that its observables are made of."""
+    """Whether a file that was once a run has all that its motion is told by."""
     try:
-        observe(scene, run)
+        found = observe(scene, run)
     except (KeyError, AttributeError):  # of xarray, for a variable or an attribute of one that is not there
         return False
-    return all(scene.label(element, name) in run for element in scene.elements for name in REQUIRED)
+    motion = [name for name, item in scene.observables.items() if item.headline and item.role is Role.MOTION]
+    return all(name in found for name in motion)
 
 
 def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
