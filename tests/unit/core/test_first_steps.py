@@ -8,11 +8,17 @@ import pytest
 from nonconforming import Clamped, Damped, Mute, Unresisting
 from tiny import Tiny, TinySettings
 
-from proofroll.core.certificate import first_difference
-from proofroll.core.errors import Diverged
-from proofroll.core.first_steps import MOST, derivable, first_steps
+from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import certify, first_difference
+from proofroll.core.engine import Regularised
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.first_steps import MOST, certificate, derivable, first_steps
 from proofroll.core.scene import Scene
+from proofroll.core.several import build
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
+from proofroll.elements.ball_on_surface.sampling import BallBuilt
 from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 
 SLOW = load_scene("sphere_in_cylinder", speed=1.2, axial_speed=0.2, radial_spin=5.0, rolling_resistance=5e-4)
 
@@ -35,6 +41,37 @@ def test_who_is_silent_is_seen_by_its_motion(liar: type[Tiny]) -> None:
     sentence = first_difference(lines)
     assert sentence is not None
     assert "of the first steps" in sentence
+
+
+class Parrot(Tiny):
+    """Repeats the scene's numbers, and moves in half its gravity."""
+
+    def rates(self, x: FloatArray) -> FloatArray:
+        """Of another scene."""
+        return reduced_rates(dataclasses.replace(self.body, gravity=self.body.gravity / 2), x)[0]
+
+
+class SoftParrot(Parrot):
+    """Says besides that its acceleration is a little soft."""
+
+    def built(self) -> BallBuilt:
+        """With an excuse."""
+        return dataclasses.replace(super().built(), regularised={"acceleration": Regularised(1e-3, "it gives way")})
+
+
+@pytest.mark.parametrize("liar", [Parrot, SoftParrot])
+def test_who_repeats_the_scenes_numbers_is_seen_by_its_motion(liar: type[Tiny]) -> None:
+    """The first steps of an engine are looked at although it says the right acceleration."""
+    assert first_difference(certify(build(liar, SLOW, TinySettings()), SLOW)) is None
+    with pytest.raises(Refused, match="acceleration of the first steps"):
+        simulate(SLOW, liar, until=0.1)
+
+
+def test_an_honest_engine_that_speaks_is_believed(scene: Scene) -> None:
+    """The certificate of an engine that says the right acceleration holds, and shows what its first steps say."""
+    lines = certificate(Tiny, build(Tiny, scene, TinySettings()), scene, TinySettings())
+    assert first_difference(lines) is None
+    assert [line.quantity for line in lines if "of the first steps" in line.quantity]
 
 
 def test_nothing_is_derived_where_nothing_can_be() -> None:
