@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
@@ -326,6 +327,23 @@ class Restless(Breaking, breaks="sampling_changes_nothing"):
         if self.t > 0:
             self.x = self.x * (1 + 1e-15)
         return right
+
+
+class Lazy(Breaking, breaks="samples_cost_the_same"):
+    """Notes the time, and moves when it is looked at; each step takes a while."""
+
+    due = 0.0
+
+    def advance(self, t: float) -> None:
+        """Later."""
+        self.due = t
+
+    def sample(self) -> BallSample:
+        """What was put off, and the state."""
+        while self.t < self.due - self.dt / 2:
+            time.sleep(2e-3)
+            super().advance(min(self.t + self.dt, self.due))
+        return super().sample()
 
 
 class Shared(Breaking, breaks="engines_do_not_disturb_each_other"):

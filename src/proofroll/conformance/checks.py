@@ -44,6 +44,7 @@ _OF_PRESETS: tuple[Callable[[Subject], None], ...] = (
     motion.advance_is_repeatable,
     motion.advance_in_two_parts,
     motion.sampling_changes_nothing,
+    motion.samples_cost_the_same,
     motion.engines_do_not_disturb_each_other,
     motion.velocities_are_the_rates,
     motion.order_is_as_declared,

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache, partial
 from itertools import pairwise
+from time import perf_counter
 from unittest import SkipTest
 
 import numpy as np
@@ -31,6 +32,10 @@ _FIRST = 4.0
 _FINEST, _COARSEST = 2.0**-5, 2.0**5
 # Long enough that a loose tolerance is not met by a single step of a method of high order.
 _TOLERANCE_SPAN = 0.5
+# A short advance [s] or step, and how many of it are long; of so many rounds the least counts, as others on the machine
+# may make one sample many times as long, and hardly all.
+_SHORT, _LONG, _ROUNDS = 1e-3, 100, 3
+_DEARER = 10.0
 
 
 def advance_is_repeatable(subject: Subject) -> None:
@@ -65,6 +70,34 @@ def sampling_changes_nothing(subject: Subject) -> None:
         alone.advance(t * part / 4)
     difference = subject.distance(watched.sample(), alone.sample())
     require(bits(watched.sample()) == bits(alone.sample()), f"sampling moved the end of the run by {difference:.2g}")
+
+
+def samples_cost_the_same(subject: Subject) -> None:
+    """A sample costs no more after a long ``advance`` than after a short one: when that returns, the state is there."""
+    short = subject.span(1, at_least=_SHORT)
+    long = short + subject.span(_LONG, at_least=_LONG * _SHORT)
+    advancing, after_short, after_long = (min(seconds) for seconds in zip(*(
+        _seconds(subject, short, long) for _ in range(_ROUNDS)
+    ), strict=True))  # fmt: skip
+    put_off = after_long > _DEARER * after_short and after_long > advancing / 2
+    require(
+        not put_off,
+        f"sample() takes {after_long:.2g} s after an advance by {long - short:.2g} s, {after_short:.2g} s after one by "
+        f"{short:.2g} s: advance must return when the state is there, or its cost is not what is timed",
+    )
+
+
+def _seconds(subject: Subject, short: float, long: float) -> tuple[float, float, float]:
+    """Of a long advance, of a sample after a short one, and after the long one [s]."""
+    engine = subject.build()
+    engine.sample()
+    engine.advance(short)
+    times = [perf_counter()]
+    for work in (engine.sample, partial(engine.advance, long), engine.sample):
+        work()
+        times.append(perf_counter())
+    after_short, advancing, after_long = (end - start for start, end in pairwise(times))
+    return advancing, after_short, after_long
 
 
 def engines_do_not_disturb_each_other(subject: Subject) -> None:

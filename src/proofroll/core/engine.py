@@ -102,7 +102,7 @@ class Engine(Protocol):
         """
 
     def advance(self, t: float) -> None:
-        """Move the state to time ``t`` [s], not before the present one. The only timed call.
+        """Move the state to time ``t`` [s], not before the present one; timed. It returns when the state is there.
 
         Raises:
             Diverged: the engine gave up; the text says when and why.

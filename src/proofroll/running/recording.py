@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -40,6 +40,7 @@ class Recording:
         wall_seconds: spent inside ``advance`` [s].
         advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
             [s].
+        passed: what was sampled at each time at which the engine was stopped, by time [s].
         remarks: of the engine about a run that went well (:class:`proofroll.core.engine_abilities.TellsRemarks`).
     """
 
@@ -50,6 +51,7 @@ class Recording:
     sampling: tuple[float, float] = (0.0, 0.0)
     remarks: tuple[str, ...] = ()
     ended: str | None = None
+    passed: Mapping[float, AnySample] = field(default_factory=dict)
 
     @property
     def dataset(self) -> xr.Dataset:
@@ -74,6 +76,7 @@ def record(
     samples = [_finite(engine.sample(), 0.0, scene)]
     failure: str | None = None
     wall = 0.0
+    passed: dict[float, AnySample] = {}
     between: dict[float, AnySample] = {}
     off = set(map(float, probes)) - set(asked.tolist())
     times = np.array(sorted({*asked.tolist(), *(set(map(float, counting)) - off)}))
@@ -90,6 +93,7 @@ def record(
                 raise
             failure = str(error)
             break
+        passed[t] = sample
         if t in off:
             between[t] = sample
             continue
@@ -121,7 +125,7 @@ def record(
     for owner, found in events:
         columns = add_events(scene, owner, columns, found)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
-    return Recording(columns, failure, wall, (wall, inside), sampling, remarks, ended)
+    return Recording(columns, failure, wall, (wall, inside), sampling, remarks, ended, passed)
 
 
 _NOT_FINITE = "is not finite (NaN or overflow)"

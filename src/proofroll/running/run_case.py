@@ -84,13 +84,15 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     except (Refused, Diverged) as error:
         return _answer(error, versions)
     timings: list[float] = []
+    remarks: list[str] = []
     reached = recording.columns["time"].values
     if recording.failure is None and case.timed and len(reached) > 1:
-        timings, inside = clean_runs(kind, scene, settings, reached)
-        spent.on("building", clean_runs=inside)
+        clean = clean_runs(kind, scene, settings, recording)
+        timings, remarks = clean.rates, clean.remarks
+        spent.on("building", clean_runs=(clean.wall, clean.processor))
     result = Result(
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
-        message=recording.message(case.until),
+        message="; ".join([recording.message(case.until), *remarks]),
         wall_seconds=recording.wall_seconds,
         seconds_per_second=statistics.median(timings) if timings else None,
         timings=timings,
