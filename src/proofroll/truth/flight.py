@@ -34,12 +34,14 @@ class Landed:
     """A ball that has come to stay on the wall.
 
     Attributes:
-        time: since when [s].
+        time: of its last impact that is followed [s].
+        settled: of the last of all, since when it stays [s]; the ball goes as far meanwhile as if it stayed before.
         world: its place [m], velocity [m/s] and spin [rad/s] then.
         slip: velocity of its contact point [m/s], shape (3,); None: it rolls.
     """
 
     time: float
+    settled: float
     world: World
     slip: FloatArray | None
 
@@ -97,8 +99,9 @@ def airborne(
                 "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
             )
         v, w = route.impact(body, p, v, w, 0.0, 0.0)
-        events.append(("settle", time + 2 * e * approach / ((1 - e) * weight) if e else time))
-        return Landed(time, (p, v, w), _slip(body, v, w, e1))
+        settled = time + 2 * e * approach / ((1 - e) * weight) if e else time
+        events.append(("settle", settled))
+        return Landed(time, settled, (p, v, w), _slip(body, v, w, e1))
 
 
 def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> FloatArray | None:

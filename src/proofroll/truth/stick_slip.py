@@ -60,8 +60,10 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     routes: tuple[Route, Route] = (first_route(body), Implicit(body))
     paths = [follow(body, route, until) for route in routes]
     if paths[0].lands is not None:
+        # One that starts in the air has not left the wall.
+        leaves = f"leaves the wall at t = {paths[0].events[-1][1]:.9g} s and " if paths[0].events else ""
         raise Refused(
-            f"the ball leaves the wall at t = {paths[0].events[-1][1]:.9g} s and lands at t = {paths[0].lands:.9g} s; "
+            f"the ball {leaves}lands at t = {paths[0].lands:.9g} s; "
             "a restitution law would be needed (restitution of the contact), so end the run before it lands"
         )
     first, second = (path.events for path in paths)

@@ -40,7 +40,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
     legs: list[Leg] = []
     reversals = 0
     events: list[tuple[EventKind, float]] = []
-    time, state = 0.0, route.start()
+    time, begins, state = 0.0, 0.0, route.start()
     if not body.gap0 and stands(body, route.world(state)[1]):
         if stays(body, route.world(state)[0]):
             return Path([_rest(body, route, state, time, until)], events)
@@ -56,12 +56,12 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
             came = airborne(body, route, flight, time, until, legs, events)
             if not isinstance(came, Landed):
                 return Path(legs, events, came)
-            time, slip, state = came.time, came.slip, touching(route, came)
+            time, begins, slip, state = came.time, came.settled, came.slip, touching(route, came)
             flight, sticking = None, None
         if sticking is None:
             sticking = slip is None and not _must_slip(body, route, state)
             if not sticking:
-                events.append(("slip", time))
+                events.append(("slip", begins))
         leg = route.stick(time, state, until) if sticking else route.slip(time, state, until, slip)
         slip = None
         legs.append(leg)

@@ -126,3 +126,23 @@ def test_a_start_in_the_air_beside_a_curved_wall() -> None:
     found = truth(scene, np.linspace(0.0, 0.6, 4))
     assert "ill_posed" not in found.attrs
     assert [event.kind for event in events_of(found)] == [*["bounce"] * 4, "settle"]
+
+
+def test_a_slip_after_bounces_begins_where_they_end() -> None:
+    """A ball that slips when it has settled begins to slip then, after all its bounces, and not at the last big one."""
+    found = truth(
+        load_scene("bouncing_ball", speed=20.0, height=0.1, restitution=0.2, mu_static=0.3), np.linspace(0, 1, 5)
+    )
+    settles, slips = [event for event in events_of(found) if event.kind in ("settle", "slip")]
+    assert (settles.kind, slips.kind) == ("settle", "slip")
+    rests = math.sqrt(2 * 0.1 / G) * 1.2 / 0.8
+    assert settles.time == slips.time
+    assert slips.time == pytest.approx(rests, rel=1e-10)  # it was 1e-8 s early
+
+
+def test_a_start_in_the_air_without_a_law_of_impacts_is_refused() -> None:
+    """A ball that starts in the air, and of whose landing nothing is said, is refused with the time of the landing."""
+    scene = load_scene("bouncing_ball")
+    scene = changed(scene, contact=replace(scene.elements[0].contact, restitution=None))
+    with pytest.raises(Refused, match=r"^the ball lands at t = 0.4515236\d+ s; a restitution law would be needed"):
+        truth(scene, np.array([0.0, 1.0]))
