@@ -1,21 +1,23 @@
-# Two commands do everything: `make report` (everything, into one page) and `make test`. Each makes .venv itself.
+# Two commands do everything: `make report` (everything, into one page) and `make test`. Each makes .venv itself; another
+# Python beside it: make test PYTHON=python3.12 VENV=.venv-3.12
 PYTHON ?= python3
-BIN := .venv/bin
+VENV ?= .venv
+BIN := $(VENV)/bin
 OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install report tradeoff test check format readme docs gallery engines clean
 
-install: .venv/.installed
+install: $(VENV)/.installed
 
 # A pip of today takes two thirds of the time of Python's own; what builds the four packages is installed once for all of
 # them. Bytecode is compiled on all cores, where pip would use one, and not for the thousands of modules that nobody imports.
-.venv/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml papers/blajer_2006/pyproject.toml tests/drill/pyproject.toml
-	$(PYTHON) -m venv .venv
+$(VENV)/.installed: pyproject.toml constraints.txt benchmarks/pyproject.toml papers/blajer_2006/pyproject.toml tests/drill/pyproject.toml
+	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --no-compile --upgrade pip hatchling editables
 	PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --editable ".[dev]" --editable ./benchmarks --editable ./papers/blajer_2006 --editable ./tests/drill
-	-$(BIN)/python -m compileall -q -j 0 -x '/(OpenGL|fontTools|mypyc?|setuptools|tests)/' .venv/lib >/dev/null
+	-$(BIN)/python -m compileall -q -j 0 -x '/(OpenGL|fontTools|mypyc?|setuptools|tests)/' $(VENV)/lib >/dev/null
 	touch $@
 
 report: install

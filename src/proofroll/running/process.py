@@ -20,7 +20,7 @@ from proofroll.running.case import Status
 from proofroll.running.memory import VARIABLE, descendants, memory_limit, resident_gb
 
 # One thread per worker, set before anything is imported there: workers run side by side.
-_ONE_THREAD = dict.fromkeys(
+THREADS = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"),
     "1",
 )
@@ -100,7 +100,7 @@ class Worker:
                 stdout=log,
                 stderr=log,
                 pass_fds=(writer, life),
-                env=(environment_of_another() if python else safe_environment()) | _ONE_THREAD,
+                env=(environment_of_another() if python else safe_environment()) | THREADS,
                 text=True,
                 start_new_session=True,  # Ctrl-C reaches the parent alone, which then ends its workers
             )

@@ -86,3 +86,34 @@ def robots(
         found = list(checked_files(folders, every, states, advance))
     show({"files": found}, as_json, lambda: [outcome_table(found), *lines(found)])
     raise typer.Exit(CONTRADICTED if any(item.outcome == "traceback" for item in found) else OK)
+
+
+@drill.command()
+def arithmetic(
+    comparison: Annotated[list[str] | None, typer.Argument(help="Comparison files or names; by default all.")] = None,
+    kind: Annotated[list[str] | None, typer.Option(help="Kind of arithmetic, may be repeated; by default all.")] = None,
+    tests: Annotated[str, typer.Option(help="Run tests too: sensitive, or all.")] = "",
+    comparisons: Annotated[bool, typer.Option(help="Run comparisons.")] = True,
+    out: Annotated[Path | None, typer.Option(help="Keep what was found here, a folder for each kind.")] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="Workers at once.")] = 1,
+    as_json: Json = False,
+) -> None:
+    """Compute as other processors do: other kernels, instructions, threads, Pythons; exit 1 if a decision differs."""
+    from proofroll.core.errors import require_known
+    from proofroll_drill.arithmetic.kinds import kinds
+    from proofroll_drill.arithmetic.matrix import TESTS, comparison_files, matrix
+    from proofroll_drill.table import arithmetic_lines, arithmetic_table
+
+    known = {item.name: item for item in kinds()}
+    for name in kind or ():
+        require_known("--kind", name, known, "there are")
+    if tests:
+        require_known("--tests", tests, TESTS, "there are")
+    asked = [item for item in known.values() if not kind or item.name in kind]
+    files = (comparison or comparison_files()) if comparisons else []
+    if files and asked[0].name != "reference":  # decisions are held against those of this machine
+        asked.insert(0, known["reference"])
+    with progress_bar("arithmetic", total=len(asked)) as advance:
+        found = matrix(asked, files, tests, out, jobs, advance)
+    show({"arithmetic": found}, as_json, lambda: [arithmetic_table(found), *arithmetic_lines(found)])
+    raise typer.Exit(OK if all(item.same for item in found) else CONTRADICTED)

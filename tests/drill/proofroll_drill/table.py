@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.table import Table
 from rich.text import Text
 
+from proofroll_drill.arithmetic.matrix import Tried
 from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
 
@@ -44,3 +45,27 @@ def mutant_table(rows: Sequence[Mutated]) -> Table:
         ]
         table.add_row(row.fault, *marks, Text(row.said or f"nothing proven; {row.by}", overflow="fold"))
     return table
+
+
+def arithmetic_table(found: Sequence[Tried]) -> Table:
+    """One line per kind of arithmetic: what was tried, and how much differs."""
+    table = Table(box=None, padding=(0, 1, 0, 0))
+    table.add_column("arithmetic", no_wrap=True)
+    for name in ("runs", "differences", "failed tests"):
+        table.add_column(name, justify="right")
+    table.add_column("")
+    for item in found:
+        if item.untried:
+            table.add_row(item.kind, "", "", "", Text(f"not tried ({item.says}): {item.untried}", overflow="fold"))
+            continue
+        counts = [Text(str(len(found)), style="bold red" if found else "") for found in (item.differences, item.failed)]
+        table.add_row(item.kind, str(item.runs), *counts, Text(item.says, overflow="fold"))
+    return table
+
+
+def arithmetic_lines(found: Sequence[Tried]) -> Iterator[str]:
+    """Each difference and each test that failed."""
+    for item in found:
+        for one in item.differences:
+            yield f"{item.kind}: {one.comparison}: {one.what}: {one.found}, and in the reference {one.reference}"
+        yield from (f"{item.kind}: {line}" for line in item.failed)

@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.loop_points import held_points, is_planar
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.null_space import LoopRows
+from proofroll.engines.pinocchio.settings import PROXIMAL
 from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.files.scene_file import load_scene
 
@@ -84,7 +85,11 @@ def test_the_rank_of_a_singular_start_is_that_of_poses_nearby():
 
 @pytest.mark.parametrize("formulation", ["constraint_dynamics", "null_space", "joints"])
 def test_the_world_may_be_either_end_of_a_loop(formulation):
-    """Turning a loop round turns the sign of its wrench and nothing else."""
+    """Turning a loop round turns the sign of its wrench and nothing else.
+
+    The ring can stress itself, along (1, 1, 1) at this hinge, which moves nothing: a solver with a term μ in the place
+    of a stiffness finds that part of the force to some ε/μ, as the processor rounds.
+    """
     mechanism = runs.model("bricard")
     loop = mechanism.loops[0]
     turned = Loop("hinge5", "revolute", "rod4", "world", loop.position_b, loop.position_a, loop.axis_b, loop.axis_a)
@@ -95,7 +100,9 @@ def test_the_world_may_be_either_end_of_a_loop(formulation):
         run.advance(0.05)
         samples.append(run.sample())
     np.testing.assert_allclose(samples[0].p_WB, samples[1].p_WB, atol=1e-11)
-    np.testing.assert_allclose(samples[0].joint_force[-1], -samples[1].joint_force[-1], rtol=1e-6)
+    known = 100 * np.finfo(float).eps / PROXIMAL if formulation == "constraint_dynamics" else 1e-12
+    one, other = (sample.joint_force[-1] for sample in samples)
+    np.testing.assert_allclose(one, -other, rtol=0, atol=known * np.abs(one).max())
 
 
 def test_elimination_keeps_loops_closed():

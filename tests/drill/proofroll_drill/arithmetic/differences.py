@@ -1,0 +1,98 @@
+"""Where two kinds of arithmetic part: in a decision, or in numbers by more than their error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proofroll.files.trajectory_file import read
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A decision or a number that hangs on the arithmetic.
+
+    Attributes:
+        kind: of arithmetic, held against the reference.
+        comparison: where it shows.
+        what: the decision, by its place in the record; or the number.
+        reference, found: what each says; of numbers the difference and what the error bars allow.
+    """
+
+    kind: str
+    comparison: str
+    what: str
+    reference: str
+    found: str
+
+
+def differences(kind: str, reference: Path, other: Path, records: tuple[Any, Any]) -> Iterator[Difference]:
+    """All of them, of two records (:mod:`proofroll_drill.arithmetic.record`) in their folders."""
+    ours, theirs = records
+    for comparison, mine in ours.items():
+        its = theirs.get(comparison, {})
+        for place, one, two in _parted(_decisions(mine), _decisions(its)):
+            yield Difference(kind, comparison, place, one, two)
+        for what, gap, allowed in (*_limits(mine, its), *_numbers(mine, its, reference, other)):
+            yield Difference(kind, comparison, what, f"known to {allowed:.2g}", f"off by {gap:.2g}")
+
+
+def _decisions(record: Any) -> dict[str, Any]:
+    """Those of the runs and of the truths."""
+    truths = {f"truth at {point}": item["decisions"] for point, item in record.get("truths", {}).items()}
+    return {**record.get("decisions", {}), **truths}
+
+
+def _parted(one: Any, two: Any, place: str = "") -> Iterator[tuple[str, str, str]]:
+    """Where two trees of decisions have another leaf."""
+    if isinstance(one, dict) and isinstance(two, dict):
+        for key in [*one, *(key for key in two if key not in one)]:
+            yield from _parted(one.get(key), two.get(key), f"{place}: {key}" if place else key)
+    elif one != two:
+        yield place, str(one), str(two)
+
+
+def _limits(mine: Any, its: Any) -> Iterator[tuple[str, float, float]]:
+    """Limits of small steps that are further apart than the error bars of both."""
+    for run, limits in mine["limits"].items():
+        for name, (limit, bar) in limits.items():
+            found = its.get("limits", {}).get(run, {}).get(name)
+            if found is not None and abs(limit - found[0]) > bar + found[1]:
+                yield f"{run}: limit of {name}", abs(limit - found[0]), bar + found[1]
+
+
+def _numbers(mine: Any, its: Any, reference: Path, other: Path) -> Iterator[tuple[str, float, float]]:
+    """Numbers of the truth that are further apart than the error bars of both."""
+    for point, truth in mine["truths"].items():
+        if point not in its.get("truths", {}):
+            continue
+        files = reference / "store" / truth["file"], other / "store" / its["truths"][point]["file"]
+        for name, gap, allowed in beyond_bars(*map(read, files)):
+            yield f"truth at {point}: {name}", gap, allowed
+
+
+def beyond_bars(one: Any, two: Any) -> Iterator[tuple[str, float, float]]:
+    """Variables of two true trajectories that differ by more than their bars allow: by how much, and how much that is.
+
+    The time of an event is known to lie in its bracket.
+    """
+    for name, variable in one.items():
+        if name not in two or variable.shape != two[name].shape or not variable.size:
+            continue
+        bars = [item[name].attrs.get("error_bar") for item in (one, two)]
+        if name.startswith("event_time"):
+            bars = [_widest(item, name) for item in (one, two)]
+        if None in bars or variable.dtype.kind != "f":
+            continue
+        gap = float(np.nanmax(np.abs(variable.to_numpy() - two[name].to_numpy()), initial=0.0))
+        if gap > sum(bars):
+            yield name, gap, sum(bars)
+
+
+def _widest(dataset: Any, name: str) -> float:
+    low, high = (dataset[name.replace("event_time", side)].to_numpy() for side in ("event_low", "event_high"))
+    return float(np.max(high - low, initial=0.0))

@@ -1,0 +1,136 @@
+"""The matrix: comparisons and tests under each kind of arithmetic, and what differs from the machine as it is."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from proofroll.files.data_folders import data_folder
+from proofroll_drill.arithmetic.differences import Difference, differences
+from proofroll_drill.arithmetic.kinds import REPOSITORY, Arithmetic, make_ready, took_effect
+
+_RECORD = "from proofroll_drill.arithmetic.record import main; import sys; main(*sys.argv[1:])"
+# The tests that a change of the last digits may reach, by a mark (pyproject.toml); or all of them.
+TESTS = {"sensitive": ["-m", "arithmetic"], "all": []}
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What came of one kind of arithmetic.
+
+    Attributes:
+        kind: its name.
+        says: what is different, in words.
+        untried: why it was not tried; empty: it was.
+        runs: how many runs were held against the reference.
+        differences: what of them is not as in the reference.
+        failed: tests that failed, by name; or the end of what pytest said where it did not come to tests.
+        passed: the last line of pytest; empty: no tests were asked for.
+    """
+
+    kind: str
+    says: str
+    untried: str = ""
+    runs: int = 0
+    differences: list[Difference] = field(default_factory=list)
+    failed: list[str] = field(default_factory=list)
+    passed: str = ""
+
+    @property
+    def same(self) -> bool:
+        """Whether nothing hangs on this kind of arithmetic, as far as it was tried."""
+        return not self.differences and not self.failed
+
+
+def comparison_files() -> list[str]:
+    """All comparisons of this repository: its own, those of the folders below, and those of articles."""
+    from proofroll.files.comparison_file import comparison_names
+
+    return [*comparison_names(), *map(str, sorted(data_folder("comparisons").glob("*/*.toml")))]
+
+
+def matrix(
+    kinds: Sequence[Arithmetic],
+    comparisons: Sequence[str],
+    tests: str = "",
+    out: Path | None = None,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> list[Tried]:
+    """Runs ``comparisons`` and ``tests`` (a key of :data:`TESTS`) under each kind; the first is the reference.
+
+    Each kind has a folder of its own under ``out``, with a fresh store: no result of one arithmetic reaches another.
+    """
+    with tempfile.TemporaryDirectory() as temporary:
+        place = out or Path(temporary)
+        return _matrix(kinds, comparisons, tests, place, jobs, progress)
+
+
+def _matrix(
+    kinds: Sequence[Arithmetic],
+    comparisons: Sequence[str],
+    tests: str,
+    place: Path,
+    jobs: int,
+    progress: Callable[[str], None],
+) -> list[Tried]:
+    found: list[Tried] = []
+    reference: Any = None
+    for kind in kinds:
+        progress(kind.name)
+        folder = place / kind.name
+        why = kind.untried or _made_ready(kind) or took_effect(kind, folder / "site")
+        if why:
+            found.append(Tried(kind.name, kind.says, why))
+            continue
+        record = _recorded(kind, comparisons, folder, jobs)
+        if reference is None:
+            reference = place / kind.name, record
+        parted = list(differences(kind.name, reference[0], folder, (reference[1], record)))
+        failed, passed = _tested(kind, tests, folder, jobs) if tests else ([], "")
+        runs = sum(len(item["decisions"]) for item in record.values())
+        found.append(Tried(kind.name, kind.says, "", runs, parted, failed, passed))
+    return found
+
+
+def _made_ready(kind: Arithmetic) -> str:
+    try:
+        make_ready(kind)
+    except subprocess.CalledProcessError as error:
+        return f"proofroll cannot be installed for {kind.says}: exit code {error.returncode}"
+    return ""
+
+
+def _recorded(kind: Arithmetic, comparisons: Sequence[str], folder: Path, jobs: int) -> dict[str, Any]:
+    if not comparisons:
+        return {}
+    command = [kind.python, "-c", _RECORD, str(folder), str(kind.threads), str(jobs), *comparisons]
+    subprocess.run(command, env=kind.variables(folder / "site"), check=True, stdout=sys.stderr)
+    recorded: dict[str, Any] = json.loads((folder / "record.json").read_text(encoding="utf-8"))
+    return recorded
+
+
+def _tested(kind: Arithmetic, tests: str, folder: Path, jobs: int) -> tuple[list[str], str]:
+    """Tests that failed, and the last line of pytest."""
+    command = [kind.python, "-m", "pytest", "-q", "-n", str(jobs), "-p", "no:cacheprovider", "-rfE", *TESTS[tests]]
+    environment = kind.variables(folder / "site")
+    done = subprocess.run(
+        command,
+        cwd=REPOSITORY,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    lines = done.stdout.strip().splitlines()
+    failed = [line for line in lines if line.startswith(("FAILED ", "ERROR "))]
+    if done.returncode and not failed:
+        failed = lines[-5:]
+    return failed, lines[-1] if lines else ""

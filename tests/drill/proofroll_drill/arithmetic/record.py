@@ -1,0 +1,98 @@
+"""All that comparisons decide, with the truths' numbers: made in a process of one kind of arithmetic, in a fresh store.
+
+``python -m proofroll_drill.arithmetic.record FOLDER THREADS JOBS COMPARISON …`` writes ``FOLDER/record.json``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from proofroll.core.dataset import part
+from proofroll.core.errors import ProofrollError
+from proofroll.core.events import events_of
+from proofroll.core.scene import Scene
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running import process
+from proofroll.running.case import Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.compare import compare
+from proofroll.studies.outcome import Outcome, Run
+from proofroll.studies.planning import point_name
+
+
+def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
+    """Runs the comparisons and writes what they decide."""
+    process.THREADS.update(dict.fromkeys(process.THREADS, threads))
+    place = Path(folder)
+    if any(place.glob("store/*")):
+        raise SystemExit(f"{place} holds results of another arithmetic; name an empty folder")
+    runner = Runner(Store(place / "store"), jobs=int(jobs))
+    found: dict[str, Any] = {}
+    for path in comparisons:
+        comparison = dataclasses.replace(load_comparison(path).briefly(), timed=False)  # no verdict hangs on speed
+        found[comparison.name] = decided(compare(comparison, runner), runner.store)
+        # Written after each, so that what was found is there if a later one is ended.
+        (place / "record.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+
+
+def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
+    """``decisions`` and ``limits`` of each run; ``truths``: what they decide, and in which files their numbers lie."""
+    points = {name: f"point {number}" for number, name in enumerate(outcome.truths)}  # an edge is a found number
+    decisions: dict[str, Any] = {}
+    limits: dict[str, Any] = {}
+    for run in outcome.runs:
+        # A row need not be unique: the same engine may stand twice, for other points.
+        number = sum(key.startswith(f"{run.row.engine} ") for key in decisions)
+        key = f"{run.row.engine} {points[point_name(run.parameters)]} #{number}"
+        decisions[key] = _decisions(run, outcome, store)
+        limits[key] = {
+            item.observable: [item.limit_error, (item.limit_error_bar or 0.0) + item.truth_error_bar]
+            for item in run.judgements
+            if item.limit_error is not None
+        }
+    truths = {}
+    for name, case in outcome.truths.items():
+        path = store.trajectory(case)
+        if path.exists():
+            scene, dataset = load_scene(case.scene, **case.parameters), read(path)
+            said = {"ill_posed": bool(dataset.attrs.get("ill_posed")), "events": _events(scene, dataset)}
+            truths[points[name]] = {"decisions": said, "file": path.name}
+    return {"decisions": decisions, "limits": limits, "truths": truths}
+
+
+def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
+    events: Any = None
+    if run.case is not None and run.result.status == Status.DONE and run.result.trajectory is not None:
+        scene = load_scene(outcome.comparison.scene, **run.parameters)
+        events = _events(scene, read(store.trajectory(run.case)))
+    return {
+        "status": run.result.status,
+        "verdict": run.verdict,
+        "judgements": {item.observable: [item.verdict, item.limit, len(item.remarks)] for item in run.judgements},
+        "causes": [[one.element, one.cause.id] for one in run.diagnosis],
+        "certificate": [[line["quantity"], line["holds"]] for line in run.result.certificate],
+        "missing": run.missing,
+        "contradictions": len(run.contradictions),
+        "events": events,
+    }
+
+
+def _events(scene: Scene, dataset: Any) -> dict[str, list[str]]:
+    found = {}
+    for element in scene.elements:
+        found[element.name] = [event.kind for event in events_of(part(scene, element, dataset))]
+    return found
+
+
+if __name__ == "__main__":
+    try:
+        main(*sys.argv[1:])
+    except ProofrollError as error:
+        raise SystemExit(str(error)) from None

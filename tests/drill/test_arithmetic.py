@@ -1,0 +1,191 @@
+"""The matrix of arithmetic: it computes otherwise, notices what hangs on that, and the truths' numbers do not."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tomllib
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from proofroll.files.trajectory_file import read
+from proofroll_drill.arithmetic import matrix as the_matrix
+from proofroll_drill.arithmetic.differences import beyond_bars, differences
+from proofroll_drill.arithmetic.kinds import PYTHONS, REPOSITORY, Arithmetic, kinds, took_effect
+from proofroll_drill.arithmetic.matrix import Tried, comparison_files, matrix
+
+# A ball that rolls, one that slips and sticks, one on a curved wall; a body in space, a tree, a loop.
+SCENES = ("sphere_in_cylinder", "inclined_plane", "bowl", "heavy_top", "four_bar")
+_TRUTHS = """
+import sys
+from pathlib import Path
+import numpy as np
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
+for name in sys.argv[2:]:
+    write(truth(load_scene(name), np.linspace(0.0, 0.5, 6)), Path(sys.argv[1]) / f"{name}.npz")
+"""
+BY_NAME = {kind.name: kind for kind in kinds()}
+
+
+def truths(kind: Arithmetic, folder: Path) -> Path:
+    """The true trajectories of the scenes, of a process with this arithmetic."""
+    folder.mkdir()
+    subprocess.run([sys.executable, "-c", _TRUTHS, folder, *SCENES], env=kind.variables(folder / "site"), check=True)
+    return folder
+
+
+@pytest.mark.slow
+def test_numbers_of_the_truth_hang_on_no_processor(tmp_path: Path) -> None:
+    """Under other kernels and instructions they differ by round-off, and by no more than their error bars."""
+    reference = truths(BY_NAME["reference"], tmp_path / "reference")
+    some = False
+    for kind in (BY_NAME["prescott"], BY_NAME["no-avx2"]):
+        if kind.untried or took_effect(kind, tmp_path / "site"):
+            continue
+        other = truths(kind, tmp_path / kind.name)
+        for name in SCENES:
+            one, two = (read(folder / f"{name}.npz") for folder in (reference, other))
+            assert list(beyond_bars(one, two)) == []
+            some |= any(not np.array_equal(item, two[key]) for key, item in one.items() if item.dtype.kind == "f")
+    assert some or sys.platform != "linux"
+
+
+def record(**changes: Any) -> dict[str, Any]:
+    """A record of one run whose truth has no file."""
+    run = {"verdict": "agrees", "causes": [], "events": {"ball": ["slip", "stick"]}}
+    return {
+        "claim": {
+            "decisions": {"engine point 0 #0": run | changes},
+            "limits": {"engine point 0 #0": {"z": [changes.get("limit", 1e-9), 1e-10]}},
+            "truths": {},
+        }
+    }
+
+
+@pytest.mark.parametrize(
+    "changes", [{"verdict": "differs"}, {"causes": [["ball", "friction"]]}, {"events": {"ball": ["slip"]}}]
+)
+def test_a_decision_that_differs_is_told(changes: dict[str, Any], tmp_path: Path) -> None:
+    """Whatever is decided of a run, with its place, what the reference says, and what was found instead."""
+    (found,) = differences("zen", tmp_path, tmp_path, (record(), record(**changes)))
+    ((what, instead),) = changes.items()
+    place = f"engine point 0 #0: {what}" + (": ball" if what == "events" else "")
+    assert (found.kind, found.comparison, found.what) == ("zen", "claim", place)
+    assert found.found == str(instead["ball"] if what == "events" else instead)
+    assert found.reference != found.found
+
+
+def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:
+    """A comparison that gave other runs is another outcome."""
+    without = record()
+    without["claim"]["decisions"] = {}
+    assert list(differences("zen", tmp_path, tmp_path, (record(), without)))
+
+
+def test_limits_may_differ_within_their_bars(tmp_path: Path) -> None:
+    """Beyond the sum of both bars they are told."""
+    assert not [
+        one
+        for one in differences("zen", tmp_path, tmp_path, (record(), record(limit=1.15e-9)))
+        if "limit of z" in one.what
+    ]
+    (found,) = (
+        one
+        for one in differences("zen", tmp_path, tmp_path, (record(), record(limit=1.3e-9)))
+        if "limit of z" in one.what
+    )
+    assert found.found == "off by 3e-10"
+
+
+def test_numbers_beyond_their_bars_are_told() -> None:
+    """A variable may differ by the bars of both, the time of an event by the brackets of both."""
+    import xarray as xr
+
+    def dataset(z: float, event: float) -> xr.Dataset:
+        times = {f"event_{name}": ("event", [event + more]) for name, more in (("time", 0), ("low", 0), ("high", 1e-9))}
+        return xr.Dataset({"z": ("time", [0.0, z], {"error_bar": 1e-12})} | times)
+
+    one = dataset(1.0, 0.5)
+    assert list(beyond_bars(one, dataset(1.0 + 1.9e-12, 0.5 + 1.9e-9))) == []
+    assert [name for name, *_ in beyond_bars(one, dataset(1.0 + 2.1e-12, 0.5))] == ["z"]
+    assert [name for name, *_ in beyond_bars(one, dataset(1.0, 0.5 + 2.1e-9))] == ["event_time"]
+
+
+def test_kinds_compute_otherwise(tmp_path: Path) -> None:
+    """Each kind that this machine has takes effect in its processes, or says why it cannot be tried."""
+    for name in ("haswell", "prescott", "no-avx2", "no-heyoka"):
+        kind = BY_NAME[name]
+        assert isinstance(kind.untried or took_effect(kind, tmp_path / name), str)
+    hidden = BY_NAME["no-heyoka"].variables(tmp_path / "site")
+    asked = "from proofroll.elements.ball_on_surface.compiled.library import available; print(available())"
+    done = subprocess.run([sys.executable, "-c", asked], env=hidden, capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
+
+
+def test_what_a_machine_cannot_is_named_as_not_tried(tmp_path: Path) -> None:
+    """An interpreter that is not there, and one that does not start, cost their kinds alone."""
+    absent = Arithmetic("python9", "Python 9", untried="it is not on this machine")
+    broken = Arithmetic("broken", "numpy without what it cannot be without", {"NPY_DISABLE_CPU_FEATURES": baseline()})
+    found = matrix([absent, broken], [], out=tmp_path)
+    assert [(item.kind, bool(item.untried), item.same) for item in found] == [
+        ("python9", True, True),
+        ("broken", bool(baseline()), True),
+    ]
+
+
+def baseline() -> str:
+    """A feature that numpy was built with and cannot switch off; empty: there is none."""
+    umath = import_module("numpy._core._multiarray_umath")  # numpy has no public name for it
+
+    return str(next(iter(umath.__cpu_baseline__), ""))
+
+
+def test_no_result_of_another_arithmetic_is_used(tmp_path: Path) -> None:
+    """A folder that holds results already is refused: what is stored does not say with which kernel it was made."""
+    (tmp_path / "store").mkdir()
+    (tmp_path / "store" / "old.json").write_text("{}")
+    command = [sys.executable, "-m", "proofroll_drill.arithmetic.record", str(tmp_path), "1", "1", "heavy_top"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode
+    assert "name an empty folder" in done.stderr
+
+
+def test_tests_that_fail_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """So is a run of tests that came to none; both are no success."""
+    said = {"out": "FAILED tests/test_it.py::test_it - assert 1 < 0\n1 failed in 1.0s\n"}
+
+    def ran(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+        return subprocess.CompletedProcess(command, 1, stdout=said["out"])
+
+    monkeypatch.setattr(the_matrix, "took_effect", lambda *_: "")
+    monkeypatch.setattr(the_matrix.subprocess, "run", ran)
+    (found,) = matrix([BY_NAME["reference"]], [], "sensitive", tmp_path)
+    assert (found.failed, found.same) == (["FAILED tests/test_it.py::test_it - assert 1 < 0"], False)
+    said["out"] = "no tests collected\n"
+    (found,) = matrix([BY_NAME["reference"]], [], "sensitive", tmp_path)
+    assert (found.failed, found.same) == (["no tests collected"], False)
+    assert Tried("x", "y").same
+
+
+def test_every_comparison_is_in_the_matrix() -> None:
+    """Those of this repository, of the folders below, and of articles."""
+    found = {Path(name).stem for name in comparison_files()}
+    assert {"paper", "stick_slip", "accuracy", "turntable", "andrews_squeezer"} <= found
+    assert {path.stem for path in REPOSITORY.glob("comparisons/*/*.toml")} <= found
+
+
+def test_declared_pythons_are_those_of_the_matrix() -> None:
+    """What ``pyproject.toml`` declares is what the matrix and the continuous integration run."""
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    prefix = "Programming Language :: Python :: "
+    assert tuple(item.removeprefix(prefix) for item in project["classifiers"] if item.startswith(prefix)) == PYTHONS
+    assert project["requires-python"] == f">={PYTHONS[0]}"
+    workflow = yaml.safe_load((REPOSITORY / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
+    assert tuple(workflow["jobs"]["two-commands"]["strategy"]["matrix"]["python"]) == PYTHONS
