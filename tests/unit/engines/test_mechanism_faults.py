@@ -83,6 +83,7 @@ def test_the_rank_of_a_singular_start_is_that_of_poses_nearby():
     assert 6 * len(mechanism.bodies) - equations.rank == found.mobility
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize("formulation", ["constraint_dynamics", "null_space", "joints"])
 def test_the_world_may_be_either_end_of_a_loop(formulation):
     """Turning a loop round turns the sign of its wrench and nothing else.

@@ -254,6 +254,7 @@ def test_disagreement_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 EPS = float(np.finfo(float).eps)
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize(("factor", "known"), [(1.0, ["slip"]), (12 / 7, [])])
 def test_between_two_regimes_the_answer_is_ill_posed(factor: float, known: list[str]) -> None:
     """Within round-off of μ = g c/V0² and (12/7) g c/V0² the truth says the same, on both sides: that it hangs."""

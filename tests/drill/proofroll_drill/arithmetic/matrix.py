@@ -118,7 +118,18 @@ def _recorded(kind: Arithmetic, comparisons: Sequence[str], folder: Path, jobs: 
 
 def _tested(kind: Arithmetic, tests: str, folder: Path, jobs: int) -> tuple[list[str], str]:
     """Tests that failed, and the last line of pytest."""
-    command = [kind.python, "-m", "pytest", "-q", "-n", str(jobs), "-p", "no:cacheprovider", "-rfE", *TESTS[tests]]
+    command = [
+        kind.python,
+        "-m",
+        "pytest",
+        "-q",
+        "-n",
+        str(jobs if jobs > 1 else 0),
+        "-p",
+        "no:cacheprovider",
+        "-rfE",
+        *TESTS[tests],
+    ]
     environment = kind.variables(folder / "site")
     done = subprocess.run(
         command,

@@ -25,6 +25,7 @@ def andrews(scene):
     return scene("andrews_squeezer"), find_truth(scene("andrews_squeezer"), np.array([0.0, 0.03]), 1e-12)
 
 
+@pytest.mark.arithmetic
 def test_andrews_truth_has_the_agreed_digits(andrews):
     """Coordinates agreed by three independent programs to 3e-13 lie within twice that."""
     mechanism, truth = andrews
@@ -55,6 +56,7 @@ def test_published_digits_are_good_to_a_nanoradian_only(andrews):
     assert truth.bars["q"][-1] < 1e-11
 
 
+@pytest.mark.arithmetic
 def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
     """The nutation of a top by elliptic functions lies within the bar that two routes gave."""
     pytest.importorskip("heyoka")
@@ -308,6 +310,7 @@ def test_the_bar_of_drift_covers_its_round_off(scene):
     assert found.bars["drift"][-1] < 1e-13
 
 
+@pytest.mark.arithmetic
 def test_routes_of_a_spinning_body_agree(scene):
     """Ten seconds about the intermediate axis: attitudes and points within what turning over makes of round-off.
 
