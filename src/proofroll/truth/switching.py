@@ -61,7 +61,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
         if sticking is None:
             sticking = slip is None and not _must_slip(body, route, state)
             if not sticking:
-                events.append(("slip", begins))
+                events.append(("slip", max(time, begins)))
         leg = route.stick(time, state, until) if sticking else route.slip(time, state, until, slip)
         slip = None
         legs.append(leg)
@@ -77,7 +77,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
             continue
         if _comes_to_rest(body, route, leg):
             if not sticking:
-                events.append(("stick", time))
+                events.append(("stick", max(time, begins)))
             legs.append(_rest(body, route, route.nudged(state, np.zeros(3)), time, until))
             return Path(legs, events)
         if leg.why is End.HALT:
@@ -92,9 +92,9 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
         # With |u| = 0 the ball sticks if it can; where the needed force is outside the cone it goes on slipping.
         must_slip = leg.why is End.CONE or _must_slip(body, route, state)
         if must_slip and sticking:
-            events.append(("slip", time))
+            events.append(("slip", max(time, begins)))
         elif not must_slip and not sticking:
-            events.append(("stick", time))
+            events.append(("stick", max(time, begins)))
         sticking = not must_slip
 
 
