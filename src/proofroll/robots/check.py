@@ -11,10 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from proofroll.core.errors import InputError, Missing
+from proofroll.core.errors import InputError, Missing, require_known
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
+from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
+from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened, with_the_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
@@ -38,6 +40,7 @@ def check(
     states: int = 20,
     seed: int = 0,
     time_limit: float = TIME_LIMIT,
+    accept: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
     workers: Workers | None = None,
 ) -> RobotCheck:
@@ -51,12 +54,14 @@ def check(
         states: how many random states are compared.
         seed: of the states.
         time_limit: for each engine [s].
+        accept: causes of differences that are no news, besides those in ``ROBOT.accept.toml`` beside the file.
         progress: called with the name of an engine that has been asked.
         workers: processes in which engines read; by default some that end with this.
 
     Raises:
         InputError: the file, an engine or an option is wrong.
     """
+    accepted = _accepted(path, accept)
     asked = []
     for spec in map(parse_engine, engines or reading.reader_names()):
         if not place_of(spec.name):
@@ -112,6 +117,7 @@ def check(
 
         def told(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
             found = row(*item)
+            found = dataclasses.replace(found, accepted=all(cause.id in accepted for cause in found.causes))
             found = dataclasses.replace(found, as_written=as_written(*item, found))
             if progress is not None:
                 progress(found.engine)
@@ -129,6 +135,23 @@ def check(
         engines=rows,
         robot=drawn(truth),
     )
+
+
+def _accepted(path: Path, given: Sequence[str]) -> set[str]:
+    """Ids of causes that a user accepts, given or in the file beside the robot's: ``causes = ["..."]``.
+
+    Raises:
+        InputError: one is no cause.
+    """
+    beside = path.with_suffix(".accept.toml")
+    written = read_toml(beside).get("causes", []) if beside.is_file() else []
+    if not isinstance(written, list):
+        raise InputError(f"{beside}: causes", written, 'write a list of causes, ["damping_left_out"]')
+    known = [item.id for item in hypotheses()]
+    for place, names in (("--accept", given), (f"{beside}: causes", written)):
+        for name in names:
+            require_known(place, str(name), known, "there is no such cause; choose from")
+    return {*given, *written}
 
 
 def _fixed_hint(file: RobotFile) -> str:

@@ -31,6 +31,10 @@ def check(
         list[str] | None,
         typer.Option("--map", help="With --against: joint=joint where names differ, or a TOML file of such; repeat."),
     ] = None,
+    accept: Annotated[
+        str | None,
+        typer.Option(help="Causes of differences that are no news, with commas: damping_left_out,friction_left_out."),
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
@@ -50,7 +54,8 @@ def check(
         if names:
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
         with options.progress_bar("engines") as advance:
-            content = checked(file, engine or (), progress=advance, **how)
+            accepted = [name.strip() for name in (accept or "").split(",") if name.strip()]
+            content = checked(file, engine or (), accept=accepted, progress=advance, **how)
     else:
         from proofroll.robots.against import against as held_against
 

@@ -71,6 +71,7 @@ def judged(
         remarks=answer.reading.remarks,
         layers=layers,
         causes=causes,
+        fed=answer.fed,
         unexplained=unexplained,
         held=Whole(sum(answer.reading.dofs), sum(answer.reading.mass.values())),
         offending=_offending(truth, answer.reading),

@@ -101,6 +101,8 @@ class RobotReader(Protocol):
     A reader that has ``as_written(request)`` loads the file of the request as a user of the engine would, and returns a
     :class:`Whole`: what is compared is a copy without looks, contacts and meshes that weigh nothing.
 
+    A reader whose engine has no importer, and that feeds it from ``request.robot``, sets ``fed = True``.
+
     Attributes:
         kinds: formats that it reads.
         options: documented options of the importer that a user may give, each with what it does.

@@ -66,6 +66,7 @@ class ReaderAnswer:
         tolerances: where the engine's own precision is less than double's, by layer.
         reading: what it holds; None: it refused.
         refused: why, in its own words.
+        fed: see :class:`proofroll.robots.protocol.RobotReader`.
     """
 
     version: str
@@ -73,6 +74,7 @@ class ReaderAnswer:
     tolerances: dict[str, float]
     reading: Reading | None
     refused: str
+    fed: bool = False
 
 
 class AsWritten(NamedTuple):
@@ -100,7 +102,7 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
                 values[name] = dict(zip(told[name], found[name], strict=True))
         values |= {name: tuple(told[name]) for name in ("joints", "dofs", "coupled", "remarks")}
         reading = Reading(**values)
-    return ReaderAnswer(told["version"], told["says"], told["tolerances"], reading, told["refused"])
+    return ReaderAnswer(told["version"], told["says"], told["tolerances"], reading, told["refused"], told["fed"])
 
 
 def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
@@ -119,6 +121,7 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     if request.kind not in reader.kinds:
         raise Missing(f"{engine} reads no {request.kind.upper()}")
     told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
+    told["fed"] = getattr(reader, "fed", False)
     try:
         with contextlib.chdir(Path(arrays).parent):  # where an engine may leave its log
             reading = reader.read(request)

@@ -34,6 +34,8 @@ class ImporterRow:
         unexplained: the first layer that they leave open.
         held: how much it holds of the copy that is compared, which has no looks, no contacts and only meshes with mass.
         as_written: what its importer does with the file as it is, where that is asked.
+        fed: the engine has no importer: it was fed from our reading, and what it leaves out is no news of a file.
+        accepted: all causes of its differences are among those that the user accepts.
         offending: joints whose carried body it holds differently, or lacks.
     """
 
@@ -48,12 +50,15 @@ class ImporterRow:
     unexplained: str | None = None
     held: Whole | None = None
     as_written: str | None = None
+    fed: bool = False
+    accepted: bool = False
     offending: Sequence[str] = ()
 
     @property
     def differs(self) -> bool:
-        """Whether it does not hold the model that the file describes: another one, or none."""
-        return self.status not in {"holds", "missing"}
+        """Whether it does not hold the model that the file describes, for a reason that is not accepted."""
+        known = self.status == "explained" and (self.fed or self.accepted)
+        return self.status not in {"holds", "missing"} and not known
 
     @property
     def named(self) -> str:

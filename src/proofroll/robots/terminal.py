@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from rich.table import Column, Table
@@ -14,6 +14,7 @@ from proofroll.report.labels import SYMBOLS
 from proofroll.report.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal import STYLES
 from proofroll.robots.records import AgainstCheck, GalleryContent, HeldLayer, ImporterRow, RobotCheck
+from proofroll.robots.robot_file import LintFinding
 
 WIDTH = 80
 SHORT = {
@@ -74,8 +75,17 @@ def lines(content: RobotCheck) -> Iterator[str]:
     said = f"{content.file}: {content.kind.upper()}{base}, {moves}, {states}"
     yield from wrapped(said)
     yield from wrapped(f"true is {truth.by}; its two formulations differ by {amount(truth.difference)}")
-    for finding in content.lint:
-        yield from wrapped(f"{finding.level}: {finding.where}: {finding.what}")
+    yield from finding_lines([finding for finding in content.lint if finding.level != "note"])
+
+
+def finding_lines(findings: Sequence[LintFinding]) -> Iterator[str]:
+    """What was noticed, what is the same at several places once, with their number."""
+    places: dict[tuple[str, str], list[str]] = {}
+    for finding in findings:
+        places.setdefault((finding.level, finding.what), []).append(finding.where)
+    for (level, what), where in places.items():
+        more = f" and {len(where) - 2} more" if len(where) > 3 else ""
+        yield from wrapped(f"{level}: {', '.join(where[: 2 if more else 3])}{more}: {what}")
 
 
 def verdict_lines(content: RobotCheck) -> Iterator[str]:
@@ -90,6 +100,7 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
     for row in content.engines:
         for sentence in sentences(row):
             yield from wrapped(sentence)
+    yield from finding_lines([finding for finding in content.lint if finding.level == "note"])
 
 
 def against_lines(content: AgainstCheck) -> Iterator[str]:
@@ -128,6 +139,8 @@ def sentences(row: ImporterRow) -> Iterator[str]:
             f"{name} differs in {cause.layer} by {amount(cause.before)}; explained by: {cause.name}; "
             f"with that hypothesis {amount(cause.after)}.{advice}"
         )
+    if row.accepted and row.causes:
+        yield f"{name}: that is accepted."
     if row.unexplained:
         off = amount(row.layers[row.unexplained].difference)
         yield f"{name} differs in {row.unexplained} by {off}; no known cause explains it."

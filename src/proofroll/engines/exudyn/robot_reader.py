@@ -23,6 +23,7 @@ class ExudynRobots:
     """``ObjectKinematicTree``: joints about z, a free base as three slides and three hinges (about x, y, z)."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
+    fed: ClassVar[bool] = True
     options: ClassVar[Mapping[str, str]] = {}
     tolerances: ClassVar[Mapping[str, float]] = {}
     says: ClassVar[str] = "fed from our reading of the file: it has no importer of its own, so this checks its dynamics"
@@ -82,9 +83,9 @@ class _Tree:
             raise Refused("the tree of Exudyn has no spherical joint")
         self.turn = {joint.name: _turn(joint) for joint in self.robot.moving}
         damping: Array = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
-        turns: Array = np.concatenate([np.full(joint.dofs, joint.kind == "free") for joint in self.robot.moving])
+        loose: Array = np.concatenate([np.full(joint.dofs, joint.kind == "free") for joint in self.robot.moving])
         # Of a free joint it acts on the velocities of the body, not on the rates of the tree's angles.
-        self.free_damping: Array = turns * damping
+        self.free_damping: Array = loose * damping
         self.damping: Array = damping - self.free_damping
         self.link: dict[str, int] = {}
         rows = [row for joint in self.robot.moving for row in self._rows(joint)]
