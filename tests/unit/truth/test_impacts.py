@@ -146,3 +146,13 @@ def test_a_start_in_the_air_without_a_law_of_impacts_is_refused() -> None:
     scene = changed(scene, contact=replace(scene.elements[0].contact, restitution=None))
     with pytest.raises(Refused, match=r"^the ball lands at t = 0.4515236\d+ s; a restitution law would be needed"):
         truth(scene, np.array([0.0, 1.0]))
+
+
+def test_events_at_the_end_of_the_bounces_stand_in_order() -> None:
+    """A slip that ends while the last bounces fade does not end before it began."""
+    start = {"tilt": 0.219, "height": 0.153, "speed": -0.806, "cross_speed": 0.2, "side_spin": -40.8, "back_spin": 50.3}
+    law = {"restitution": 0.228, "tangential_restitution": -0.115, "mu_static": 0.231, "mu_kinetic": 0.192}
+    found = events_of(truth(load_scene("bouncing_ball", **start, **law), np.linspace(0.0, 0.4, 5)))
+    assert [event.kind for event in found] == ["bounce", "bounce", "settle", "slip", "stick"]
+    times = [event.time for event in found]
+    assert times == sorted(times)
