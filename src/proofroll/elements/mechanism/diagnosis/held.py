@@ -21,6 +21,8 @@ COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
 _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", DERIVED)}
 
 
+# Where the start itself is another, its accelerations are.
+_STATE = {"position", "orientation", "velocity", "spin"}
 # What an engine is given, and may say to hold though it does not.
 GIVEN = ("mass", "centre of mass", "inertia", "gravity", "joint positions", "joint axes")
 # The start is known so many times as badly as its first steps show.
@@ -39,7 +41,7 @@ def held_against(evidence: Evidence) -> Iterator[Residuals[Change]]:
     if wrong & set(GIVEN):
         return
     start = of_start(evidence)
-    if start is not None and _FOLLOWS & wrong:
+    if start is not None and _FOLLOWS & wrong and not _STATE & wrong:
         yield balanced_at_start(start)
     if evidence.run is None or evidence.truth is None:
         return

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 
 
@@ -55,3 +59,31 @@ def test_what_is_not_finite_is_no_cause(name: str) -> None:
     run = true.copy(deep=True)
     run[name][10:] = np.nan
     assert _told(scene, run, true) == []
+
+
+def test_speeds_do_not_hide_that_places_are_off_otherwise() -> None:
+    """A pendulum that a moment holds back has speeds as of a slow clock, and places as of none."""
+    scene, times = load_scene("pendulum"), np.arange(0, 0.12, 0.006)
+    (element,) = scene.elements
+    mechanism = element.mechanism  # type: ignore[attr-defined]  # it is one
+    held = replace(mechanism, joints=tuple(replace(joint, torque=0.1) for joint in mechanism.joints))
+    slower = truth(replace(scene, elements=(MechanismElement(held),)), times)
+    assert not [said for said in _told(scene, slower, truth(scene, times)) if "time runs" in said]
+
+
+def test_a_start_in_another_pose_does_not_accuse_gravity() -> None:
+    """Where the certificate shows another pose at time 0, the accelerations that follow from it prove nothing."""
+    (element,) = load_scene("pendulum").elements
+    start, motion = element.start, element.first_motion  # type: ignore[attr-defined]  # a mechanism
+
+    def line(quantity: str, expected: np.ndarray, found: np.ndarray) -> dict[str, object]:
+        told = Line(quantity, "1", tuple(np.ravel(expected)), tuple(np.ravel(found)), 2.0, 1e-9)
+        return told.as_dict()
+
+    mirrored = start.q_WB[0] * [-1, 1, 1, 1]
+    lines = [
+        line("orientation", start.q_WB[0], mirrored),
+        line("acceleration", motion.acceleration, -motion.acceleration),
+        line("angular acceleration", motion.angular_acceleration, -motion.angular_acceleration),
+    ]
+    assert not [cause for cause in diagnose(Evidence(element, lines), hypotheses_of(element)) if "gravity" in cause.id]
