@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from proofroll.report.growing_report import Report
+from proofroll.running.store import alone_in
 
 Proofroll = Callable[..., tuple[int, str, str]]
 
@@ -160,3 +163,13 @@ def test_a_page_after_the_first_comparison(
     content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert content["awaited"] == []
     assert [run["parameters"] for run in content["comparisons"][0]["runs"]] == [{"speed": 4.0}]
+
+
+def test_a_second_report_into_one_folder(tmp_path: Path) -> None:
+    """While a report is being made in a folder, another one says so and waits."""
+    asked = [sys.executable, "-m", "proofroll", "report", "inclined_plane", "--out", str(tmp_path)]
+    with alone_in(tmp_path, lambda: None), subprocess.Popen(asked, stderr=subprocess.PIPE, text=True) as second:
+        assert second.stderr is not None
+        assert "this one waits for it" in second.stderr.readline()
+        second.terminate()
+    assert not (tmp_path / "report.html").exists()

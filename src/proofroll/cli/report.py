@@ -46,6 +46,7 @@ def report(
     from proofroll.files.comparison_file import comparison_names
     from proofroll.report.growing_report import begun
     from proofroll.report.study_parts import all_parts, parts_of
+    from proofroll.running.store import alone_in
     from proofroll.running.worker_pool import Workers
 
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
@@ -63,27 +64,28 @@ def report(
     keys = list(dict.fromkeys(part.key for part in parts))
     total = len(keys) + bool(loaded)
     command = _command(studies or [], engine or [], settings or [], out)
-    outcomes: list[Outcome] = []
-    if loaded:
-        stage = _begin(1, total, "comparisons")
-        if len(loaded) > 1:
-            awaited = [item.title for item in loaded[1:]]
-            first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited)
-            first.expect(parts, out, fresh=fresh)
-            first.write(out)
-            options.complain(f"{stage}the first is in {out / 'report.html'}")
-        outcomes = outcomes_of(loaded, engine or [], runner, stage)
-    made = begun(outcomes, runner.store, command)
-    missing = made.expect(parts, out, fresh=fresh)
-    made.write(out)
-    for number, key in enumerate(keys, start=1 + bool(loaded)):
-        wanted = [part for part in missing if part.key == key]
-        words = next(part.words for part in parts if part.key == key)
-        stage = _begin(number, total, words if wanted else f"{words}: kept from before")
-        for part in wanted:
-            _make(made, part, runner, out, stage)
-            made.write(out)
-    options.show(made.content, as_json, lambda: _shown(made.content, out))
+    with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
+        outcomes: list[Outcome] = []
+        if loaded:
+            stage = _begin(1, total, "comparisons")
+            if len(loaded) > 1:
+                awaited = [item.title for item in loaded[1:]]
+                first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited)
+                first.expect(parts, out, fresh=fresh)
+                first.write(out)
+                options.complain(f"{stage}the first is in {out / 'report.html'}")
+            outcomes = outcomes_of(loaded, engine or [], runner, stage)
+        made = begun(outcomes, runner.store, command)
+        missing = made.expect(parts, out, fresh=fresh)
+        made.write(out)
+        for number, key in enumerate(keys, start=1 + bool(loaded)):
+            wanted = [part for part in missing if part.key == key]
+            words = next(part.words for part in parts if part.key == key)
+            stage = _begin(number, total, words if wanted else f"{words}: kept from before")
+            for part in wanted:
+                _make(made, part, runner, out, stage)
+                made.write(out)
+        options.show(made.content, as_json, lambda: _shown(made.content, out))
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
 
 

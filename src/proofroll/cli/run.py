@@ -61,17 +61,18 @@ def run(
         raise InputError("--out", out, f"end the name of the file in {NETCDF} or {STORED}")
     if plot is not None:
         require_ending(plot, "--plot")
-    preparing.join()
-    case = single_case(
-        scene,
-        options.assignments(settings),
-        engine,
-        until=until,
-        every=every,
-        time_limit=time_limit,
-        asks=tuple(dict.fromkeys(ask or [])),
-        workers=workers,
-    )
+    with options.spinner(f"waiting for {engine} to say what it is"):
+        preparing.join()
+        case = single_case(
+            scene,
+            options.assignments(settings),
+            engine,
+            until=until,
+            every=every,
+            time_limit=time_limit,
+            asks=tuple(dict.fromkeys(ask or [])),
+            workers=workers,
+        )
     with tempfile.TemporaryDirectory() as folder:
         target = Path(folder) / f"run{STORED}"
         with options.spinner(f"{scene} in {case.engine.name}"):

@@ -14,6 +14,11 @@ if TYPE_CHECKING:
 
 ENDINGS = (".html", ".svg", ".png", ".pdf")
 _COLUMNS = 2
+# As in all pages: nothing is asked for from anywhere, whatever a name in the file says.
+_POLICY = (
+    "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
+    "style-src 'unsafe-inline'; img-src data: blob:\">"
+)
 
 
 def require_ending(path: Path, option: str = "--out") -> None:
@@ -103,4 +108,5 @@ def _page(dataset: xr.Dataset, path: Path) -> None:
         figure.add_trace(curve, row=index // _COLUMNS + 1, col=index % _COLUMNS + 1)
     figure.update_xaxes(title_text="time [s]", row=rows)
     figure.update_layout(title=_title(dataset), height=220 * rows + 120, showlegend=False, template="simple_white")
-    figure.write_html(path, include_plotlyjs=True)  # in the file, which then needs no network
+    text = figure.to_html(include_plotlyjs=True)  # in the file, which then needs no network
+    path.write_text(text.replace("<head>", f"<head>{_POLICY}", 1), encoding="utf-8")

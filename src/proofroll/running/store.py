@@ -10,8 +10,7 @@ import json
 import os
 import shutil
 import tempfile
-import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
@@ -30,9 +29,8 @@ def write_text(path: Path, text: str) -> None:
         temporary.write_text(text, encoding="utf-8")
 
 
-# A trajectory that is being made lies in a folder of this kind, and does not take longer than this [s].
+# A trajectory that is being made lies in a folder of this kind, which its process has locked.
 _INCOMING = ".incoming-"
-_STALE = 7 * 86400.0
 
 
 class Store:
@@ -52,10 +50,10 @@ class Store:
             ) from None
 
     def _sweep(self) -> None:
-        """Removes what processes left that were ended in the middle of a case, and nothing that may still be in use."""
-        for place in self.folder.glob(f"{_INCOMING}*"):
-            with contextlib.suppress(OSError):  # another run has just removed it
-                if time.time() - place.stat().st_mtime > _STALE:
+        """Removes what processes left that were ended in the middle of a case, and nothing that is in use."""
+        with self._locked(fcntl.LOCK_EX):
+            for place in self.folder.glob(f"{_INCOMING}*"):
+                with contextlib.suppress(OSError), _holding(place, fcntl.LOCK_EX | fcntl.LOCK_NB):  # else in use
                     shutil.rmtree(place, ignore_errors=True)
 
     def trajectory(self, case: Case) -> Path:
@@ -69,14 +67,16 @@ class Store:
         Raises:
             ProofrollError: the place cannot be written.
         """
-        try:
-            place = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
-        except OSError as error:
-            raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
-        try:
+        with contextlib.ExitStack() as held:
+            try:
+                with self._locked(fcntl.LOCK_SH):  # or another process would remove it before it is locked
+                    place = tempfile.mkdtemp(prefix=_INCOMING, dir=self.folder)
+                    held.callback(shutil.rmtree, place, ignore_errors=True)  # who ends while writing leaves a half
+                    with contextlib.suppress(OSError):  # of a file system that cannot lock
+                        held.enter_context(_holding(Path(place), fcntl.LOCK_SH))
+            except OSError as error:
+                raise ProofrollError(f"{self.folder} cannot be written ({error.strerror or error})") from None
             yield Path(place) / self.trajectory(case).name
-        finally:
-            shutil.rmtree(place, ignore_errors=True)  # a process that ended while it wrote leaves a half
 
     def has(self, case: Case) -> bool:
         """Whether there is a record of the case, sound or not."""
@@ -114,9 +114,7 @@ class Store:
         """Keeps other processes from changing records meanwhile, where the file system can lock."""
         with contextlib.ExitStack() as stack:
             with contextlib.suppress(OSError):
-                folder = os.open(self.folder, os.O_RDONLY)
-                stack.callback(os.close, folder)
-                fcntl.flock(folder, how)
+                stack.enter_context(_holding(self.folder, how))
             yield
 
     def get(self, case: Case) -> Result | None:
@@ -133,6 +131,35 @@ class Store:
                 return result if checksum == result.checksum else None
         except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError, MemoryError):
             return None  # absent, truncated, tampered with or no file of ours: the case is run again
+
+
+@contextlib.contextmanager
+def _holding(folder: Path, how: int) -> Iterator[None]:
+    """Holds a lock of a folder; the system lets it go when the process ends, however that ends.
+
+    Raises:
+        OSError: another process has it, where ``how`` does not wait, or the file system cannot lock.
+    """
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(opened, how)
+        yield
+    finally:
+        os.close(opened)
+
+
+@contextlib.contextmanager
+def alone_in(folder: Path, wait: Callable[[], None]) -> Iterator[None]:
+    """Only one process at a time is in here for a folder; ``wait`` is called where another one is waited for."""
+    with contextlib.ExitStack() as stack:
+        try:
+            stack.enter_context(_holding(folder, fcntl.LOCK_EX | fcntl.LOCK_NB))
+        except BlockingIOError:
+            wait()
+            stack.enter_context(_holding(folder, fcntl.LOCK_EX))
+        except OSError:
+            pass  # of a file system that cannot lock
+        yield
 
 
 def _seal(record: object) -> str:

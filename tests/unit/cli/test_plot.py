@@ -43,6 +43,7 @@ def test_every_curve_with_its_unit(
     for name in found:
         assert f"{name} [{units[name].attrs['units']}]" in page
     assert "<script src=" not in page  # plotly is inside
+    assert '<meta http-equiv="Content-Security-Policy" content="default-src \'none\';' in page
     assert picture.read_bytes().startswith(begins)
     assert ending == ".png" or b"<svg" in picture.read_bytes()
 

@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,7 +14,7 @@ import pytest
 
 from proofroll.core.errors import ProofrollError
 from proofroll.running.case import Case, Result, Status
-from proofroll.running.store import Store, write_text
+from proofroll.running.store import Store, alone_in, write_text
 
 MakeCase = Callable[..., Case]
 
@@ -239,14 +240,43 @@ def test_two_writers_and_a_reader(tmp_path: Path, make_case: MakeCase) -> None:
     assert store.trajectory(case).read_text() == last.message * 1000
 
 
-def test_old_scraps_are_swept(tmp_path: Path) -> None:
-    """What a killed process left is removed after a week; what may be in use, and what is not ours, stays."""
-    for name in (".incoming-old", ".incoming-new", ".other"):
-        (tmp_path / name).mkdir()
-    for name in (".incoming-old", ".other"):
-        os.utime(tmp_path / name, (0, 0))
-    Store(tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".incoming-new", ".other"]
+def test_scraps_are_swept(tmp_path: Path, make_case: MakeCase) -> None:
+    """What a killed process left is removed by the next; what another writes into, and what is not ours, stays."""
+    (tmp_path / ".other").mkdir()
+    (tmp_path / ".incoming-old").mkdir()
+    script = (
+        "import json, os, signal, sys\nfrom pathlib import Path\nfrom proofroll.running.case import Case\n"
+        "from proofroll.running.store import Store\n"
+        "case = Case.from_dict(json.loads(sys.argv[2]))\n"
+        "with Store(Path(sys.argv[1])).incoming(case) as written:\n"
+        "    written.write_text('half')\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    content = json.dumps(dataclasses.asdict(make_case("oracle")))
+    subprocess.run([sys.executable, "-c", script, str(tmp_path), content], check=False)
+    assert len(list(tmp_path.glob(".incoming-*"))) == 1  # it swept the old one, and left its own
+    with Store(tmp_path).incoming(make_case("oracle")) as written:
+        Store(tmp_path)
+        assert [path.name for path in tmp_path.glob(".incoming-*")] == [written.parent.name]
+    assert [path.name for path in tmp_path.iterdir()] == [".other"]
+
+
+def test_alone_in_a_folder(tmp_path: Path) -> None:
+    """Who comes second says so once, and waits until the first is done."""
+    said: list[str] = []
+    inside = threading.Event()
+
+    def second() -> None:
+        with alone_in(tmp_path, lambda: (said.append("waits"), inside.set())):
+            said.append("in")
+
+    other = threading.Thread(target=second)
+    with alone_in(tmp_path, lambda: said.append("not this one")):
+        other.start()
+        assert inside.wait(60)
+        said.append("first done")
+    other.join()
+    assert said == ["waits", "first done", "in"]
 
 
 def test_a_case_that_asks_nothing_keeps_its_key(make_case: MakeCase) -> None:

@@ -127,3 +127,14 @@ def test_a_preset_that_no_run_could_take(tmp_path: Path, values: dict[str, Any],
     program = script(tmp_path / "rod", f"read -r line; echo '{described}'")
     with pytest.raises(ProofrollError, match=f"rod: preset matched of one: {says}"):
         engine(f"rod@program:{program}")
+
+
+def test_a_program_that_is_waited_for(
+    command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run says now and then that it waits for a program to say what it is."""
+    program = script(tmp_path / "rod", "read -r line; sleep 2; exit 1")
+    monkeypatch.setattr("proofroll.cli.options._SAID_EVERY", 0.1)
+    code, _, err = command_line("run", "pendulum", "--engine", f"rod@program:{program}")
+    assert code == 3
+    assert f"waiting for rod@program:{program} to say what it is, " in err
