@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -79,3 +80,16 @@ def test_notes_stand_below(proofroll: Proofroll, tmp_path: Path) -> None:
     path.write_text(urdf(extra="<gazebo/><wheel/>"))
     _, out, _ = proofroll("check", str(path), "--engine", "pinocchio", "--states", "2")
     assert out.index("warning: wheel") < out.index("joints mass") < out.index("note: gazebo")
+
+
+def test_where_it_differs(proofroll: Proofroll, tmp_path: Path) -> None:
+    """A difference names the body or joint, the state, the value that is held and the true one."""
+    path = tmp_path / "arm.xml"
+    path.write_text(mjcf(option='gravity="0 1 -3"'))
+    _, out, _ = proofroll("check", str(path), "--engine", "pinocchio", "--states", "2")
+    assert re.search(r"most at joint k[12]: \S+ at state [01], true", " ".join(out.split()))
+    box = '<collision><geometry><box size="0.1 0.2 0.3"/></geometry></collision>'
+    path = tmp_path / "arm.urdf"
+    path.write_text(urdf(tool=box))
+    _, out, _ = proofroll("check", str(path), "--engine", "mujoco", "--states", "2")
+    assert re.search(r"most at body tip: mass 7\.3, true 1\.3", " ".join(out.split()))

@@ -44,6 +44,9 @@ LOOSE = '<body name="loose"><freejoint/><geom size="0.1 0.2 0.3" type="box"/></b
 FLYING = """<mujoco model="f"><worldbody><body name="b" pos="0.2 0.3 1" euler="90 20 0"><freejoint name="f"/>
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/></body></worldbody></mujoco>"""
 FLOOR = '<worldbody><geom type="plane" size="0 0 0.05"/></worldbody><actuator>'
+POINTED = """<robot name="r"><link name="a"/><link name="b">
+<inertial><mass value="1"/><inertia ixx="0" iyy="0" izz="0" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
 FREE = '<joint name="free" type="free" damping="0.5"/>'
 WORLD_ROOT = urdf().replace(
     "</robot>",
@@ -191,6 +194,7 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("two joints", mjcf(second=TWO), "pinocchio", set()),
     ("two joints", mjcf(second=TWO), "mujoco", set()),
     ("free body", mjcf(extra=LOOSE), "mujoco", set()),
+    ("no moment about its axis", POINTED, "exudyn", set()),
     ("damped free body", mjcf(extra=LOOSE.replace("<freejoint/>", FREE)), "exudyn", set()),
     ("damped free body", mjcf(extra=LOOSE.replace("<freejoint/>", FREE)), "mujoco", set()),
     *[("huge damping", mjcf(joint='damping="1e11"'), name, set()) for name in ("mujoco", "exudyn")],

@@ -18,8 +18,9 @@ from proofroll.core.number_text import counted
 from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots import defining, reading
 from proofroll.robots.explain import Search
-from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences
+from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences, first_failing
 from proofroll.robots.model import Robot
+from proofroll.robots.places import worst_place
 from proofroll.robots.protocol import Reading, Whole
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile, open_robot
@@ -72,6 +73,7 @@ def judged(
         layers=layers,
         causes=causes,
         fed=answer.fed,
+        where=None if holds else worst_place(truth, answer.reading, str(first_failing(found, tolerances))),
         unexplained=unexplained,
         held=Whole(sum(answer.reading.dofs), sum(answer.reading.mass.values())),
         offending=_offending(truth, answer.reading),

@@ -36,6 +36,7 @@ class ImporterRow:
         as_written: what its importer does with the file as it is, where that is asked.
         fed: the engine has no importer: it was fed from our reading, and what it leaves out is no news of a file.
         accepted: all causes of its differences are among those that the user accepts.
+        where: it is off the most at the first layer that fails.
         offending: joints whose carried body it holds differently, or lacks.
     """
 
@@ -52,6 +53,7 @@ class ImporterRow:
     as_written: str | None = None
     fed: bool = False
     accepted: bool = False
+    where: str | None = None
     offending: Sequence[str] = ()
 
     @property

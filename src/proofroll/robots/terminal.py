@@ -139,6 +139,8 @@ def sentences(row: ImporterRow) -> Iterator[str]:
             f"{name} differs in {cause.layer} by {amount(cause.before)}; explained by: {cause.name}; "
             f"with that hypothesis {amount(cause.after)}.{advice}"
         )
+    if row.where:
+        yield f"{name}: most at {row.where}."
     if row.accepted and row.causes:
         yield f"{name}: that is accepted."
     if row.unexplained:
