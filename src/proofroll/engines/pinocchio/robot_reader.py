@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.errors import Refused
 from proofroll.robots.model import Array
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
@@ -85,7 +86,10 @@ class PinocchioRobots:
 def _build(request: Request) -> Any:
     mimic = {"mimic": True} if request.options.get("mimic") else {}
     if request.kind == "mjcf":
-        return pin.buildModelFromMJCF(str(request.path))
+        try:
+            return pin.buildModelFromMJCF(str(request.path))
+        except IndexError as error:  # of its C++, which would be taken for a mistake of this reader
+            raise Refused(f"IndexError: {error}") from None
     free = (pin.JointModelFreeFlyer(),) if request.base == "free" else ()
     return pin.buildModelFromUrdf(str(request.path), *free, **mimic)
 
