@@ -18,7 +18,7 @@ from proofroll.running.case import EngineFacts
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
 _NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs"}
-# Of a comparison these are for a person, or for a report of everything.
+# Of a comparison these are for a person, or for a report without names.
 _WORDS = ("title", "question", "order", "brief")
 
 

@@ -94,7 +94,7 @@ engine refuse the scene and say so.
 """,
     "A comparison: `comparisons/*.toml` without `study`": """### `[vary]`, `[brief]`
 
-Parameter = list of values. `[vary]`: every combination is run. `[brief]`: a report of everything has only these values.
+Parameter = list of values. `[vary]`: every combination is run. `[brief]`: a report without names has only these values.
 
 ### `[tolerances.NAME]`
 

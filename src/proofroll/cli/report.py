@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def report(
     studies: Annotated[
         list[str] | None,
-        typer.Argument(help="Comparisons, other studies, scenes, robot files; all studies by default."),
+        typer.Argument(help="Comparisons, other studies, scenes, robot files; by default the main ones, see below."),
     ] = None,
     engine: options.Engines = None,
     settings: options.Set = None,
@@ -38,12 +38,14 @@ def report(
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
 
+    Without names it makes those that lie in the folder of studies itself: the main comparisons, and all further studies
+    but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names.
     The files are there after the first comparison, and are written again after all of them and after each further
     study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
     says so, and the report names the command that makes it whole. --set is for scenes and robot files.
     """
     from proofroll.core.errors import InputError
-    from proofroll.files.comparison_file import comparison_names
+    from proofroll.files.comparison_file import comparison_names, further_comparison_names
     from proofroll.report.growing_report import begun
     from proofroll.report.study_parts import all_parts, parts_of
     from proofroll.running.store import alone_in
@@ -55,6 +57,7 @@ def report(
         raise InputError(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
         )
+    left_out = [] if studies else further_comparison_names()
     loaded = [asked(name, assigned, workers) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
@@ -70,12 +73,14 @@ def report(
             stage = _begin(1, total, "comparisons")
             if len(loaded) > 1:
                 awaited = [item.title for item in loaded[1:]]
-                first = begun(outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited)
+                first = begun(
+                    outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited, left_out
+                )
                 first.expect(parts, out, fresh=fresh)
                 first.write(out)
                 options.complain(f"{stage}the first is in {out / 'report.html'}")
             outcomes = outcomes_of(loaded, engine or [], runner, stage)
-        made = begun(outcomes, runner.store, command)
+        made = begun(outcomes, runner.store, command, left_out=left_out)
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)
         for number, key in enumerate(keys, start=1 + bool(loaded)):
@@ -129,4 +134,7 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
         yield from verdict_parts(item)
     yield from part_lines(content)
     yield from first_lines(content)
+    if content.left_out:
+        names = " ".join(content.left_out)
+        yield f"Comparisons left out: {len(content.left_out)}. proofroll report {names} runs them."
     yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."

@@ -134,7 +134,7 @@ class Comparison:
         time_limit: wall seconds a case may take [s].
         timed: whether the speed of every run is measured, in clean runs of its own.
         order: place in a report, the smallest first; those without come last, by name.
-        brief: parameter -> values; a report of everything has only the combinations that have one of them for each.
+        brief: parameter -> values; a report without names has only the combinations that have one of them for each.
         left_out: how many combinations have been left out for that.
     """
 
@@ -155,7 +155,7 @@ class Comparison:
     left_out: int = 0
 
     def briefly(self) -> Comparison:
-        """The comparison at the combinations that a report of everything has."""
+        """The comparison at the combinations that a report without names has."""
         vary = {name: [value for value in values if value in self.brief.get(name, values)]
                 for name, values in self.vary.items()}  # fmt: skip
         kept = replace(self, vary=vary, points=[point for point in self.points if _fits(point, self.brief)])

@@ -31,6 +31,13 @@ def comparison_names() -> list[str]:
     return [path.stem for path in sorted(paths, key=lambda path: (_order(path), path.stem))]
 
 
+def further_comparison_names() -> list[str]:
+    """Names, with their folder, of the comparisons that a report without names leaves out, sorted."""
+    found = {path: folder for folder in study_folders() for path in folder.glob("*/*.toml")}
+    comparisons = [path for path in found if path.name != "scene.toml" and study_of(path) is None]
+    return sorted(path.relative_to(found[path]).with_suffix("").as_posix() for path in comparisons)
+
+
 def _order(path: Path) -> float:
     """The place that a file asks for; of a broken one its reader is told."""
     try:

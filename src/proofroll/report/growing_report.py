@@ -95,7 +95,9 @@ class Report:
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
 
-def begun(outcomes: list[Outcome], store: Store, command: str, awaited: Sequence[str] = ()) -> Report:
+def begun(
+    outcomes: list[Outcome], store: Store, command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()
+) -> Report:
     """A report of comparisons, to which further studies can be added.
 
     Args:
@@ -103,10 +105,12 @@ def begun(outcomes: list[Outcome], store: Store, command: str, awaited: Sequence
         store: where the trajectories are: a folder in that of the report.
         command: that makes the report again.
         awaited: titles of comparisons that are still being run.
+        left_out: names of comparisons that are not in it.
     """
     replay = _replay(outcomes, store)
     described = [case.described for case in replay.cases] if replay else []
-    content = replace(report_content(outcomes, store, command), replay=described, awaited=list(awaited))
+    content = report_content(outcomes, store, command)
+    content = replace(content, replay=described, awaited=list(awaited), left_out=list(left_out))
     return Report(content, [point_curves(outcome, store) for outcome in outcomes], replay)
 
 

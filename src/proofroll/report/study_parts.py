@@ -89,7 +89,7 @@ class Part(Protocol):
 
     @property
     def on_request(self) -> bool:
-        """Whether a report of everything leaves it out unless it is kept; as its file says."""
+        """Whether a report without names leaves it out unless it is kept; as its file says."""
         return getattr(self.asked, "on_request", False)
 
     @property

@@ -133,7 +133,7 @@ class StabilityFile:
         scene: which scene.
         axes: along which it is taken to its extremes.
         claims: what is expected.
-        on_request: a report of everything has this map only where it is kept.
+        on_request: a report without names has this map only where it is kept.
     """
 
     name: str
