@@ -174,6 +174,75 @@ def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> N
         assert set(names) <= {item.judgement.observable for item in found.compared} | {"q_WB"}
 
 
+@pytest.mark.parametrize("scene", ["inclined_plane", "double_pendulum"])
+def test_a_table_of_numbers(command_line: Proofroll, scene: str, tmp_path: Path) -> None:
+    """What run writes as CSV has every number over time under its name and unit, and is judged as the run is."""
+    own = tmp_path / "run.csv"
+    code, _, err = command_line("run", scene, "--engine", "projection", "--until", "0.1", "--out", str(own))
+    assert (code, err) == (0, "")
+    run, table = proofroll.simulate(scene, "projection", until=0.1), np.genfromtxt(own, delimiter=",", skip_header=1)
+    header = own.read_text(encoding="utf-8").splitlines()[0].split(",")
+    assert header[0] == "time [s]"
+    last = f"w_WB/{run['body'].item(1)}/z [rad/s]" if "body" in run.dims else "w_WB/z [rad/s]"
+    assert np.array_equal(table[:, header.index(last)], run["w_WB"].to_numpy().reshape(len(table), -1)[:, -1])
+    code, out, err = command_line("judge", str(own), "--scene", scene)
+    assert (code, err) == (0, ""), out
+    assert "v_WB is off by" in out
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("time [s],q.pivot [rad]", ""),
+        ("time,q.pivot", ""),
+        ("time [ms],q.pivot [rad]", "convert time to s"),
+        ("time [s],q.pivot [deg]", "convert q.pivot to rad"),
+        ("t [s],q.pivot [rad]", "it has no column time"),
+        ("time [s],time [s]", "two columns are called time"),
+        ("time [s],[rad]", r"column 2 is called '\[rad\]'"),
+        ("time [s]", "line 2 has 2 fields, the header 1"),
+        ("time [s],p_WB/rod/x [m]", "the columns of p_WB are not whole"),
+    ],
+)
+def test_a_table_of_ones_own(header: str, words: str, tmp_path: Path) -> None:
+    """CSV from anywhere is judged; what is wrong with it is one line that names the column or line."""
+    own = swing()
+    rows = "".join(f"{t!r},{q!r}\n" for t, q in zip(own["time"].tolist(), own["q.pivot"].tolist(), strict=True))
+    (file := tmp_path / "own.csv").write_text(f"{header}\n{rows}", encoding="utf-8-sig")
+    if not words:
+        assert proofroll.judge(file, "pendulum", "1e-6 rad").agrees
+        return
+    with pytest.raises(InputError, match=words) as caught:
+        proofroll.judge(file, "pendulum")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_word_in_a_table(tmp_path: Path) -> None:
+    """The line of a CSV file in which no number stands is named."""
+    (file := tmp_path / "own.csv").write_text("time [s],q.pivot [rad]\n0.0,2.8\n0.1,none\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 3: could not convert string to float: 'none'\)$"):
+        proofroll.judge(file, "pendulum")
+
+
+def test_bodies_in_another_order(tmp_path: Path) -> None:
+    """Bodies of a file stand in the order of the scene, or are told to."""
+    run = proofroll.simulate("double_pendulum", "projection", until=0.1)
+    other = run[["p_WB", "v_WB", "w_WB", "q_WB"]].drop_attrs().isel(body=[1, 0])
+    for ending in ("csv", "nc"):
+        write(other, file := tmp_path / f"run.{ending}")
+        with pytest.raises(InputError, match="in its order: "):
+            proofroll.judge(file, "double_pendulum")
+
+
+def test_arrays_of_numpy_in_a_file(tmp_path: Path) -> None:
+    """A file of ``numpy.savez`` is judged as its arrays are; any other file of that ending is one line."""
+    np.savez(tmp_path / "own.npz", **swing())
+    assert proofroll.judge(tmp_path / "own.npz", "pendulum", "1e-6 rad").agrees
+    (tmp_path / "none.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"none\.npz is no file of numpy's arrays"):
+        proofroll.judge(tmp_path / "none.npz", "pendulum")
+
+
 def test_a_file_that_was_cut_off(tmp_path: Path) -> None:
     """Wherever a file ends before it should, it is told in one line."""
     write(proofroll.simulate("pendulum", "projection", until=0.1), whole := tmp_path / "whole.nc")

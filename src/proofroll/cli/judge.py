@@ -12,7 +12,9 @@ from proofroll.cli import options
 
 
 def judge(
-    run: Annotated[Path, typer.Argument(help="netCDF file with time [s] and the state, or variables of the truth.")],
+    run: Annotated[
+        Path, typer.Argument(help="File (.nc, .csv, .npz) with time [s] and the state, or variables of the truth.")
+    ],
     scene: Annotated[str, typer.Option(help="The scene, or the path of its folder.")],
     settings: options.Set = None,
     tolerance: Annotated[

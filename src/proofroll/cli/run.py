@@ -22,7 +22,8 @@ def run(
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Write the trajectory to this netCDF file, or to numpy's, with the ending npz.")
+        Path | None,
+        typer.Option(help="Write the trajectory to this file, by its ending: nc (netCDF), csv, or npz (numpy)."),
     ] = None,
     time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = 600.0,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
@@ -46,7 +47,7 @@ def run(
     from proofroll.core.errors import InputError
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
-    from proofroll.files.trajectory_file import NETCDF, STORED, import_xarray, read, write
+    from proofroll.files.trajectory_file import CSV, NETCDF, STORED, import_xarray, read, write
     from proofroll.report.run import run_content, run_lines
     from proofroll.report.run_plot import require_ending
     from proofroll.running.runner import run_one
@@ -57,8 +58,8 @@ def run(
     for option, file in (("--out", out), ("--plot", plot)):
         if file is not None:
             options.require_writable(file, option)
-    if out is not None and out.suffix not in (NETCDF, STORED):  # a scene.toml would be written over
-        raise InputError("--out", out, f"end the name of the file in {NETCDF} or {STORED}")
+    if out is not None and out.suffix not in (NETCDF, CSV, STORED):  # a scene.toml would be written over
+        raise InputError("--out", out, f"end the name of the file in {NETCDF}, {CSV} or {STORED}")
     if plot is not None:
         require_ending(plot, "--plot")
     with options.spinner(f"waiting for {engine} to say what it is"):

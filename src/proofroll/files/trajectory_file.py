@@ -1,4 +1,4 @@
-"""Trajectories in files: numpy's ``.npz`` between processes and in the store, netCDF for people and other programs.
+"""Trajectories in files: numpy's ``.npz`` between processes and in the store, netCDF and CSV for people and programs.
 
 numpy is imported anyway; what reads and writes netCDF takes longer to import than a short run to make.
 """
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 # Endings of the files in which trajectories are stored, and in which a person is given one.
-STORED, NETCDF = ".npz", ".nc"
+STORED, NETCDF, CSV = ".npz", ".nc", ".csv"
 # What is in such a file beside an array for each variable: their dimensions and all attributes.
 _ABOUT = "about.json"
 # Whether xarray was imported without dask, so that it may go on without: it asks for a scheduler when it writes.
@@ -71,7 +71,13 @@ def write(trajectory: xr.Dataset | Columns, path: Path) -> None:
         ValueError: the format cannot hold a number.
     """
     # Made in memory first: a disk that fills meanwhile gives one reason, and no half of a file.
-    made = _stored(trajectory) if path.suffix == STORED else _netcdf(trajectory)
+    made = (
+        _csv(trajectory)
+        if path.suffix == CSV
+        else _stored(trajectory)
+        if path.suffix == STORED
+        else _netcdf(trajectory)
+    )
     with replacing(path) as temporary:
         temporary.write_bytes(made)
 
@@ -89,6 +95,12 @@ def _stored(trajectory: xr.Dataset | Columns) -> bytes:
     return buffer.getvalue()
 
 
+def _csv(trajectory: xr.Dataset | Columns) -> bytes:
+    from proofroll.files.csv_table import csv_text
+
+    return csv_text(trajectory.dataset() if isinstance(trajectory, Columns) else trajectory).encode()
+
+
 def _netcdf(trajectory: xr.Dataset | Columns) -> bytes:
     dataset = trajectory.dataset() if isinstance(trajectory, Columns) else trajectory
     # No number stands for an absent one.
@@ -98,13 +110,17 @@ def _netcdf(trajectory: xr.Dataset | Columns) -> bytes:
 
 
 def read(path: Path) -> xr.Dataset:
-    """A trajectory from a file that :func:`write` made, wholly in memory.
+    """A trajectory from a file that :func:`write` made, wholly in memory; of CSV without attributes.
 
     Raises:
         OSError, ValueError: it cannot be read, or is of another kind than its ending says.
     """
     if path.suffix == STORED:
         return read_columns(path).dataset()
+    if path.suffix == CSV:
+        from proofroll.files.csv_table import read_csv
+
+        return read_csv(ordinary_content(path).decode())
     import xarray as xr
 
     # Times stay numbers of seconds, and no number stands for an absent one.
@@ -135,6 +151,19 @@ def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path} is no stored trajectory") from error
     return Columns(found, attrs)
+
+
+def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """The arrays of a file that ``numpy.savez`` made.
+
+    Raises:
+        OSError, ValueError: it cannot be read, or is no such file.
+    """
+    try:
+        with np.load(io.BytesIO(ordinary_content(path)), allow_pickle=False) as file:
+            return dict(file)
+    except _NO_SUCH_FILE as error:
+        raise ValueError(f"{path.name} is no file of numpy's arrays") from error
 
 
 def read_some(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:

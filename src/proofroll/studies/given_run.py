@@ -15,18 +15,20 @@ from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.several import REQUIRED
+from proofroll.files.trajectory_file import CSV, STORED
 from proofroll.running.recording import require_unit
 
 if TYPE_CHECKING:
     import xarray as xr
 
 Run = Any
-"""An ``xarray.Dataset``, the path of a netCDF file, or arrays by name, ``time`` [s] among them."""
+"""An ``xarray.Dataset``, the path of a file (netCDF, CSV, ``.npz``), or arrays by name, ``time`` [s] among them."""
 # Other ways to write a unit of the truth, as in files of other programs.
 _SPELT = {
     "sec": "s", "second": "s", "seconds": "s", "radian": "rad", "radians": "rad", "m s-1": "m/s", "rad s-1": "rad/s",
     "meter": "m", "meters": "m", "metre": "m", "metres": "m",
 }  # fmt: skip
+_WRITE_NETCDF = "; xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
 FROM_STATE = "it is taken from the state"
 
 
@@ -37,20 +39,27 @@ class GivenRun:
     Attributes:
         dataset: with ``time``, and with all that follows from the state where that is given.
         units: of the variables that say theirs.
+        labels: of the dimensions that have names, as bodies, in their order.
         besides: variables that are none of the state, and velocities, with why they are not judged where that is known
             already; none of a run of proofroll's own.
     """
 
     dataset: xr.Dataset
     units: Mapping[str, str]
+    labels: Mapping[str, list[str]]
     besides: Mapping[str, str | None]
 
     def require_units(self, truth: xr.Dataset) -> None:
-        """Every variable that the truth has too is in the truth's unit, if it says its own.
+        """Every variable that the truth has too is in the truth's unit, if it says its own, and bodies in its order.
 
         Raises:
             InputError: one is not.
         """
+        for dim, given in self.labels.items():
+            wanted = truth[dim].to_numpy().tolist() if dim in truth.coords else given
+            if given != wanted:
+                advice = f"name them as the scene does, in its order: {', '.join(wanted)}"
+                raise InputError("run", f"{dim} {', '.join(given)}", advice)
         for name, unit in self.units.items():
             if name in truth.data_vars:
                 _require_unit(name, unit, str(truth[name].attrs["units"]))
@@ -76,6 +85,9 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
         advice = f"it is a run of {made}" + (" with other numbers; give those parameters here too" if numbers else "")
         raise InputError("scene", scene.name, advice)
     units = {str(k): str(v.attrs["units"]).strip() for k, v in dataset.variables.items() if "units" in v.attrs}
+    labels = {
+        str(k): list(map(str, v.to_numpy())) for k, v in dataset.coords.items() if v.dtype.kind in "UO" and v.ndim
+    }
     if "time" in units:
         _require_unit("time", units["time"], "s")
     times = dataset["time"].to_numpy()
@@ -87,17 +99,17 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
     _require_finite_state(dataset, scene)
     if made_of is not None:
         if _whole(dataset, scene):
-            return GivenRun(dataset, units, {})
+            return GivenRun(dataset, units, labels, {})
         # Variables were left out: what there is on the grid is judged by itself.
         dataset = dataset.drop_dims(BETWEEN, errors="ignore").drop_attrs(deep=False)
     names = [str(name) for name in dataset.data_vars]
     # a scene of several elements is judged by variables
     if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
-        return GivenRun(dataset, units, dict.fromkeys(names))
+        return GivenRun(dataset, units, labels, dict.fromkeys(names))
     state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
     besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in state], FROM_STATE)
     besides |= dict.fromkeys(REQUIRED[1:])  # velocities: what is asked may be of places alone
-    return GivenRun(_completed(dataset, scene, times, state), units, besides)
+    return GivenRun(_completed(dataset, scene, times, state), units, labels, besides)
 
 
 def _whole(run: xr.Dataset, scene: Scene) -> bool:
@@ -138,14 +150,13 @@ def _dataset(run: Run) -> xr.Dataset:
     import xarray as xr
 
     if isinstance(run, str | Path):
-        from proofroll.files.trajectory_file import read
-
         try:
-            run = read(Path(run))
+            run = _from_file(Path(run))
         except FileNotFoundError:
             raise InputError("run", str(run), "there is no such file") from None
         except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
-            advice = f"it cannot be read ({error}); xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
+            how = "" if Path(run).suffix in {CSV, STORED} else _WRITE_NETCDF
+            advice = f"it cannot be read ({error}){how}"
             raise InputError("run", str(run), advice) from None
     if isinstance(run, xr.Dataset):
         if "time" not in run.variables:
@@ -159,6 +170,18 @@ def _dataset(run: Run) -> xr.Dataset:
     dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
     found = {name: (dims[name], values, said[name]) for name, values in given.items()}
     return xr.Dataset({name: item for name, item in found.items() if name != "time"}, {"time": found["time"]})
+
+
+def _from_file(path: Path) -> Run:
+    """A dataset, or of numpy's own files the arrays by name."""
+    from proofroll.files.trajectory_file import read, read_arrays
+
+    try:
+        return read(path)
+    except ValueError:
+        if path.suffix != STORED:
+            raise
+        return read_arrays(path)
 
 
 def _check_lengths(given: Mapping[str, Any]) -> None:

@@ -114,10 +114,10 @@ def judge(
     """Holds a trajectory against the truth of a scene at the trajectory's own times.
 
     Args:
-        run: from :func:`proofroll.simulate`, the path of a netCDF file, or arrays by name: ``time`` [s], and the state
-            (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for each time; for
-            mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, as ``q.hinge``,
-            ``tip.x``, ``positions``, ``z``; in the truth's units.
+        run: from :func:`proofroll.simulate`, the path of a file (netCDF, CSV or ``.npz``), or arrays by name: ``time``
+            [s], and the state (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for
+            each time; for mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, as
+            ``q.hinge``, ``tip.x``, ``positions``, ``z``; in the truth's units.
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
             one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,

@@ -1,0 +1,116 @@
+"""Trajectories as CSV: a column for each number over time, with its unit in the header, for any other program.
+
+The header names each column as ``q.pivot [rad]``. An array has a column for each of its numbers, whose labels
+follow its name: ``p_WB/rod/x [m]``. Attributes, and what is not along time, are left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+_HEADER = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
+_AXES = ("xyz", "wxyz")
+
+
+def csv_text(trajectory: xr.Dataset) -> str:
+    """All numbers of a trajectory over time, to the last bit."""
+    columns = {"time": trajectory["time"], **trajectory.data_vars}
+    header, values = [], []
+    for name, item in columns.items():
+        if item.dims[:1] != ("time",) or item.dtype.kind not in "fiub":
+            continue
+        labels = [
+            item[dim].to_numpy().tolist() if dim in item.coords else range(item.sizes[dim]) for dim in item.dims[1:]
+        ]
+        unit = f" [{item.attrs['units']}]" if "units" in item.attrs else ""
+        header += ["/".join(map(str, (name, *at))) + unit for at in itertools.product(*labels)]
+        numbers = item.to_numpy()
+        numbers = numbers.astype(np.int8) if numbers.dtype == bool else numbers
+        values += list(numbers.reshape(len(numbers), -1).T.tolist())
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([header, *zip(*values, strict=True)])
+    return text.getvalue()
+
+
+def read_csv(text: str) -> xr.Dataset:
+    """The trajectory that a CSV file holds.
+
+    Raises:
+        ValueError: it is no table of numbers under names, one of them time.
+    """
+    rows = list(csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True))
+    header = [field.strip() for field in rows[0]] if rows else []
+    numbers = _numbers(header, rows[1:])
+    columns: dict[str, dict[tuple[str, ...], Any]] = {}
+    units: dict[str, set[str]] = {}
+    for index, field in enumerate(header):
+        found = _HEADER.fullmatch(field)
+        name, *labels = (found["name"] if found else "").split("/")
+        if not name or found is None:
+            raise ValueError(
+                f"column {index + 1} is called {field!r}; the header has names with units, as q.pivot [rad]"
+            )
+        own = columns.setdefault(name, {})
+        if tuple(labels) in own:
+            raise ValueError(f"two columns are called {'/'.join((name, *labels))}")
+        own[tuple(labels)] = numbers[:, index]
+        if found["unit"] is not None:
+            units.setdefault(name, set()).add(found["unit"].strip() or "1")
+    if "time" not in columns:
+        raise ValueError("it has no column time [s]; its first line has the names")
+    variables: dict[str, Any] = {}
+    coordinates: dict[str, list[str]] = {}
+    for name, own in columns.items():
+        if len(units.get(name, ())) > 1:
+            raise ValueError(f"the columns of {name} have several units")
+        values, labels_of = _array(name, own)
+        dims = ["time"]
+        for level, names in enumerate(labels_of):
+            dims.append(_dimension(name, level, names))
+            if not names[0].isdigit():
+                coordinates[dims[-1]] = list(names)
+        variables[name] = (dims, values, {"units": units[name].pop()} if name in units else {})
+    return xr.Dataset(variables, coordinates)
+
+
+def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
+    """The name of an array's axis, as in a run: of space, of bodies, or its own."""
+    axes = "".join(labels)
+    if axes in _AXES:
+        return axes
+    return "body" if level == 0 and not labels[0].isdigit() else f"{name}_{level + 1}"
+
+
+def _numbers(header: list[str], rows: list[list[str]]) -> Any:
+    found = []
+    for line, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        if len(row) != len(header):
+            raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
+        try:
+            found.append([float(field) for field in row])
+        except ValueError as error:
+            raise ValueError(f"line {line}: {error}") from None
+    return np.array(found).reshape(len(found), len(header))
+
+
+def _array(name: str, columns: Mapping[tuple[str, ...], Any]) -> tuple[Any, list[tuple[str, ...]]]:
+    """Values with time first, and the labels of each further axis; axes of space in their usual order."""
+    depth = {len(labels) for labels in columns}
+    labels = [tuple(dict.fromkeys(level)) for level in zip(*columns, strict=len(depth) == 1)]
+    labels = [next((tuple(axes) for axes in _AXES if set(axes) == set(level)), level) for level in labels]
+    expected = list(itertools.product(*labels))
+    part = bool(labels) and set(labels[-1]) < set("wxyz") and "".join(labels[-1]) not in _AXES
+    if part or len(depth) > 1 or set(expected) != set(columns):
+        raise ValueError(f"the columns of {name} are not whole; write one for each of {name}/x, {name}/y, {name}/z")
+    values = np.stack([columns[at] for at in expected], axis=1)
+    return values.reshape(-1, *map(len, labels)), labels
