@@ -79,6 +79,7 @@ class Row:
         expect_for: observable -> expected verdicts on it alone.
         because: why something else than agreement is expected.
         ladder: factors on the step, coarse first; 1 is the run itself. [1]: no ladder, so no limit of small steps.
+            The usual one is [2, 1, 0.5] or [1, 0.5, 0.25] where its steps do not divide `every`.
         only: parameter -> values for which this row is run (all if absent).
         order: observable -> lowest and highest order that is expected.
         limit: observable -> largest expected distance of the limit of small steps from the truth.

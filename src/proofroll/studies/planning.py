@@ -9,7 +9,6 @@ from itertools import product
 import numpy as np
 
 from proofroll.core.comparison import Comparison, Edge, Row
-from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError, told_of
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
@@ -21,6 +20,7 @@ from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
+from proofroll.studies.step_factors import USUAL, fitting, unfit
 
 # What is expected of a row whose formulation cannot represent the scene.
 _UNFIT = frozenset({"failed", "refused", "another-scene"})
@@ -79,12 +79,14 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     asked = scene_at(comparison, next(iter(comparison.variations(rows[0])), {}))
     resolved, truth_facts = row_facts(comparison, numbered, asked.requires, workers)
     comparison = settled(comparison)
+    times = time_grid(comparison.until, comparison.every)
+    steps = [facts.step if isinstance(facts, EngineFacts) else None for facts in resolved]
+    rows = [fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
     rungs = _rungs(rows, resolved, workers)
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
-    times = time_grid(comparison.until, comparison.every)
-    steps = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
-    between = tuple(sorted({t for step in steps for t in off_grid(times, step).tolist()}))
+    of_engines = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
+    between = tuple(sorted({t for step in of_engines for t in off_grid(times, step).tolist()}))
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):
             scene = scene_at(comparison, point)
@@ -143,7 +145,6 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
     """
     known = described([item.name for item in facts if isinstance(item, EngineFacts)], workers)
     times = time_grid(comparison.until, comparison.every)
-    intervals = [times[:2].tolist(), times[-2:].tolist()]  # the last may be shorter
     for point in comparison.combinations():
         ends = product(*(value.edge_between if isinstance(value, Edge) else (value,) for value in point.values()))
         numbers, *others = [dict(zip(point, values, strict=True)) for values in ends]
@@ -161,11 +162,13 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
                 raise InputError(place, row.engine, advice)
             if (step := item.step) is None:
                 continue
-            try:
-                for start, end in intervals:
-                    whole_steps(start, end, step)
-            except InputError as error:
-                raise error.within(place, row.engine) from None
+            if error := unfit([1.0], step, times):
+                raise error.within(place, row.engine)
+            ladder = fitting(row, step, times).ladder
+            if unfit(ladder, step, times):
+                advice = "a step of it does not divide the interval between samples (`every`); "
+                advice += f"{fitting(replace(row, ladder=USUAL), step, times).ladder} does"
+                raise InputError(f"{place.removesuffix('engine')}ladder", ladder, advice)
 
 
 def _rungs(

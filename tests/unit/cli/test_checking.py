@@ -82,6 +82,12 @@ def broken(tmp_path: Path, name: str, old: str, new: str) -> str:
             ["rows.0.engine", "not have rolling without slip at tilt=0.35"],
         ),
         ("inclined_plane.toml", "=chart]", "=chart,dt=0.003]", ["rows.7.engine", "no whole number of steps"]),
+        (
+            "inclined_plane.toml",
+            "ladder = [1, 0.5, 0.25]",
+            "ladder = [9, 3, 1]",
+            ["rows.4.ladder", "does not divide the interval", "[4.0, 2.0, 1.0] does"],
+        ),
         ("tradeoff.toml", 'quantity = "z"', 'quantity = "height"', ["quantity = 'height'"]),
         ("tradeoff.toml", "until = ", "until = nan #", ["tradeoff.toml: until = nan", "finite"]),
         ("tradeoff.toml", "until = ", "until = -1 #", ["tradeoff.toml: until = -1", "above 0"]),

@@ -40,3 +40,15 @@ def test_the_truth_gives_all_that_can_be_asked_for() -> None:
     found = planning.plan(load_comparison("inclined_plane"), ["projection"])
     assert {case.asks for case in found.truths.values()} == {("orientation",)}
     assert {case.asks for run in found.runs for case in run.ladder.values()} == {()}
+
+
+@pytest.mark.parametrize(
+    ("step", "factors"), [(2.5e-4, [4.0, 2.0, 1.0]), (1e-3, [2.0, 1.0, 0.5]), (2e-3, [1.0, 0.5, 0.25])]
+)
+def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) -> None:
+    """Steps of the usual ladder that do not divide the interval between samples, 0.01 s, are finer ones instead."""
+    comparison = dataclasses.replace(load_comparison("inclined_plane"), until=0.1, every=0.01)
+    row = Row(f"mujoco[formulation=chart,dt={step}]", comparison.rows[0].tolerance)
+    found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["mujoco"])
+    assert {tuple(run.row.ladder) for run in found.runs} == {tuple(factors)}
+    assert all(run.ladder.keys() == set(factors) for run in found.runs)
