@@ -9,6 +9,7 @@ from pathlib import Path
 
 from proofroll.cli import options
 from proofroll.core.announced import announced
+from proofroll.core.element_abilities import TellsStart
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_text import counted
 
@@ -21,13 +22,20 @@ def is_text_check(name: Path) -> bool:
     return name.suffix in {"", ".toml"} or name.is_dir()
 
 
-def check_text(name: str, as_json: bool) -> None:
-    """Says in one line what a scene or the file of a study holds.
+def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
+    """Says in one line what a scene or the file of a study holds, and below it how a scene starts.
+
+    Args:
+        name: of a scene or the file of a study, or a path.
+        as_json: one document instead.
+        plot: page to which a scene is drawn.
 
     Raises:
         InputError: the first thing that is wrong with it.
     """
     found = checked(name)
+    if plot is not None:
+        _draw(found, plot)
     if as_json:
         options.write_json(found)
         return
@@ -35,11 +43,31 @@ def check_text(name: str, as_json: bool) -> None:
     needs = f"; engines must provide: {', '.join(found.requires)}" if found.requires else ""
     about = f"{found.scene}, " if found.kind != "scene" and found.scene else ""
     sys.stdout.write(f"{found.name} is sound: {found.kind}, {about}{counts}{needs}\n")
+    for line in found.start:
+        sys.stdout.write(f"  {line}\n")
+
+
+def _draw(found: SoundFile, plot: Path) -> None:
+    """Draws a scene at its start to a page.
+
+    Raises:
+        InputError: it is a study, or the file is no page or cannot be written.
+    """
+    if found.kind != "scene":
+        raise InputError("--plot", plot, f"{found.name} is no scene; name one")
+    if plot.suffix.lower() != ".html":
+        raise InputError("--plot", plot, "a drawn scene is a page: end the name of the file in .html")
+    options.require_pages()
+    options.require_writable(plot, "--plot")
+    from proofroll.report.scene_page import scene_page
+    from proofroll.running.store import write_text
+
+    write_text(plot, scene_page(found.path, found.start))
 
 
 @dataclasses.dataclass(frozen=True)
 class SoundFile:
-    """What a scene or file holds: counts of its parts, and what a scene requires."""
+    """What a scene or file holds: counts of its parts, and what a scene requires, and how it starts."""
 
     kind: str
     name: str
@@ -47,6 +75,7 @@ class SoundFile:
     scene: str
     counts: dict[str, int]
     requires: list[str] = dataclasses.field(default_factory=list)
+    start: list[str] = dataclasses.field(default_factory=list)
 
 
 def checked(name: str) -> SoundFile:
@@ -81,7 +110,9 @@ def _scene(name: str) -> SoundFile:
     file, scene = read_scene_file(name), load_scene(name)
     tables = {f"[[{key}]]": len(value) for key, value in file.tables.items() if isinstance(value, list)}
     counts = {"parameters": len(file.parameters)} | tables
-    return SoundFile("scene", scene.name, str(scene.folder / "scene.toml"), scene.name, counts, sorted(scene.requires))
+    start = [line for element in scene.elements if isinstance(element, TellsStart) for line in element.start_facts]
+    path = str(scene.folder / "scene.toml")
+    return SoundFile("scene", scene.name, path, scene.name, counts, sorted(scene.requires), start)
 
 
 def _comparison(path: Path) -> SoundFile:

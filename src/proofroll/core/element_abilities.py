@@ -29,6 +29,15 @@ class SeenInRun:
     ended: str | None = None
 
 
+@runtime_checkable
+class TellsStart(Protocol):
+    """What an element has besides, if it can say in words how it starts: for a person who wrote a scene."""
+
+    @property
+    def start_facts(self) -> Sequence[str]:
+        """Short sentences: where its bodies are, how they move, what holds them, how many ways they can move."""
+
+
 class RunWatch(Protocol):
     """Follows one run."""
 

@@ -6,6 +6,9 @@ A number that was given, as a parameter or the length of a run, is told as it wa
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+from proofroll.core.arrays import FloatArray
 
 
 def number(value: float | None, digits: int = 2, none: str = "–") -> str:
@@ -22,6 +25,13 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
 def error(value: float | None, digits: int = 2) -> str:
     """An error; infinite where there is none that is finite."""
     return number(value, digits, none="∞")
+
+
+def place(values: Sequence[float] | FloatArray) -> str:
+    """Components of a vector; those that are round-off of the others are zero."""
+    given = [float(value) for value in values]
+    size = max(map(abs, given), default=0.0) or 1.0
+    return f"({', '.join(f'{round(value / size, 9) * size + 0.0:.4g}' for value in given)})"
 
 
 def counted(count: int, many: str) -> str:

@@ -35,17 +35,21 @@ def check(
         str | None,
         typer.Option(help="Causes of differences that are no news, with commas: damping_left_out,friction_left_out."),
     ] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw a scene at its start to this page (.html).")] = None,
     as_json: options.Json = False,
 ) -> None:
     """Check a scene or a comparison without running it, or a robot file with every engine's own importer.
 
+    Of a scene it says where things start, with the normal force or the degrees of freedom, and --plot draws it.
     Of a robot file: exit 1 if an engine (or the file of --against) does not hold the model that the file describes, or
-    if the file describes what cannot be. The options are for these.
+    if the file describes what cannot be. The other options are for these.
     """
     if is_text_check(file):
         _require_none_for_robots(context)
-        check_text(str(file), as_json)
+        check_text(str(file), as_json, plot)
         return
+    if plot is not None:
+        raise InputError("--plot", plot, "this is for scenes; --out FOLDER writes a page about a robot file")
     from proofroll.robots.check import check as checked
     from proofroll.robots.terminal import WIDTH, check_parts
 
@@ -99,7 +103,7 @@ def _require_none_for_robots(context: typer.Context) -> None:
         InputError: there is one.
     """
     for parameter in context.command.params:
-        if parameter.name in {"file", "as_json", "help"}:
+        if parameter.name in {"file", "plot", "as_json", "help"}:
             continue
         source = context.get_parameter_source(str(parameter.name))
         if source is not None and source.name == "COMMANDLINE":

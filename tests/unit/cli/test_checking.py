@@ -1,4 +1,4 @@
-"""``proofroll check`` of scenes and studies: one line, and nothing is run."""
+"""``proofroll check`` of scenes and studies: what they hold, how scenes start, and nothing is run."""
 
 from __future__ import annotations
 
@@ -30,11 +30,56 @@ def nothing_runs(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("name", scene_names())
 def test_every_scene_is_sound(proofroll: Proofroll, name: str) -> None:
-    """Each scene of the package passes with one line that counts its parameters."""
+    """Each scene of the package passes with a line that counts its parameters, and a few that say how it starts."""
     code, out, err = proofroll("check", name)
-    assert (code, err, out.count("\n")) == (0, "", 1)
+    assert (code, err) == (0, "")
     assert out.startswith(f"{name} is sound: scene, ")
-    assert " parameters, " in out
+    assert " parameters, " in out.splitlines()[0]
+    assert 1 < out.count("\n") <= 12
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("bouncing_ball", ("", ""), ["it starts 1 m above the plane and falls"]),
+        ("sphere_in_cylinder", ("", ""), ["gamma = 0 rad", "it rolls; the cylinder presses it with"]),
+        ("slide_to_roll", ("", ""), ["it slips at 2 m/s; the plane presses it with"]),
+        ("torus_rim", ("", ""), ["m in the world (", "presses it with"]),
+        ("inclined_plane", ("direction = [0, 0, -1]", "direction = [0, 0, 1]"), ["it leaves the plane at once"]),
+        (
+            "four_bar",
+            ("", ""),
+            ["freedom: 1; loops add 10 constraints", "rod0: centre of mass at (0, 0.5, 0) m"],
+        ),
+        ("bricard", ("", ""), ["degrees of freedom: 1", "of which 1 follow from the others"]),
+        ("double_pendulum", ("", ""), ["degrees of freedom: 2\n"]),
+    ],
+)
+def test_how_a_scene_starts(
+    proofroll: Proofroll, tmp_path: Path, name: str, change: tuple[str, str], words: list[str]
+) -> None:
+    """Places, what presses a ball, and degrees of freedom are told; a ball that nothing holds leaves at once."""
+    text = (data_folder("models") / name / "scene.toml").read_text(encoding="utf-8")
+    assert change[0] in text
+    (tmp_path / "scene.toml").write_text(text.replace(*change, 1) if change[0] else text, encoding="utf-8")
+    _, out, _ = proofroll("check", str(tmp_path))
+    for word in words:
+        assert word in out
+
+
+def test_a_scene_is_drawn(proofroll: Proofroll, tmp_path: Path) -> None:
+    """With --plot the scene at its start, its parameters and how it starts are a page; a study or robot has none."""
+    page = tmp_path / "scene.html"
+    assert proofroll("check", "four_bar", "--plot", str(page))[0] == 0
+    text = page.read_text(encoding="utf-8")
+    assert '<svg class="drawing"' in text
+    assert "degrees of freedom: 1" in text
+    assert "acceleration of gravity" in text
+    for name, words in (("paper", "is no scene"), ("pendulum.png", "end the name of the file in .html")):
+        plot = str(tmp_path / "none.html") if name == "paper" else str(tmp_path / name)
+        code, _, err = proofroll("check", name.partition(".")[0], "--plot", plot)
+        assert (code, err.count("\n")) == (2, 1)
+        assert words in err
 
 
 @pytest.mark.parametrize("path", sorted(COMPARISONS.glob("*.toml")), ids=lambda path: path.stem)

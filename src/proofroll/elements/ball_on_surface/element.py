@@ -26,6 +26,7 @@ from proofroll.elements.ball_on_surface.failure_program import program
 from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion, RollingBall
 from proofroll.elements.ball_on_surface.optional_terms import optional_terms
 from proofroll.elements.ball_on_surface.sampling import BallSample
+from proofroll.elements.ball_on_surface.start_words import start_facts
 from proofroll.elements.ball_on_surface.surfaces import Surface
 
 if TYPE_CHECKING:
@@ -106,6 +107,11 @@ class BallOnSurface:
     softened: ClassVar[frozenset[str]] = frozenset(name for name in certificate.CAPS if not name.startswith("1 / "))
     failures: ClassVar[Mapping[str, str]] = failure.MEANINGS
     failing_events: ClassVar[Mapping[str, str]] = {"lift_off": failure.LEFT}
+
+    @property
+    def start_facts(self) -> Sequence[str]:
+        """See :class:`proofroll.core.element_abilities.TellsStart`."""
+        return start_facts(self.rolling)
 
     @cached_property
     def rolling(self) -> RollingBall:

@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Sol
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
+from proofroll.elements.mechanism.start_words import start_facts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,6 +91,11 @@ class MechanismElement:
         quaternions = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
         state = (motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], quaternions)
         return Placed(self.mechanism, np.zeros(1), *(part[None] for part in state))
+
+    @property
+    def start_facts(self) -> Sequence[str]:
+        """See :class:`proofroll.core.element_abilities.TellsStart`."""
+        return start_facts(self)
 
     @cached_property
     def _equations(self) -> JointCoordinates:

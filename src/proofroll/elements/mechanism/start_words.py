@@ -1,0 +1,35 @@
+"""How a mechanism starts, in words for a person who wrote it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.number_text import place
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.element import MechanismElement
+
+# Bodies whose places are told.
+_MOST = 8
+
+
+def start_facts(element: MechanismElement) -> Sequence[str]:
+    """Degrees of freedom, what the loops repeat, a singular pose, and where the bodies are."""
+    found, mechanism = element.analysis, element.mechanism
+    said = [f"degrees of freedom: {found.mobility}"]
+    if found.rows:
+        repeated = f", of which {found.redundant} follow from the others" if found.redundant else ""
+        said[0] += f"; loops add {found.rows} constraints{repeated}"
+    if found.singular_start:
+        said.append("the start is a singular pose: constraints lose rank there, and the motion may go several ways")
+    moving = element.start
+    for body in mechanism.bodies[:_MOST]:
+        centre = moving.point(body.name, body.com)[0]
+        speed = float(np.linalg.norm(moving.velocity(body.name, body.com)[0]))
+        said.append(f"{body.name}: centre of mass at {place(centre)} m, speed {speed:.4g} m/s")
+    if more := len(mechanism.bodies) - _MOST:
+        said += [f"and {more} more bodies"] if more > 0 else []
+    return said
