@@ -352,13 +352,19 @@ def test_the_plug_in_costs_nothing_until_it_is_used(tmp_path: Path) -> None:
         "    assert not {'numpy', 'scipy', 'xarray', 'pydantic'} & set(sys.modules)\n"
         "def test_mine(assert_agrees):\n"
         "    assert_agrees('pendulum', 'projection', tolerance='1 %', because='a look', until=0.1)\n"
+        "def test_wrong(assert_agrees):\n"
+        "    run = {'time': [0.0, 0.1], 'q.pivot': [0.0, 0.0]}\n"
+        "    assert_agrees('pendulum', run, tolerance='1e-3 rad', because='a look')\n"
     )
     others = [
         word for name in ("cacheprovider", "hypothesispytest", "xdist", "timeout") for word in ("-p", f"no:{name}")
     ]
     command = [sys.executable, "-m", "pytest", "-q", *others, "."]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600)
-    assert "2 passed" in done.stdout, done.stdout
+    assert "1 failed, 2 passed" in done.stdout, done.stdout
+    # a failure shows the line of the test and the sentence, none of our frames
+    assert "AssertionError: the trajectory differs from the truth of pendulum" in done.stdout
+    assert "testing.py" not in done.stdout
 
 
 @pytest.mark.parametrize("given", [object, 3])

@@ -211,15 +211,47 @@ def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:
 
 
 def test_scenes(proofroll: Proofroll) -> None:
-    """The scenes are listed with every parameter's default, unit and meaning."""
+    """Scenes are listed on one screen by title; one that is named with the default, unit and meaning of parameters."""
     code, out, err = proofroll("scenes")
     assert (code, err) == (0, "")
-    assert "sphere_in_cylinder" in out
-    assert "rolling_resistance" in out
+    assert re.search("^sphere_in_cylinder +Sphere rolling on the inside", out, flags=re.MULTILINE)
+    assert "rolling_resistance" not in out
+    assert out.count("\n") < 40
+    code, out, err = proofroll("scenes", "sphere_in_cylinder")
+    assert (code, err) == (0, "")
+    assert re.search(r"^rolling_resistance +f +0 +m +", out, flags=re.MULTILINE)
+    assert "inclined_plane" not in out
+    code, _, err = proofroll("scenes", "no_such_scene")
+    assert (code, err.count("\n")) == (2, 1)
     code, out, _ = proofroll("scenes", "--json")
     found = {scene["name"]: scene for scene in json.loads(out)}
     assert found["sphere_in_cylinder"]["parameters"]["speed"]["value"] == 4.0
     assert found["sphere_in_cylinder"]["parameters"]["speed"]["unit"] == "m/s"
+
+
+@pytest.mark.parametrize(
+    ("words", "index", "found"),
+    [
+        ("proofroll sce", 1, "scenes"),
+        ("proofroll run pendu", 2, "pendulum"),
+        ("proofroll compare x --engine exu", 4, "exudyn"),
+    ],
+)
+def test_completion(words: str, index: int, found: str) -> None:
+    """A shell completes commands, scenes and engines."""
+    asked = {"_PROOFROLL_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(index)}
+    command = [str(Path(sys.executable).with_name("proofroll"))]
+    done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True, timeout=60)
+    assert done.stdout.split() == [found]
+
+
+def test_a_scene_says_which_step_suits_it(proofroll: Proofroll) -> None:
+    """A run that fails with a longer step than the scene asks for names the engine with that step, which works."""
+    code, _, err = proofroll("run", "andrews_squeezer", "--engine", "exudyn", "--json")
+    assert code == 3
+    found = re.search("this scene asks for steps of 0.0001 s or less: --engine '(.*)'", err)
+    assert found
+    assert proofroll("run", "andrews_squeezer", "--engine", found[1], "--json")[0] == 0
 
 
 def test_engines(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:

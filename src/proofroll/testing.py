@@ -50,6 +50,7 @@ def assert_agrees(
         InputError: something that was given does not exist or makes no sense.
         Missing, Refused: the engine is not installed, or cannot represent the scene.
     """
+    __tracebackhide__ = True  # pytest then shows the line of the test and the sentence, not the frames in here
     if not because.strip():
         raise InputError("because", because, "say why the tolerance is close enough")
     scene = load_scene(scene) if isinstance(scene, str) else scene

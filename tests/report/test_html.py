@@ -100,6 +100,14 @@ def test_nothing_that_others_write_becomes_markup(made: tuple[Outcome, Store], p
     assert "<img src=x" in json.loads(unpack(html, "curves"))["rows"][0][0]["name"]
 
 
+def test_a_comparison_that_varies_nothing(made: tuple[Outcome, Store]) -> None:
+    """Of a scene as it is nothing is said to vary."""
+    for vary, said in (({"speed": [1.0]}, True), ({}, False)):
+        comparison = dataclasses.replace(made[0].comparison, vary=vary)
+        content = report_content([dataclasses.replace(made[0], comparison=comparison)], made[1], COMMAND)
+        assert ("; varied:" in page(content, [point_curves(*made)])) is said
+
+
 def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """An infinite error is null in JSON and a sign on the page."""
     outcome, store = made

@@ -38,7 +38,6 @@ from proofroll.core.errors import InputError, Missing, ProofrollError
 
 app = typer.Typer(
     help="Which multibody engine, formulation and time step can you trust for a scene?",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from proofroll.cli import options
 
@@ -13,16 +15,31 @@ if TYPE_CHECKING:
     from proofroll.files.scene_file import SceneFile
 
 
-def scenes(as_json: options.Json = False) -> None:
-    """List the scenes and the parameters that can be set."""
+def scenes(
+    name: Annotated[
+        str | None, typer.Argument(help="Scene of which all parameters are listed.", autocompletion=options.scenes_like)
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """List the scenes; of one that is named, the parameters that can be set."""
     from proofroll.files.scene_file import read_scene_file, scene_names
 
-    files = {name: read_scene_file(name) for name in scene_names()}
+    files = {scene: read_scene_file(scene) for scene in (scene_names() if name is None else [name])}
     content = [
         {"name": name, "title": file.title, "source": file.source, "parameters": file.parameters}
         for name, file in files.items()
     ]
-    options.show(content, as_json, lambda: _tables(files))
+    options.show(content, as_json, lambda: _titles(files) if name is None else _tables(files))
+
+
+def _titles(files: Mapping[str, SceneFile]) -> Iterator[Table | str]:
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    for name, file in files.items():
+        table.add_row(name, file.title)
+    yield table
+    yield "proofroll scenes NAME lists the parameters of one."
 
 
 def _tables(files: Mapping[str, SceneFile]) -> Iterator[Table | str]:

@@ -26,6 +26,21 @@ if TYPE_CHECKING:
 _SAID_EVERY = 10.0  # seconds between lines of progress where no bar can be shown
 OK, CONTRADICTED, USAGE, ENGINE, INTERRUPTED = 0, 1, 2, 3, 130
 
+
+def scenes_like(incomplete: str) -> list[str]:
+    """Names of scenes that begin so, for the completion of a shell."""
+    from proofroll.files.scene_file import scene_names
+
+    return [name for name in scene_names() if name.startswith(incomplete)]
+
+
+def engines_like(incomplete: str) -> list[str]:
+    """Names of engines that begin so, for the completion of a shell."""
+    from proofroll.core.plugins import engine_names
+
+    return [name for name in engine_names() if name.startswith(incomplete)]
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder for results; what is there is reused.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case again, whatever is stored.")]
@@ -34,8 +49,14 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", help="Run the cases on a Dask cluster: tcp://…, or local:4 for 4 workers here."),
 ]
-Engines = Annotated[list[str] | None, typer.Option("--engine", help="Restrict to an engine; may be repeated.")]
-SceneName = Annotated[str, typer.Argument(help="A scene: its name, a folder with a scene.toml, or a robot file.")]
+Engines = Annotated[
+    list[str] | None,
+    typer.Option("--engine", help="Restrict to an engine; may be repeated.", autocompletion=engines_like),
+]
+SceneName = Annotated[
+    str,
+    typer.Argument(help="A scene: its name, a folder with a scene.toml, or a robot file.", autocompletion=scenes_like),
+]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 
 

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from proofroll.cli import options
 
+if TYPE_CHECKING:
+    from proofroll.running.case import Case
+
 
 def run(
     scene: options.SceneName,
-    engine: Annotated[str, typer.Option(help="truth, or name[key=value,…], e.g. mujoco[formulation=chart,dt=1e-4].")],
+    engine: Annotated[
+        str,
+        typer.Option(
+            help="truth, or name[key=value,…], e.g. mujoco[formulation=chart,dt=1e-4].",
+            autocompletion=options.engines_like,
+        ),
+    ],
     settings: options.Set = None,
     until: Annotated[
         float | None, typer.Option(help="Last time [s]; by default 2, or the scene's duration where that is shorter.")
@@ -92,8 +101,21 @@ def run(
             content = replace(content, trajectory=str(out))
     done = content.status == "done"
     if not done:
-        options.complain(f"{content.engine} {content.status}: {content.message}")
+        options.complain(f"{content.engine} {content.status}: {content.message}{_shorter_step(scene, engine, case)}")
     if as_json or done or content.final:
         options.show(content, as_json, lambda: run_lines(content))
     if not done:
         raise typer.Exit(options.ENGINE)
+
+
+def _shorter_step(scene: str, engine: str, case: Case) -> str:
+    """Which engine with which step to try, where the scene's file names one and this run had a longer one."""
+    from proofroll.core.plugins import parse_engine
+    from proofroll.files.scene_file import read_scene_file
+
+    dt, step = read_scene_file(scene).dt, case.engine.step
+    if dt is None or step is None or step <= dt:
+        return ""
+    spec = parse_engine(engine)
+    shorter = replace(spec, options={**spec.options, "dt": f"{dt:g}"})
+    return f"; this scene asks for steps of {dt:g} s or less: --engine '{shorter}'"

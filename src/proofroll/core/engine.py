@@ -64,7 +64,7 @@ class Settings(Protocol):
 
     @property
     def resolution(self) -> str | None:
-        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [-]; None: a closed form."""
+        """Name of the field that trades speed for accuracy: ``dt`` [s] or ``rtol`` [1]; None: a closed form."""
 
     @property
     def order(self) -> int | None:

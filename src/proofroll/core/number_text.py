@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-from proofroll.core.arrays import FloatArray
+if TYPE_CHECKING:
+    from proofroll.core.arrays import FloatArray
 
 
 def number(value: float | None, digits: int = 2, none: str = "–") -> str:

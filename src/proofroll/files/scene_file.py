@@ -39,6 +39,8 @@ class SceneFile:
         asks: what is wanted besides the motion, e.g. ``orientation``.
         reason: why the scene is there, for a person.
         duration: length of a run that shows what it is about [s].
+        dt: step that is short enough for engines with a fixed one [s]; told where a run with a longer one fails, and
+            taken by a first look.
         tables: all others, which kinds of elements read.
     """
 
@@ -49,6 +51,7 @@ class SceneFile:
     asks: list[str] = field(default_factory=list)
     reason: str = ""
     duration: float | None = None
+    dt: float | None = None
     tables: dict[str, Any] = field(default_factory=dict)
 
 
@@ -193,7 +196,9 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
     file = validated(SceneFile, own, str(path), tables=tables)
-    if file.duration is not None and not 0 < file.duration < math.inf:
-        raise InputError(f"{path}: duration", file.duration, "give a positive, finite time in s")
+    for name in ("duration", "dt"):
+        value = getattr(file, name)
+        if value is not None and not 0 < value < math.inf:
+            raise InputError(f"{path}: {name}", value, "give a positive, finite time in s")
     check_parameters(file.parameters, _units(), path)
     return file

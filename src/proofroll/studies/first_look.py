@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.observable import Role
-from proofroll.core.plugins import engine_names
+from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.several import each_alone, represents
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
-from proofroll.running.asking import described
-from proofroll.running.case import EngineDescription
+from proofroll.running.asking import described, resolve
+from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.axes import Axis, AxisTerm
 
@@ -37,7 +38,8 @@ def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None =
     file, scene = read_scene_file(name), load_scene(name, **parameters)
     duration = file.duration or _UNTIL
     every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
-    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in able(scene, workers)]
+    engines = _stepped(able(scene, workers), file.dt, workers)
+    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in engines]
     if not rows:
         raise InputError("scene", name, _why_none(scene, workers))
     return Comparison(
@@ -51,6 +53,20 @@ def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None =
         bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene))},
         rows=rows,
     )
+
+
+def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) -> list[str]:
+    """The engines, with the step that the scene asks for where their own is longer."""
+    if dt is None:
+        return [*engines]
+    specs = [parse_engine(engine) for engine in engines]
+    found = resolve([(spec.name, spec.options) for spec in specs], workers)
+    return [
+        str(replace(spec, options={**spec.options, "dt": f"{dt:g}"}))
+        if isinstance(facts, EngineFacts) and facts.step is not None and facts.step > dt
+        else engine
+        for engine, spec, facts in zip(engines, specs, found, strict=True)
+    ]
 
 
 def bounds(scene: Scene) -> dict[str, Tolerance]:

@@ -52,7 +52,7 @@ class NumbersApart:
     Attributes:
         quantity, unit: of that observable; empty where nothing differs.
         difference: the largest, in its unit.
-        relative: the same in parts of its size [-].
+        relative: the same in parts of its size [1].
         kind: what that means.
     """
 

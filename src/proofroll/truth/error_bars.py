@@ -48,7 +48,7 @@ def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
     """Gives each variable of ``result`` the attribute ``error_bar`` in its own unit.
 
     It is :data:`SAFETY` times the largest difference to ``check``, of the second route, plus ``floor``: what both may
-    have in common, relative to the size of the variable [-].
+    have in common, relative to the size of the variable [1].
 
     Raises:
         Diverged: a value is not finite, other than the friction needed where nothing presses.

@@ -27,7 +27,7 @@ _SAME = 1e-10  # crests that differ by less, relatively, are the same crest agai
 
 @dataclass(frozen=True)
 class FrictionCurve:
-    """Needed friction |F|/N [-] of rolling without slip.
+    """Needed friction |F|/N [1] of rolling without slip.
 
     Attributes:
         until: last time that is known [s]; earlier than asked for where the normal force vanishes.

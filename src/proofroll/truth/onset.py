@@ -22,11 +22,11 @@ class Onset:
 
     Attributes:
         time: of the first slip [s]; 0: the ball slips from the start; None: not until the end.
-        by_mu: d ln t / d ln μ [-]; None where there is no slip or it comes at once.
-        by_f: d ln t / d ln f [-]; 0 without rolling resistance.
-        edge_below, edge_above: next values of μ at which the time jumps [-]; None: there is none until the end.
-        distance: to the nearer of them, relative to μ [-]; inf where there is none.
-        uncertainty: of μ and f, relative, for which the verdict holds [-].
+        by_mu: d ln t / d ln μ [1]; None where there is no slip or it comes at once.
+        by_f: d ln t / d ln f [1]; 0 without rolling resistance.
+        edge_below, edge_above: next values of μ at which the time jumps [1]; None: there is none until the end.
+        distance: to the nearer of them, relative to μ [1]; inf where there is none.
+        uncertainty: of μ and f, relative, for which the verdict holds [1].
         verdict: ``ill-posed`` where a change within the uncertainty moves the slip to another rise of the needed
             friction, or makes or removes it.
         earliest, latest: of the first slip with μ and f at the corners of their ranges [s]; None: no slip.
@@ -53,7 +53,7 @@ def first_slip(scene: Scene, until: float) -> float | None:
 
 
 def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
-    """The first slip until ``until`` [s], and its conditioning if μ and f have this relative uncertainty [-].
+    """The first slip until ``until`` [s], and its conditioning if μ and f have this relative uncertainty [1].
 
     Raises:
         InputError: ``uncertainty`` is not between 0 and 1.
@@ -94,7 +94,7 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
 
 
 def edge_between(scene: Scene, low: float, high: float, until: float, digits: int = 6) -> float | None:
-    """A value of μ between ``low`` and ``high`` at which the time of the first slip jumps, by bisection [-].
+    """A value of μ between ``low`` and ``high`` at which the time of the first slip jumps, by bisection [1].
 
     The question that is halved is on which rise of the needed friction the slip comes, so the answer does not depend
     on how large the jump is. The result is rounded to ``digits`` decimal places.
@@ -129,7 +129,7 @@ def _changed(body: RollingBall, relative: float, until: float) -> FrictionCurve:
 
 
 def _by_f(body: RollingBall, time: float, until: float) -> float:
-    """Value of f times the derivative of the needed friction by f at a fixed time [-]."""
+    """Value of f times the derivative of the needed friction by f at a fixed time [1]."""
     if not body.contact.rolling_resistance:
         return 0.0
     high, low = (float(_changed(body, step, until)(np.array([time]))[0]) for step in (_STEP, -_STEP))

@@ -47,7 +47,7 @@ def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
 
 
 def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """μ below which the ball falls and above which it never slips, without rolling resistance [-], shape (n,).
+    """μ below which the ball falls and above which it never slips, without rolling resistance [1], shape (n,).
 
     From the closed form on a vertical cylinder with a level start and no spin about the normal; None elsewhere. The
     friction needed is m g (1 - cos νt / (1 + κ)) with κ = J/ma²: at most 12/7 of the weight of a homogeneous ball.

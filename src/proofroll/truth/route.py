@@ -98,7 +98,7 @@ class Route(ABC):
         """The state rolling with the centre's velocity ``v_WB`` [m/s], shape (3,), in place of its own."""
 
     def excess(self, state: FloatArray) -> float:
-        """(needed - available) / (needed + available) of the friction to stick [-]."""
+        """(needed - available) / (needed + available) of the friction to stick [1]."""
         needed, available = self.friction(state)
         return (needed - available) / max(needed + available, np.finfo(float).tiny)
 

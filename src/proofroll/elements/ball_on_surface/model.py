@@ -80,12 +80,12 @@ class Contact:
     Attributes:
         body, surface: names of a ball and of the surface that it touches.
         rolling_resistance: f, distance by which the normal force is shifted forward [m].
-        mu_static: largest |F|/N while sticking [-]; inf: the ball never slips.
-        mu_kinetic: |F|/N while slipping [-].
-        restitution: e: part of its normal velocity with which the ball leaves the wall after an impact [-]; left out:
+        mu_static: largest |F|/N while sticking [1]; inf: the ball never slips.
+        mu_kinetic: |F|/N while slipping [1].
+        restitution: e: part of its normal velocity with which the ball leaves the wall after an impact [1]; left out:
             nothing is said of impacts, and a ball that would land ends what is known.
         tangential_restitution: e_t: the contact point leaves an impact with -e_t times its velocity along the wall, as
-            far as friction allows [-]; 0 stops it there, 1 turns it back whole.
+            far as friction allows [1]; 0 stops it there, 1 turns it back whole.
     """
 
     body: str

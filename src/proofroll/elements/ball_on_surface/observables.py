@@ -94,7 +94,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
 def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """All observables that a run allows, by name; what the engine cannot say is absent.
 
-    Coordinates of the surface as they are; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [-] without time 0, where
+    Coordinates of the surface as they are; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [1] without time 0, where
     the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s], ``force_audit`` [N] and
     ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m]
     is, the way slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 _EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
 _SMALLEST = float(np.finfo(float).tiny)  # what is less is round-off of zero
-_LATER = 0.05  # an engine that slips later than the truth by more than this part is run once more, to the end [-]
+_LATER = 0.05  # an engine that slips later than the truth by more than this part is run once more, to the end [1]
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def onset_study(
         runner: where the cases are run.
         engines: engines with settings; all that can slip if empty.
         until: how long to look [s].
-        uncertainty: relative uncertainty of μ and f for which the verdicts hold [-].
+        uncertainty: relative uncertainty of μ and f for which the verdicts hold [1].
         progress: called with each case that is finished.
 
     Raises:

@@ -67,7 +67,7 @@ class RegimesStudy:
         title, question: for a person.
         scene: name of the scene.
         until: length of each run [s].
-        speed, mu_static: the axes: initial speed [m/s] and static friction [-].
+        speed, mu_static: the axes: initial speed [m/s] and static friction [1].
         rolling_resistance: f [m]; one map for each.
     """
 
@@ -144,7 +144,7 @@ def regime_map(
     Args:
         scene: one ball on one surface; its other parameters are kept.
         speeds: of the centre [m/s], shape (n,).
-        frictions: μs [-], shape (m,).
+        frictions: μs [1], shape (m,).
         until: length of each run [s].
         workers: number of processes; 1 runs in this one.
         progress: called with the number of runs just finished.

@@ -37,7 +37,7 @@ class BallBuilt:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         ball_radius: [m].
         rolling_resistance: f [m]; 0 where nothing of the kind was built. None counts as missing where f > 0.
-        mu_static, mu_kinetic: coefficients of friction [-]; inf where friction has no bound. None counts as missing
+        mu_static, mu_kinetic: coefficients of friction [1]; inf where friction has no bound. None counts as missing
             where friction is bounded.
         gap: distance of the ball from the engine's own wall at time 0 [m].
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).

@@ -62,7 +62,8 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
     world axes, NaN where the attribute ``absent`` says why; ``forces``, ``torques``: the
-    determinate components of all; ``energy`` [J], ``energy_error`` [J], ``drift`` [m].
+    determinate components of all; ``energy`` [J], ``drift`` [m], and
+    ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
     """
     mechanism, determinate = element.mechanism, element.analysis.determinate
     placed = replace(placed, q_WB=_continuous(placed.q_WB, element.start.q_WB[0]))
@@ -103,7 +104,9 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
     wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
     unsure = {UNCERTAIN: wound[0]} if wound else {}
     put("energy", energy, "J", "kinetic and potential energy", **unsure)
-    put("energy_error", energy - energy[0], "J", "energy now minus energy at the start", **unsure)
+    # Where something drives or damps, no law keeps the energy: then it is no error.
+    gained = "energy_error" if element.conservative else "energy_change"
+    put(gained, energy - energy[0], "J", "energy now minus energy at the start", **unsure)
     put("drift", placed.drift(), "m", "how far joints and loops are open")
     return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 

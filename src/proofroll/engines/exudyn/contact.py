@@ -39,7 +39,7 @@ ON_A_PLANE = 10.0
 # The ball slips once it has left the friction zone and is this many times as fast as its edge: at a grazing onset the
 # time steps throw the slip velocity to and fro across the edge itself.
 SURELY = 2.0
-# Part of the natural force [-]: a ball that presses less, of which rolling needs more friction than a grip gives, is
+# Part of the natural force [1]: a ball that presses less, of which rolling needs more friction than a grip gives, is
 # about to leave the wall, where a ball that sticks by whatever friction would leave it hardly later.
 LETTING_GO = 0.01
 # Looked up once: the functions that Exudyn calls ask for them at every iterate and step.
@@ -226,7 +226,7 @@ def _softened(
 ) -> dict[str, Regularised]:
     """What differs at time 0: creep, depth, the bound of friction, and forces in which the contact magnifies round-off.
 
-    At time 0 the ball slips with ``creep`` [m/s] under the normal force ``press`` [N]; ``mu`` [-] and the radius
+    At time 0 the ball slips with ``creep`` [m/s] under the normal force ``press`` [N]; ``mu`` [1] and the radius
     ``hollow`` [m] of the sphere are those that are built.
     """
     a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia

@@ -57,7 +57,7 @@ class KineticFriction:
     """Kinetic friction as it is built, shared with the function that applies it.
 
     Attributes:
-        mu_kinetic: |F|/N [-].
+        mu_kinetic: |F|/N [1].
         direction: unit direction of slip (e2, e3) for the coming step; None: the ball rolls.
         applied: the one with which the present state was computed.
     """

@@ -72,7 +72,7 @@ class Generic(ExudynModel):
             self.integration = SwitchedIntegration(self, body, settings)
 
     def _probe(self, settings: ExudynSettings) -> tuple[FloatArray, float | None, float | None]:
-        """Gravity in the world [m/s²], f [m] and μk [-], from the forces that Exudyn computes without spin."""
+        """Gravity in the world [m/s²], f [m] and μk [1], from the forces that Exudyn computes without spin."""
         data, initial = self.system.systemData, exu.ConfigurationType.Initial
         q, q_t = data.GetODE2Coordinates(initial), data.GetODE2Coordinates_t(initial)
         # Without spin, the only moment is that of the rolling resistance, and the force along the distance is N.

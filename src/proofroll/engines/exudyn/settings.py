@@ -25,16 +25,16 @@ class ExudynSettings:
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
             (undamped, constraints at velocity level); of ``tree`` ``rk44`` or ``rk67``, explicit.
-        spectral_radius: of the generalized-alpha method at infinite frequency [-]; 1 damps nothing. None: the engine's
+        spectral_radius: of the generalized-alpha method at infinite frequency [1]; 1 damps nothing. None: the engine's
             own, 0.9. The trapezoidal rule has no damping and does not look at it.
-        newton_tolerance: relative tolerance of Newton's method [-]; the absolute one is a hundredth of it, which is
+        newton_tolerance: relative tolerance of Newton's method [1]; the absolute one is a hundredth of it, which is
             the engine's own ratio. Explicit integrators have none, and look at neither this nor ``jacobian``.
         jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
         halvings: how often a step is halved where Newton's method fails, before the run ends; ``contact`` only, as the
             following. With 0, and in the other formulations, all steps are dt.
         stiffness: of the contact's normal force [N/m].
         friction_zone: slip velocity up to which friction is proportional to it [m/s].
-        grip: coefficient that stands for unbounded friction [-]; the ball creeps by friction_zone |F| / (grip N).
+        grip: coefficient that stands for unbounded friction [1]; the ball creeps by friction_zone |F| / (grip N).
     """
 
     formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "tree"] = "generic"
@@ -86,7 +86,7 @@ class ExudynSettings:
 
     @property
     def penalty(self) -> tuple[float, float, float]:
-        """Stiffness [N/m], friction zone [m/s] and grip [-] of the contact."""
+        """Stiffness [N/m], friction zone [m/s] and grip [1] of the contact."""
         assert self.stiffness is not None  # see __post_init__, here and below
         assert self.friction_zone is not None
         assert self.grip is not None

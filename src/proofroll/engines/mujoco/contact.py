@@ -48,7 +48,7 @@ def foreseen_normal_force(data: Any, N: float) -> float:
 
 
 def contact_coefficient(model: Any, data: Any, geoms: tuple[int, int]) -> float:
-    """Coefficient of friction of the first contact as MuJoCo combined it [-]; without contact, as it would."""
+    """Coefficient of friction of the first contact as MuJoCo combined it [1]; without contact, as it would."""
     if data.ncon:
         contact = data.contact[0]
         return float(contact.friction[0]) if contact.dim > 1 else 0.0

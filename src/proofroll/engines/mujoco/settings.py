@@ -65,7 +65,7 @@ class MujocoSettings:
             (first number of ``solref``), in steps; None: MuJoCo's default of 0.02 s at every step.
         impedance: constant constraint impedance (``solimp``); 1 would be a rigid contact; None: MuJoCo's default,
             0.9 to 0.95 growing with depth.
-        friction: coefficient that stands for unbounded friction [-]; with less than the scene needs, the ball slips.
+        friction: coefficient that stands for unbounded friction [1]; with less than the scene needs, the ball slips.
             Where the scene bounds friction, its coefficients are taken instead.
         friction_damping: of the slip, in units of 1/dt (``solreffriction`` of a contact pair in its direct format);
             None: as in the normal direction. An Euler step moves the ball with the velocity at its end, along the wall
@@ -151,7 +151,7 @@ class MujocoSettings:
         return self.velocity_lag * self.own_share / (1 - self.own_share)
 
     def friction_coefficients(self, mu: float) -> tuple[float, float, float]:
-        """MuJoCo's coefficients of sliding [-], of turning about the normal [m] and of rolling [m]; 0 where unused."""
+        """MuJoCo's coefficients of sliding [1], of turning about the normal [m] and of rolling [m]; 0 where unused."""
         turning = DEFAULT_TURNING if self.condim >= TURNS else 0.0
         return mu, turning, DEFAULT_ROLLING if self.condim >= ROLLS else 0.0
 

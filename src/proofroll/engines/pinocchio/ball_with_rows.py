@@ -133,7 +133,7 @@ class BallWithRows(ABC):
         """N [N] that the last :meth:`accelerate` left in ``data``."""
 
     def excess(self, data: Any, q: FloatArray, v: FloatArray, mu_static: float) -> tuple[float, float]:
-        """(needed - available) / (needed + available) friction while sticking [-], and N [N].
+        """(needed - available) / (needed + available) friction while sticking [1], and N [N].
 
         Slip begins where the first is positive.
         """

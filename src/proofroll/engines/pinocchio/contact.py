@@ -24,7 +24,7 @@ from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 # Pinocchio's cone needs a number where friction is unbounded. PGS takes any; the iterations of ADMM grow with it.
 UNBOUNDED_FRICTION = {"pgs": 1e6, "admm": 1e2}
-# An impulse nearer to the cone than this is on it [-].
+# An impulse nearer to the cone than this is on it [1].
 _ON_CONE = 1 - 1e-9
 # A normal impulse smaller than this part of gravity's is round-off of the gap: the wall does not press.
 _FAINT = 1e-9
@@ -65,7 +65,7 @@ class ContactSteps:
         solver, tolerance: Pinocchio's solver, and where it stops.
         started: whether a step was made.
         bounded: whether friction is.
-        mu_static, mu_kinetic: what the cone is given [-].
+        mu_static, mu_kinetic: what the cone is given [1].
         q, v: joint configuration and velocity.
         happened: events so far; with unbounded friction, too.
     """

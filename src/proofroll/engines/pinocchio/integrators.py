@@ -31,7 +31,7 @@ class TangentIntegrator(ABC):
         t, q, v: time [s], joint configuration and velocity now.
         turns: whether the orientation of the ball is integrated.
         events: so far; of a ball that cannot slip, that it left the wall.
-        mu_static: largest |F|/N while sticking [-]; None: the rows of rolling hold always.
+        mu_static: largest |F|/N while sticking [1]; None: the rows of rolling hold always.
         sticking: whether the ball sticks now; None where it cannot slip.
     """
 

@@ -35,14 +35,14 @@ class PinocchioSettings:
             ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``contact`` has
             ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions.
         dt: step [s]; None with ``dop853``.
-        rtol: relative tolerance [-] of ``dop853``; None with the others.
+        rtol: relative tolerance [1] of ``dop853``; None with the others.
         orientation: integrate the orientation of the ball; None: if the scene asks for it. Its inertia is the same
             about every axis, so the motion does not depend on it, and without it the fast turning needs no small steps.
             ``contact`` always turns the ball: its spherical joint is part of the state.
             Mechanisms always have it.
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
         solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM); None with the others.
-        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [-]; None with
+        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [1]; None with
             the others.
         proximal: of ``constraint_dynamics``: the term μ that makes dependent rows solvable, taken back by iteration;
             None with the others.

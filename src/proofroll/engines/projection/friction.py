@@ -56,7 +56,7 @@ class Friction:
     Attributes:
         rolling: the ball with both rows active.
         sliding: the ball with none.
-        mu_static, mu_kinetic: coefficients [-].
+        mu_static, mu_kinetic: coefficients [1].
         bounded: whether there is a static cone to leave.
     """
 

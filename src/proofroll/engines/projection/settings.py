@@ -28,7 +28,7 @@ class ProjectionSettings:
         integrator: ``rk4`` with the fixed step ``dt``, ``dop853`` with the tolerance ``rtol``, or ``taylor`` with it:
             the same equations in compiled Taylor series (heyoka), on a cylinder or plane, without bounded friction.
         dt: step of rk4 [s].
-        rtol: relative tolerance of dop853 and of taylor [-].
+        rtol: relative tolerance of dop853 and of taylor [1].
         elimination: remove the violation of the rolling constraints after each step (taylor: after every few); None
             is yes. In ``rotating_frame`` on a surface of constant curvature no step leaves a violation, for there the
             constraints are linear with constant coefficients, but round-off does, and it grows.

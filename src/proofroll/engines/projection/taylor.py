@@ -31,7 +31,7 @@ class TaylorSeries(Series):
         check: Callable[..., None],
         accepted: Renewed,
     ) -> None:
-        """Starts at time 0 in the state x, with the relative tolerance ``rtol`` of a step [-].
+        """Starts at time 0 in the state x, with the relative tolerance ``rtol`` of a step [1].
 
         After each step ``check`` is called with the time [s] and state, and raises Diverged if it is not to be trusted;
         ``accepted`` is the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.

@@ -31,7 +31,7 @@ class ReducedSettings:
         preset: where the other values come from.
         integrator: ``dop853`` (scipy, on any surface) or ``taylor`` (heyoka, compiled, on a cylinder or plane); None
             in ``closed_form``.
-        rtol: relative tolerance of a step [-]; None in ``closed_form``.
+        rtol: relative tolerance of a step [1]; None in ``closed_form``.
     """
 
     formulation: Literal["equations", "closed_form"] = "equations"

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 # Which error bar of the routes belongs to a variable; that of energy and of rates is by what they are made from.
 _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
-    "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy", "drift": "drift",
+    "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
+    "energy_change": "energy", "drift": "drift",
 }  # fmt: skip
 _PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 

@@ -18,6 +18,7 @@ from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
 from proofroll.report.pen import Disc
+from proofroll.running.simulation import simulate
 
 SCENES = ("pendulum", "slider_crank", "bricard", "heavy_top", "andrews_squeezer", "free_body", "gyroscope_cart")
 
@@ -251,3 +252,11 @@ def test_bad_input_is_one_line(tmp_path, old: str, new: str, said: str) -> None:
         load_scene(str(tmp_path))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("scene", "name"), [("pendulum", "energy_error"), ("oscillators", "energy_change")])
+def test_a_change_of_energy_is_an_error_where_a_law_keeps_it(scene: str, name: str) -> None:
+    """What is driven or damped changes its energy, and nothing calls that an error; the truth knows it with a bar."""
+    run = simulate(scene, "projection", until=0.1)
+    assert {"energy_error", "energy_change"} & set(map(str, run.data_vars)) == {name}
+    assert simulate(scene, until=0.1)[name].attrs["error_bar"] > 0

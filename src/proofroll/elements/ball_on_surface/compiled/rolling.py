@@ -37,7 +37,7 @@ class Expressions:
     Attributes:
         state: q, h, v2, v3, ω1.
         swing: k/a [1/m²].
-        A, per_A: (1 + κ)/κ [-] and its inverse.
+        A, per_A: (1 + κ)/κ [1] and its inverse.
         g2, g3: gravity along the surface [m/s²].
         b2, b3: drive [m/s²].
         N: normal force over mass [m/s²].
@@ -136,7 +136,7 @@ class CompiledEquations:
 
 @lru_cache(maxsize=16)
 def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquations:
-    """The equations compiled for a tolerance of each step, relative to the state [-]; it also decides the order.
+    """The equations compiled for a tolerance of each step, relative to the state [1]; it also decides the order.
 
     Forces are b2/A, b3/A and N: what friction must hold, and the press.
     """

@@ -136,7 +136,7 @@ def _drawn(maps: Sequence[xr.Dataset], size: tuple[float, float]) -> Figure:
             xlim=(float(item["speed"].min()), float(item["speed"].max())),
             ylim=(float(item["mu_static"].min()), float(item["mu_static"].max())),
             xlabel="initial speed [m/s]",
-            ylabel="static friction [-]",
+            ylabel="static friction [1]",
             title=f"rolling resistance f = {item.attrs['rolling_resistance']:g} m, {item.attrs['until']:g} s",
         )
     handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
