@@ -9,7 +9,6 @@ from pathlib import Path
 
 from proofroll.cli import options
 from proofroll.core.announced import announced
-from proofroll.core.element_abilities import TellsStart
 from proofroll.core.errors import InputError, choices, require_known
 from proofroll.core.number_text import counted
 
@@ -105,6 +104,7 @@ def checked(name: str) -> SoundFile:
 
 
 def _scene(name: str) -> SoundFile:
+    from proofroll.core.element_abilities import TellsStart
     from proofroll.files.scene_file import load_scene, read_scene_file
 
     file, scene = read_scene_file(name), load_scene(name)
