@@ -26,12 +26,14 @@ class Event:
         kind: as its kind of element names it, e.g. ``slip``.
         time: best value [s].
         time_low, time_high: the event lies between these [s].
+        name: of what it happens to, where an element has several; may be empty.
     """
 
     kind: str
     time: float
     time_low: float
     time_high: float
+    name: str = ""
 
 
 def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
@@ -41,8 +43,14 @@ def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
         "event_low": ("not before", [event.time_low for event in events]),
         "event_high": ("not after", [event.time_high for event in events]),
     }
-    kinds = np.array([event.kind for event in events], dtype=str) if events else np.zeros(0, dtype="<U1")
-    return {"event_kind": Variable(("event",), kinds, {"units": "1", "long_name": "what happened"})} | {
+    texts = {
+        "event_kind": ("what happened", [event.kind for event in events]),
+        "event_name": ("to what", [event.name for event in events]),
+    }
+    return {
+        name: Variable(("event",), np.array(values or np.zeros(0), dtype=str), {"units": "1", "long_name": meaning})
+        for name, (meaning, values) in texts.items()
+    } | {
         name: Variable(("event",), np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
         for name, (meaning, values) in columns.items()
     }
@@ -57,5 +65,7 @@ def events_of(dataset: xr.Dataset | Columns) -> list[Event]:
     """The events that :func:`with_events` stored; none if there are no such variables."""
     if "event_kind" not in dataset:
         return []
-    columns = (dataset[f"event_{name}"].to_numpy().tolist() for name in ("kind", "time", "low", "high"))
-    return [Event(*row) for row in zip(*columns, strict=True)]
+    columns = [dataset[f"event_{name}"].to_numpy().tolist() for name in ("kind", "time", "low", "high")]
+    named = "event_name" in dataset  # files of earlier runs have none
+    names = dataset["event_name"].to_numpy().tolist() if named else [""] * len(columns[0])
+    return [Event(*row) for row in zip(*columns, names, strict=True)]

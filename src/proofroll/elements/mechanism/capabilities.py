@@ -31,6 +31,8 @@ class MechanismCapability(StrEnum):
     JOINT_SPRINGS = "springs, dampers and drives of joints"
     JOINT_FRICTION = "dry friction in joints"
     ARMATURE = "inertia of drives"
+    STOPS = "stops of joints"
+    REBOUNDS = "rebounds from stops (restitution)"
 
 
 ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)
@@ -53,6 +55,10 @@ def required(mechanism: Mechanism) -> frozenset[str]:
             needs.add(capability.JOINT_FRICTION)
         if joint.armature:
             needs.add(capability.ARMATURE)
+        if joint.limits:
+            needs.add(capability.STOPS)
+        if joint.restitution:
+            needs.add(capability.REBOUNDS)
     return frozenset(needs)
 
 

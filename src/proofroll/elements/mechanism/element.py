@@ -158,7 +158,7 @@ class MechanismElement:
     @cached_property
     def conservative(self) -> bool:
         """Whether nothing in it drives or damps."""
-        laws = [(j.damping, j.friction, j.torque) for j in self.mechanism.joints]
+        laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.mechanism.joints]
         return not any(any(law) for law in laws) and not any(spring.damping for spring in self.mechanism.springs)
 
     @cached_property

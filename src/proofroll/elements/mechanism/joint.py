@@ -123,7 +123,8 @@ class Joint:
         friction: dry friction.
         torque: constant drive.
         armature: inertia of the drive, added to the coordinate's own.
-        limits: least and greatest coordinate of a revolute or prismatic joint, or None.
+        limits: least and greatest coordinate of a revolute or prismatic joint, where stops hold it, or None.
+        restitution: speed after an impact on a stop over the speed before it, from 0 to 1.
         dependent: q0 and v0 are to be found from the loops, with q0 as a guess; no joint of a mechanism that has
             started is.
     """
@@ -146,6 +147,7 @@ class Joint:
     torque: float = field(default=0.0, metadata=_UNITS["effort"])
     armature: float = field(default=0.0, metadata=_UNITS["armature"])
     limits: tuple[float, float] | None = field(default=None, metadata=_UNITS["coordinate"])
+    restitution: float = field(default=0.0, metadata=RATIO)
     dependent: bool = False
 
     def __post_init__(self) -> None:
@@ -179,6 +181,18 @@ class Joint:
                     f"{place}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
                 )
             checks.assign(self, limits=(low, high))
+            if not low <= self.q0[0] <= high:
+                advice = f"the joint starts beyond a stop; its limits are {low:g} and {high:g}"
+                raise InputError(f"{place}.q0", self.q0[0], advice)
+        self._check_restitution(place)
+
+    def _check_restitution(self, place: str) -> None:
+        value = checks.number(f"{place}.restitution", self.restitution, at_least=0)
+        if value > 1:
+            raise InputError(f"{place}.restitution", value, "no impact returns more than it takes; give 0 to 1")
+        if value and self.limits is None:
+            raise InputError(f"{place}.restitution", value, "there is no stop without limits; add them or leave it out")
+        checks.assign(self, restitution=value)
 
     def _check_start(self, place: str) -> None:
         zero = [0.0] * self.nq

@@ -8,7 +8,7 @@ spherical and free joints are states in the child's axes, which keeps digits whe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,11 +16,19 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.analysis import RowSign, analysed, reactions
+from proofroll.elements.mechanism.analysis import RANK, RowSign, analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
+from proofroll.elements.mechanism.switches import (
+    Mode,
+    complementary,
+    held_by,
+    load_of,
+    margin,
+    switched_joints,
+)
 
 _NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
 _EQUAL_STEP = 2e-3  # s
@@ -36,6 +44,8 @@ class Solution:
         multipliers: of the loops' rows, the smallest in norm where they are redundant.
         motion, rows: kinematics.
         split: (L⁻ᵀV, Uᵀ/S) of the locked directions: −product with a residual is the correction that removes it.
+        C: rows of the loops, then of what holds, (rows, nv).
+        holding: forces of what holds switched joints along their coordinates, in the order of these.
     """
 
     acceleration: Array
@@ -43,6 +53,8 @@ class Solution:
     motion: BodyMotion
     rows: Rows
     split: tuple[Array, Array] | None
+    C: Array
+    holding: Array
 
 
 class JointCoordinates:
@@ -54,8 +66,7 @@ class JointCoordinates:
     """
 
     def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
-        self._dry = next((joint.name for joint in mechanism.joints if joint.friction), None)
-        self.mechanism, self.tree = mechanism, Tree(mechanism)
+        self.mechanism, self.tree, self.switched = mechanism, Tree(mechanism), switched_joints(mechanism)
         self.rank = analysed(mechanism).rank if rank is None else rank
         self._mass = np.array([body.mass for body in mechanism.bodies])
         self._com = np.array([body.com for body in mechanism.bodies])
@@ -68,15 +79,20 @@ class JointCoordinates:
         laws = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
         self._springs = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in laws if joint.stiffness]
 
-    def solve(self, q: Array, v: Array) -> Solution:
+    def solve(self, q: Array, v: Array, mode: Mode | None = None, load: Array | None = None) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv).
 
+        Args:
+            q: coordinates.
+            v: velocities.
+            mode: of the switched joints; None: what the forces make of it, see :meth:`decided`.
+            load: further forces along the velocities, (nv).
+
         Raises:
-            Refused: the mechanism has dry friction, whose switching this route does not follow.
             Diverged: a velocity moves nothing with inertia in this pose.
         """
-        if self._dry is not None:
-            raise Refused(f"dry friction in joint {self._dry} switches; no route follows it (of robots: friction=0)")
+        if mode is None:
+            mode = self.decided(q, v)[0] if self.switched else ()
         motion = self.tree.at(q, v)
         J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
@@ -84,23 +100,103 @@ class JointCoordinates:
             b[at_v] -= stiffness * (q[at_q] - rest)
         for i, arm, force in self._spring_forces(motion):
             b += np.concatenate([force, cross(arm, force)]) @ motion.J[i]
+        if self.switched:
+            b += load_of(self.switched, mode, len(v))
+        if load is not None:
+            b += load
         rows = self.tree.loop_rows(motion)
+        C, bias, rank = rows.C, rows.bias, self.rank
+        if held := [self.switched[number].velocity for number in held_by(mode)]:
+            C, bias, rank = np.vstack([C, np.eye(len(v))[held]]), np.append(bias, np.zeros(len(held))), rank + len(held)
         try:
             into = np.linalg.inv(np.linalg.cholesky(M)).T  # M⁻¹ = into intoᵀ
         except np.linalg.LinAlgError:
             raise Diverged("the mass matrix is singular, as where joints of massless bodies line up") from None
         free = into.T @ b
-        if not self.rank:
-            return Solution(into @ free, np.zeros(0), motion, rows, None)
-        U, S, Vt = np.linalg.svd(rows.C @ into, full_matrices=False)
-        locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
-        normal = -back @ rows.bias - locked @ free
+        if not rank:
+            return Solution(into @ free, np.zeros(0), motion, rows, None, C, np.zeros(0))
+        U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
+        if held and (rank > len(S) or S[rank - 1] < RANK * S[0]):
+            raise Refused("joints that hold lock more than can move: their forces are not determinate")
+        locked, back = Vt[:rank], U[:, :rank].T / S[:rank, None]
+        normal = -back @ bias - locked @ free
         locked_into = into @ locked.T
-        return Solution(into @ free + locked_into @ normal, back.T @ normal, motion, rows, (locked_into, back))
+        multipliers = back.T @ normal
+        loops = len(rows.residual)
+        return Solution(
+            into @ free + locked_into @ normal,
+            multipliers[:loops],
+            motion,
+            rows,
+            (locked_into, back),
+            C,
+            multipliers[loops:],
+        )
 
     def rows(self, q: Array) -> Rows:
         """Constraints of the loops for coordinates (nq), at rest."""
         return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
+
+    def decided(self, q: Array, v: Array) -> tuple[Mode, float]:
+        """Mode of the switched joints that follows from the forces, and how far from another one it is, relative.
+
+        A joint at rest is held where the force that this needs lies between its bounds; all at once, for they feel
+        each other.
+        """
+        joints = self.switched
+        mode = [
+            joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
+            for joint in joints
+        ]
+        still = held_by(tuple(mode))
+        if not still:
+            return tuple(mode), np.inf
+        begun = tuple("free" if number in still else own for number, own in enumerate(mode))
+        at = [joints[number].velocity for number in still]
+        free, response = self._responses(q, v, begun, at)
+        low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
+        state, force, acceleration = complementary(free[at], response[at], low, high)
+        for number, side in zip(still, state, strict=True):
+            if side:
+                mode[number] = joints[number].moving(-side)
+        return tuple(mode), margin(free[at], response[at], low, high, force, acceleration)
+
+    def struck(self, q: Array, v: Array, hit: Sequence[int]) -> tuple[Array, float]:
+        """Velocities after an impact of the switched joints ``hit`` on their stops, by Newton's law of impact.
+
+        Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
+
+        Returns:
+            The velocities, and how far from another outcome it is, relative.
+
+        Raises:
+            Refused: several stops share the impact and one of them returns speed, so that its order decides.
+        """
+        joints = self.switched
+        resting = [
+            k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}
+        ]
+        at_stop = sorted({*hit, *resting})
+        at = [joints[number].velocity for number in at_stop]
+        _, response = self._responses(q, v, tuple("free" for _ in joints), at)
+        returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[at]
+        below = np.array([q[joints[k].coordinate] <= joints[k].low for k in at_stop])
+        low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
+        _, impulse, left = complementary(returned, response[at], low, high)
+        if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
+            raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+        v = v + response @ impulse
+        for number, rest in zip(at_stop, left, strict=True):
+            joint = joints[number]
+            if not rest and not joint.restitution:
+                v[joint.velocity] = 0.0
+        return v, margin(returned, response[at], low, high, impulse, left)
+
+    def _responses(self, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
+        """Accelerations without further forces, (nv), and what unit forces along velocities add, (nv, forces)."""
+        free = self.solve(q, v, mode).acceleration
+        unit = np.eye(self.mechanism.nv)
+        return free, np.array([self.solve(q, v, mode, unit[k]).acceleration - free for k in at]).T
 
     def run(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853.
@@ -150,10 +246,10 @@ class JointCoordinates:
             ]
         )
 
-    def rate(self, _: float, y: Array) -> Array:
+    def rate(self, _: float, y: Array, mode: Mode | None = None) -> Array:
         """Right-hand side for the state (q, v)."""
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
-        return np.concatenate([self.tree.rate(q, v), self.solve(q, v).acceleration])
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode).acceleration])
 
     def run_rk4(self, times: Array) -> Record:
         """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most 2 ms.
@@ -177,21 +273,22 @@ class JointCoordinates:
             now = time
             yield y
 
-    def eliminated(self, y: Array) -> Array:
-        """The state with violations of the loops and of unit quaternions removed."""
+    def eliminated(self, y: Array, mode: Mode | None = None) -> Array:
+        """The state with violations of the loops, of what holds and of unit quaternions removed."""
         nq = self.mechanism.nq
         q, v = self.tree.normalised(y[:nq]), y[nq:]
-        if self.rank:
-            found = self.solve(q, v)
-            assert found.split is not None
-            into, back = found.split
-            v = v - into @ (back @ (found.rows.C @ v))
-            q = self.tree.moved(q, -into @ (back @ found.rows.residual))
+        if self.rank or self.switched:
+            found = self.solve(q, v, mode)
+            if found.split is not None:
+                into, back = found.split
+                v = v - into @ (back @ (found.C @ v))
+                residual = np.append(found.rows.residual, np.zeros(len(found.C) - len(found.rows.residual)))
+                q = self.tree.moved(q, -into @ (back @ residual))
         return np.concatenate([q, v])
 
-    def sample(self, q: Array, v: Array) -> dict[str, Any]:
+    def sample(self, q: Array, v: Array, mode: Mode | None = None) -> dict[str, Any]:
         """What a :class:`~proofroll.elements.mechanism.record.Record` holds at one time."""
-        found = self.solve(q, v)
+        found = self.solve(q, v, mode)
         motion, rows, mechanism = found.motion, found.rows, self.mechanism
         n = len(mechanism.bodies)
         wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, self._needed(found)))

@@ -36,13 +36,14 @@ PROVIDES = (
     ALL_JOINTS
     | FORCES
     | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT}
-    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE}
+    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE, _CAPABILITY.STOPS}
 )
 _NO_ROWS = "MuJoCo's equality constraints hold points or whole frames together, and no single angle or direction"
 LACKING: Mapping[str, str] = {
     _CAPABILITY.PRISMATIC_LOOP: _NO_ROWS,
     _CAPABILITY.UNIVERSAL_LOOP: _NO_ROWS,
     _CAPABILITY.PLANAR_LOOP: _NO_ROWS,
+    _CAPABILITY.REBOUNDS: "MuJoCo's limits have no restitution but that of a spring of their own",
 }
 
 

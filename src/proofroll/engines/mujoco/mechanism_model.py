@@ -39,6 +39,10 @@ def parts_of(joint: Joint) -> tuple[tuple[Any, int], ...]:
     return ((_FREE, 2),) if joint.kind == "free" and joint.parent == WORLD else PARTS[joint.kind]
 
 
+# s; MuJoCo lifts a shorter time constant to two steps.
+_SHORTEST = 1e-9
+
+
 def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     """The MjSpec; joint k of the mechanism has MuJoCo's joints ``k.0``, ``k.1`` …, a site ``k`` and two sensors."""
     spec = mujoco.MjSpec()
@@ -51,7 +55,7 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     bodies = {WORLD: spec.worldbody}
     data = {body.name: body for body in mechanism.bodies}
     for number, joint in enumerate(mechanism.joints):
-        bodies[joint.child] = _add_body(spec, bodies[joint.parent], number, joint, data[joint.child])
+        bodies[joint.child] = _add_body(spec, bodies[joint.parent], number, joint, data[joint.child], settings)
     for number, loop in enumerate(mechanism.loops):
         _add_loop(spec, bodies, number, loop, held_points(mechanism, loop), settings)
     for number, spring in enumerate(mechanism.springs):
@@ -64,7 +68,7 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     return spec
 
 
-def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> Any:
+def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, settings: MujocoSettings) -> Any:
     turned = joint.parent_frame @ joint.child_frame.T
     place = np.array(joint.position) - turned @ joint.child_position
     added = parent.add_body(name=body.name, pos=place, quat=to_quaternion(turned))
@@ -84,6 +88,7 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> 
         _set_law(made, joint.stiffness, joint.damping)
         made.springref = joint.rest
         made.frictionloss, made.armature = joint.friction, joint.armature
+        _set_switches(made, joint, settings)
     added.add_site(name=f"{number}", pos=joint.child_position)
     for kind in ("FORCE", "TORQUE"):
         spec.add_sensor(
@@ -93,6 +98,22 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body) -> 
             objname=f"{number}",
         )
     return added
+
+
+def _set_switches(made: Any, joint: Joint, settings: MujocoSettings) -> None:
+    """Stops, and how soft these and dry friction are.
+
+    The row of dry friction asks for the acceleration -B v, B = 2/(dmax time constant). A joint slower than its free
+    acceleration over B is pushed along its motion. The shortest time constant makes B the inverse of the step.
+    """
+    if joint.limits is not None:
+        made.limited, made.range = True, joint.limits
+        if settings.time_constant is not None:
+            made.solref_limit = (settings.contact_time, 1.0)
+    if settings.time_constant is not None:
+        made.solref_friction = (_SHORTEST, 1.0)
+    if settings.impedance is not None:
+        made.solimp_limit = made.solimp_friction = (*settings.impedances, 1e-3, 0.5, 2.0)
 
 
 def _set_law(item: Any, stiffness: float, damping: float) -> None:

@@ -166,7 +166,7 @@ def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     if settings.formulation != "joints":
         return {BallCapability.ROLLING_RESISTANCE: 2, BallCapability.BOUNDED_FRICTION: 1}
     turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
-    return turning | dict.fromkeys((*ALL_LOOPS, MechanismCapability.JOINT_FRICTION), 1)
+    return turning | dict.fromkeys((*ALL_LOOPS, MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS), 1)
 
 
 def check(settings: MujocoSettings, *, bounded: bool) -> None:

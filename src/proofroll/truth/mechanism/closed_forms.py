@@ -43,7 +43,8 @@ class ClosedForm:
 
 def closed_form(mechanism: Mechanism) -> ClosedForm | None:
     """The closed form of a mechanism's motion, or None where none is known here."""
-    plain = not any(joint.friction or joint.armature for joint in mechanism.joints) and not mechanism.springs
+    switched = any(joint.friction or joint.armature or joint.limits for joint in mechanism.joints)
+    plain = not switched and not mechanism.springs
     if not plain:
         return None
     for recognised in (_oscillators, _swinging, _free_body, _heavy_top):

@@ -8,6 +8,7 @@ heyoka is absent.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +25,7 @@ from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
     ConstrainedEquations,
     MaximalEquations,
+    Switched,
 )
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 from proofroll.truth.mechanism.rolling_rows import RollingContact
@@ -50,13 +52,23 @@ class NumericEquations:
 
     def __init__(self, equations: MaximalEquations) -> None:
         self.equations = equations
+        self._switched: Switched | None = None
         mass = equations.mass_matrix.copy()
         mass[equations.light, equations.light] += max(equations.usual)  # only the scale of rows hangs on it
         self._inverse_root = np.linalg.inv(np.linalg.cholesky(mass)).T
-        start = self.equations.start()
-        C = self._matrix(self.equations.at(start.tolist()).rows)
+        self.rank = self._rank(self.equations.start())
+
+    def switched(self, state: Array, switched: Switched) -> NumericEquations:
+        """The same equations while joints hold or push so; their rank is that at ``state``."""
+        found = copy(self)
+        found._switched = switched
+        found.rank = found._rank(state)
+        return found
+
+    def _rank(self, state: Array) -> int:
+        C = self._matrix(self.equations.at(state.tolist(), switched=self._switched).rows)
         values = np.linalg.svd(C @ self._inverse_root, compute_uv=False) if C.size else np.zeros(0)
-        self.rank = int((values > RANK * values.max(initial=0.0)).sum())
+        return int((values > RANK * values.max(initial=0.0)).sum())
 
     def independent_rows(self) -> list[int]:
         """Numbers of as many rows as the rank, the most independent ones at the start."""
@@ -67,15 +79,12 @@ class NumericEquations:
 
     def solve(self, state: Array) -> Solved:
         """Accelerations and multipliers, the smallest where rows depend on each other."""
-        found = self.equations.at(state.tolist())
-        C, half, force = self._matrix(found.rows), self._inverse_root, np.array(found.force, dtype=float)
-        if added := [*found.drives, *found.holders]:
-            G = self._matrix([drive.row for drive in added])
-            inertia = np.array([drive.inertia for drive in added])
-            half = np.linalg.inv(np.linalg.cholesky(self.equations.mass_matrix + (G.T * inertia) @ G)).T
-            force = force - G.T @ (inertia * np.array([drive.row.bias for drive in added], dtype=float))
+        found = self.equations.at(state.tolist(), switched=self._switched)
+        C, (half, force) = self._matrix(found.rows), self._driven(found)
         free = half.T @ force
         residual = np.array([row.residual for row in found.rows], dtype=float)
+        if self._switched is not None and self._switched.held:
+            residual[-len(self._switched.held) :] = 0.0  # joints are held where they are, not at zero
         if not self.rank:
             return Solved(
                 found, half @ free, np.zeros(len(C)), C, residual, np.zeros((len(half), 0)), np.zeros((0, len(C)))
@@ -85,6 +94,42 @@ class NumericEquations:
         normal = -back @ np.array([row.bias for row in found.rows], dtype=float) - locked @ free
         into = half @ locked.T
         return Solved(found, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
+
+    def _driven(self, found: ConstrainedEquations) -> tuple[Array, Array]:
+        """H with M⁻¹ = H Hᵀ, and the forces, with the armature of joints in both."""
+        half, force = self._inverse_root, np.array(found.force, dtype=float)
+        if added := [*found.drives, *found.holders]:
+            G = self._matrix([drive.row for drive in added])
+            inertia = np.array([drive.inertia for drive in added])
+            half = np.linalg.inv(np.linalg.cholesky(self.equations.mass_matrix + (G.T * inertia) @ G)).T
+            force = force - G.T @ (inertia * np.array([drive.row.bias for drive in added], dtype=float))
+        return half, force
+
+    def struck(self, state: Array, held: Sequence[int], after: Sequence[float]) -> tuple[Array, Array]:
+        """Velocities u after an impact that gives joints these speeds along their coordinates, and its impulses there.
+
+        Args:
+            state: before it.
+            held: numbers of the joints.
+            after: m/s or rad/s.
+        """
+        found = self.equations.at(state.tolist(), switched=Switched(tuple(held)))
+        A, (half, _) = self._matrix(found.rows), self._driven(found)
+        e = self.equations
+        u = state[e.nx : e.nx + e.nu]
+        target = np.append(np.zeros(len(A) - len(held)), after)
+        inverse = np.linalg.pinv(A @ half, RANK)
+        change = inverse @ (target - A @ u)
+        return u + half @ change, (inverse.T @ change)[len(A) - len(held) :]
+
+    def along(self, state: Array, joints: Sequence[int]) -> tuple[Array, Array]:
+        """Coordinates and rates of joints with one coordinate, rad or m and per s; angles are those that are kept."""
+        e = self.equations
+        rows = e.rate_rows(state.tolist(), joints)
+        rates = self._matrix(rows) @ state[e.nx : e.nx + e.nu]
+        kept = {number: state[e.nx + e.nu + place] for place, (number, _) in enumerate(e.angles)}
+        places = [kept.get(number, float(row.residual)) for number, row in zip(joints, rows, strict=True)]
+        return np.array(places, dtype=float), np.asarray(rates, dtype=float)
 
     def normalised(self, state: Array) -> Array:
         """The state with quaternions of unit length."""
@@ -202,17 +247,20 @@ class MaximalCoordinates:
         """Where this route places everything at time 0."""
         return self.recorded(np.zeros(1), self.lean.equations.start()[None])
 
-    def recorded(self, times: Array, states: Array) -> Record:
-        """What the states mean; reactions come from the complete rows of all bodies."""
-        found = gathered(times, [self._sample(self.lean.normalised(state)) for state in states])
+    def recorded(self, times: Array, states: Array, switched: Sequence[Switched] | None = None) -> Record:
+        """What the states mean, with what switched joints did there; reactions come from the complete rows."""
+        modes = [None] * len(states) if switched is None else switched
+        pairs = zip(states, modes, strict=True)
+        found = gathered(times, [self._sample(self.lean.normalised(state), mode) for state, mode in pairs])
         q, v = found.placed(self.mechanism).of_tree()
         return replace(found, q=q, v=v)
 
-    def _sample(self, state: Array) -> dict[str, Any]:
+    def _sample(self, state: Array, switched: Switched | None = None) -> dict[str, Any]:
         lean = self.lean.equations
         views = lean.at(state.tolist()).views
         whole = self._complete(views, state[lean.nx + lean.nu :])
-        found = self._whole.solve(whole)
+        equations = self._whole if switched is None else self._whole.switched(whole, switched)
+        found = equations.solve(whole)
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
         n = len(self.mechanism.bodies)
         arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]

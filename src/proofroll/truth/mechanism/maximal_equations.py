@@ -14,7 +14,6 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from proofroll.core.arrays import slices
-from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.checks import WORLD
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -47,6 +46,18 @@ class Drive(NamedTuple):
     inertia: float
 
 
+class Switched(NamedTuple):
+    """What joints with dry friction or stops do at present.
+
+    Attributes:
+        held: numbers of the joints whose coordinates do not move.
+        push: number of a joint -> further force along its coordinate, N or N m.
+    """
+
+    held: tuple[int, ...] = ()
+    push: Mapping[int, float] = {}
+
+
 @dataclass(frozen=True)
 class ConstrainedEquations:
     """M u̇ = force + Cᵀλ, C u̇ + bias = 0, and the rates of coordinates and of angles that springs remember.
@@ -70,7 +81,7 @@ class MaximalEquations:
     """The mechanism as bodies, connections and springs.
 
     Args:
-        mechanism: any without dry friction.
+        mechanism: any.
         allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
         rolling: which of its bodies, free ones without joints of their own, are balls that roll on a wall.
 
@@ -79,10 +90,6 @@ class MaximalEquations:
     """
 
     def __init__(self, mechanism: Mechanism, allow_planar: bool, rolling: Sequence[RollingContact] = ()) -> None:
-        for joint in mechanism.joints:
-            if joint.friction:
-                said = "switches; no route follows it (of robots: friction=0)"
-                raise Refused(f"dry friction in joint {joint.name} {said}")
         self.mechanism, self.bodies = mechanism, made_bodies(mechanism, allow_planar)
         self.x_slices = slices(body.nx for body in self.bodies)
         self.u_slices = slices(body.nu for body in self.bodies)
@@ -114,7 +121,7 @@ class MaximalEquations:
         self.angles = [
             (k, n)
             for k, joint in enumerate(mechanism.joints)
-            if joint.stiffness and joint.kind in {"revolute", "universal"}
+            if (joint.stiffness or joint.limits) and joint.kind in {"revolute", "universal"}
             for n in range(joint.nq)
         ]
 
@@ -128,14 +135,16 @@ class MaximalEquations:
         angles = [self.mechanism.joints[k].q0[n] for k, n in self.angles]
         return np.array([s for x, _ in starts for s in x] + [s for _, u in starts for s in u] + angles)
 
-    def at(self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS) -> ConstrainedEquations:
-        """The equations for a state as :meth:`start` gives it, of any scalars; quaternions of unit length."""
+    def at(
+        self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS, switched: Switched | None = None
+    ) -> ConstrainedEquations:
+        """The equations for a state as :meth:`start` gives it, of any scalars; quaternions of unit length.
+
+        Rows of ``switched`` joints that hold come last.
+        """
+        switched = switched or Switched()
         x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
-        views = [
-            body.view(x[at_x], u[at_u], functions)
-            for body, at_x, at_u in zip(self.bodies, self.x_slices, self.u_slices, strict=True)
-        ]
-        views.append(GROUND)
+        views = self._views(state, functions)
         force: list[Scalar] = []
         rate: list[Scalar] = []
         for body, at_x, at_u, view in zip(self.bodies, self.x_slices, self.u_slices, views, strict=False):
@@ -149,7 +158,7 @@ class MaximalEquations:
             rows += made.of(number)
             if number < len(self.mechanism.joints):
                 own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
-                law, rates = self._law(number, connection, views, own, force)
+                law, rates = self._law(number, connection, views, own, force, switched.push.get(number, 0.0))
                 laws.append(law)
                 angle_rate += rates
         for spring, (a, place_a, b, place_b) in zip(self.mechanism.springs, self._ends, strict=True):
@@ -162,6 +171,7 @@ class MaximalEquations:
                 pull = add(pull, mul(spring.damping, dot(slide, d) / (length * length)))
             self._apply(force, views, a, scaled(pull, d), arm_a)
             self._apply(force, views, b, scaled(-1.0, scaled(pull, d)), arm_b)
+        rows += [made.of_rate(number, self.mechanism.joints[number].kind) for number in switched.held]
         drives = [
             Drive(made.of_rate(number, joint.kind), float(joint.armature))
             for number, joint in enumerate(self.mechanism.joints)
@@ -173,6 +183,22 @@ class MaximalEquations:
             if self._light & {self.connections[row.connection].a, self.connections[row.connection].b}
         ]
         return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, drives, holders)
+
+    def rate_rows(self, state: Sequence[Scalar], joints: Sequence[int]) -> list[ConstraintRow]:
+        """Rates of revolute and prismatic joints as rows; of a prismatic one the residual is the coordinate."""
+        made = ConstraintRows(
+            self.bodies, self.u_slices, self.connections, self._rolling, self._views(state, FUNCTIONS)
+        )
+        return [made.of_rate(number, self.mechanism.joints[number].kind) for number in joints]
+
+    def _views(self, state: Sequence[Scalar], functions: Mapping[str, Any]) -> list[BodyInScalars]:
+        """All bodies, the ground last."""
+        x, u = state[: self.nx], state[self.nx : self.nx + self.nu]
+        views = [
+            body.view(x[at_x], u[at_u], functions)
+            for body, at_x, at_u in zip(self.bodies, self.x_slices, self.u_slices, strict=True)
+        ]
+        return [*views, GROUND]
 
     def _connection(
         self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
@@ -202,14 +228,20 @@ class MaximalEquations:
             force[place] = add(force[place], entry)
 
     def _law(
-        self, number: int, c: Connection, views: list[BodyInScalars], angles: list[Scalar], force: list[Scalar]
+        self,
+        number: int,
+        c: Connection,
+        views: list[BodyInScalars],
+        angles: list[Scalar],
+        force: list[Scalar],
+        further: float,
     ) -> tuple[tuple[list[Scalar], list[Scalar]], list[Scalar]]:
         """Force and moment of a joint's own spring, damper and drive on its child, added to the forces; angle rates."""
         joint, a, b = self.mechanism.joints[number], views[c.a], views[c.b]
         push: list[Scalar] = [0.0, 0.0, 0.0]
         moment: list[Scalar] = [0.0, 0.0, 0.0]
         rates: list[Scalar] = []
-        if not (joint.stiffness or joint.damping or joint.torque):
+        if not (joint.stiffness or joint.damping or joint.torque or further or angles):
             return (push, moment), rates
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
@@ -219,15 +251,15 @@ class MaximalEquations:
             moment = scaled(-joint.damping, turning)
         elif joint.kind == "prismatic":
             slide = minus(minus(speed_at(b, arm_b), speed_at(a, arm_a)), cross(a.w, d))
-            push = scaled(_along(joint, dot(A[2], d), dot(A[2], slide)), A[2])
+            push = scaled(add(_along(joint, dot(A[2], d), dot(A[2], slide)), further), A[2])
         else:
             axes = [A[2]] if joint.kind == "revolute" else [A[2], B[0]]
             speeds = [dot(axis, turning) for axis in axes]
-            if joint.stiffness:
+            if angles:
                 rates = speeds
             for place, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
                 angle = angles[place] if joint.stiffness else 0.0
-                moment = plus(moment, scaled(_along(joint, angle, speed), axis))
+                moment = plus(moment, scaled(add(_along(joint, angle, speed), further), axis))
         self._apply(force, views, c.b, push, arm_b, moment)
         self._apply(force, views, c.a, scaled(-1.0, push), plus(arm_a, d), scaled(-1.0, moment))
         return (push, moment), rates

@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
+from proofroll.core.events import with_events
 from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
 
@@ -34,13 +35,13 @@ class MechanismTruth:
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.mechanism.two_routes.find_truth`."""
+        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`."""
         # a third of a second, which no ball needs
         from proofroll.truth.mechanism.singular_poses import branching
-        from proofroll.truth.mechanism.two_routes import NUDGE, find_truth
+        from proofroll.truth.mechanism.switched_truth import truth_of
 
         assert isinstance(element, MechanismElement)  # it covers it
-        found = find_truth(element.mechanism, times)
+        found = truth_of(element.mechanism, times)
         record = found.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         dataset = columns(element, record.placed(element.mechanism), wrench).dataset()
@@ -58,9 +59,7 @@ class MechanismTruth:
         said = [branching(found.branches)]
         if np.isfinite(found.horizon):
             dataset.attrs["horizon"] = found.horizon
-            said.append(
-                f"from {found.horizon:.4g} s on a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
-            )
+            said.append(f"from {found.horizon:.4g} s on {found.reason}")
         if any(said):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, said))
-        return dataset
+        return with_events(dataset, found.events) if found.events else dataset

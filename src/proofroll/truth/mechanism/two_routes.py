@@ -8,12 +8,14 @@ the horizon.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import Diverged, Missing, Refused
+from proofroll.core.events import Event
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
@@ -47,6 +49,8 @@ class TwoRouteMotion:
         determinate: which components of the wrenches are, (joints + loops, 6).
         routes: what was computed, the one taken first.
         checked_by: a closed form that knows a part of the motion, and its largest difference from the truth.
+        events: what switched on the way.
+        reason: why the question is ill-posed from the horizon on.
     """
 
     record: Record
@@ -57,6 +61,8 @@ class TwoRouteMotion:
     determinate: NDArray[np.bool_]
     routes: tuple[str, ...]
     checked_by: tuple[str, float] | None
+    events: Sequence[Event] = ()
+    reason: str = f"a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
@@ -75,20 +81,20 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
     try:
         second = MaximalCoordinates(mechanism)
-        _check_start(first, second)
+        check_start(first, second)
         one = first.run(times, tolerance)
         two, precise, name = _second(second, times, tolerance)
         # route 1 alone counts turns; all others are put on its
-        two, precise = _matched(mechanism, one, two), _matched(mechanism, one, precise)
+        two, precise = matched(mechanism, one, two), matched(mechanism, one, precise)
         chaotic = second.growth(times) * NUDGE > CHAOS
         _check_branch(one, precise, chaotic)
         routes: tuple[str, ...] = (name, "joint coordinates, DOP853")
-        best = precise if exact is None else _matched(mechanism, one, exact)
+        best = precise if exact is None else matched(mechanism, one, exact)
     except Diverged as stopped:
         if exact is None:
             poses = _singular(mechanism, float(times[-1]))
             raise Refused(f"no truth to the end: {stopped}; end before it{poses}") from None
-        one = two = precise = _matched(mechanism, exact, first.run_rk4(times))
+        one = two = precise = matched(mechanism, exact, first.run_rk4(times))
         best, routes, chaotic = exact, ("joint coordinates, RK4",), np.zeros(len(times), dtype=bool)
     if exact is not None and form is not None:
         routes = (f"closed form: {form.title}", *routes)
@@ -97,26 +103,26 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     bars, differences = {}, {}
     late = np.flatnonzero(chaotic)
     horizon = float(times[late[0]]) if len(late) else np.inf
-    rest = [_judged(mechanism, record) for record in (one, two, precise)]
-    for field, values in _judged(mechanism, masked).items():
+    rest = [judged(mechanism, record) for record in (one, two, precise)]
+    for field, values in judged(mechanism, masked).items():
         others = [np.where(np.isnan(values), np.nan, other[field]) for other in rest]
-        difference = np.maximum(_largest(others[0] - values), _largest(others[0] - others[2]))
-        size = np.maximum.accumulate(_largest(values))
-        bar = FACTOR * difference + _largest(others[1] - others[2]) + ROUND_OFF * size
+        difference = np.maximum(largest(others[0] - values), largest(others[0] - others[2]))
+        size = np.maximum.accumulate(largest(values))
+        bar = FACTOR * difference + largest(others[1] - others[2]) + ROUND_OFF * size
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
     placed = masked.placed(mechanism)
     # nothing is open in truth: all that is seen is error, and round-off of places and of cosines
-    of_places = ROUND_OFF * np.maximum(1.0, np.maximum(_largest(placed.p_WB), _largest(placed.points)))
+    of_places = ROUND_OFF * np.maximum(1.0, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + of_places)
     checked = None
     if form is not None and form.motion is None:
-        checked = (form.title, float(_largest(form.part(times) - form.same(best)).max()))
+        checked = (form.title, float(largest(form.part(times) - form.same(best)).max()))
     branches = [] if exact is None or form is None else singular_poses_of(form, first, float(times[-1]))
     return TwoRouteMotion(masked, bars, differences, horizon, branches, found.determinate, routes, checked)
 
 
-def _judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
+def judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
     """What gets an error bar: fields of the record, and tracked points and energy, which follow from the poses."""
     placed = record.placed(mechanism)
     found = {name: getattr(record, name) for name in JUDGED}
@@ -134,10 +140,10 @@ def _singular(mechanism: Mechanism, until: float) -> str:
 
 def _apart(one: Record, two: Record) -> Array:
     """How far two motions are apart at each time, m and 1."""
-    return np.maximum(_largest(one.p_WB - two.p_WB), _largest(one.q_WB - two.q_WB))
+    return np.maximum(largest(one.p_WB - two.p_WB), largest(one.q_WB - two.q_WB))
 
 
-def _check_start(first: JointCoordinates, second: MaximalCoordinates) -> None:
+def check_start(first: JointCoordinates, second: MaximalCoordinates) -> None:
     """Both routes place all bodies alike before anything has moved; only their formulas decide that.
 
     Raises:
@@ -145,9 +151,9 @@ def _check_start(first: JointCoordinates, second: MaximalCoordinates) -> None:
     """
     at = np.zeros(1)
     one, two = gathered(at, [first.sample(*first.mechanism.start())]), second.at_start()
-    two = _matched(first.mechanism, one, two)
-    apart = max(float(_largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
-    if apart > SAME_START * max(1.0, float(_largest(one.p_WB)[0])):
+    two = matched(first.mechanism, one, two)
+    apart = max(float(largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
+    if apart > SAME_START * max(1.0, float(largest(one.p_WB)[0])):
         raise Refused(
             f"the two routes place the bodies {apart:.3g} m (or 1, of quaternions) apart at t = 0 s, where nothing has "
             "moved yet: an error of proofroll's truth, not a property of the scene; please report it"
@@ -195,7 +201,7 @@ def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[
     return double, long, "maximal coordinates, Taylor series in long doubles"
 
 
-def _matched(mechanism: Mechanism, guide: Record, other: Record) -> Record:
+def matched(mechanism: Mechanism, guide: Record, other: Record) -> Record:
     """The other record with quaternions of the same sign and angles on the same turn as the guide's."""
     q_WB = _same_sign(guide.q_WB, other.q_WB)
     q = other.q.copy()
@@ -213,7 +219,7 @@ def _same_sign(best: Array, other: Array) -> Array:
     return np.where((best * other).sum(axis=-1, keepdims=True) < 0, -other, other)
 
 
-def _largest(values: Array) -> Array:
+def largest(values: Array) -> Array:
     """Largest size at each time, of what is known."""
     flat = np.abs(values.reshape(len(values), -1))
     return np.asarray(np.where(np.isnan(flat), 0.0, flat).max(axis=1, initial=0.0), dtype=np.float64)

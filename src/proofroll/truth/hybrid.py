@@ -1,0 +1,258 @@
+"""Motions that switch: smooth stretches, and what happens at the instants between them.
+
+A route integrates one stretch and decides what comes next; :func:`follow` puts the stretches together and knows no
+physics. Two routes may share this module, which finds where guards rise through zero, and nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged
+from proofroll.truth.crossing import first_rise
+
+State = FloatArray
+ModeT = TypeVar("ModeT")
+Rates = Callable[[float, State], FloatArray]
+# Stretches without any length, one after the other, after which a route is taken to make no progress.
+_STUCK = 50
+
+
+@dataclass(frozen=True)
+class Happening:
+    """A change of what acts.
+
+    Attributes:
+        kind: as the kind of element names its events.
+        name: of what changes.
+        time: [s].
+    """
+
+    kind: str
+    name: str
+    time: float
+
+
+@dataclass(frozen=True)
+class Leg(Generic[ModeT]):
+    """A stretch of time in one mode.
+
+    Attributes:
+        start, end: [s].
+        mode: what holds and pushes.
+        first: the state at the start.
+        last: the state at the end, before anything changes there.
+        guard: number of the guard that ended it; None: the end of time.
+    """
+
+    start: float
+    end: float
+    mode: ModeT
+    first: State
+    last: State
+    guard: int | None
+
+
+@dataclass(frozen=True)
+class Change(Generic[ModeT]):
+    """What a route makes of the end of a leg.
+
+    Attributes:
+        state, mode: of the next leg.
+        happenings: what changed.
+        margin: how far from another outcome the forces were, relative; inf where nothing was decided.
+        delay: time after the leg's end at which the changes are over [s]: infinitely many may follow each other within.
+    """
+
+    state: State
+    mode: ModeT
+    happenings: tuple[tuple[str, str], ...]
+    margin: float = np.inf
+    delay: float = 0.0
+
+
+class HybridRoute(Protocol[ModeT]):
+    """One way of integrating the legs, in state variables of its own."""
+
+    def within(self, leg: Leg[ModeT], times: FloatArray) -> FloatArray:
+        """States at rising times from the start of a leg on [s], shape (times, state)."""
+
+    def begin(self) -> Change[ModeT]:
+        """The state and mode at time 0."""
+
+    def walk(self, time: float, state: State, mode: ModeT, until: float) -> Leg[ModeT]:
+        """One leg from ``time`` to its first guard, or to ``until`` [s]."""
+
+    def change(self, leg: Leg[ModeT]) -> Change[ModeT]:
+        """What comes after a leg that a guard ended."""
+
+
+@dataclass(frozen=True)
+class HybridPath(Generic[ModeT]):
+    """The whole sequence.
+
+    Attributes:
+        legs: one after another from time 0.
+        happenings: each change, with its time.
+        margins: of each decision: time [s] and distance from another outcome, relative.
+    """
+
+    legs: tuple[Leg[ModeT], ...]
+    happenings: tuple[Happening, ...]
+    margins: tuple[tuple[float, float], ...]
+
+    def leg_at(self, times: FloatArray) -> list[int]:
+        """Number of the leg at each time [s]; a time of a change belongs to the later leg."""
+        ends = [leg.end for leg in self.legs[:-1]]
+        return [int(k) for k in np.searchsorted(ends, times, side="right")]
+
+
+def follow(route: HybridRoute[ModeT], until: float) -> HybridPath[ModeT]:
+    """Everything from time 0 to ``until`` [s].
+
+    Raises:
+        Diverged: the route makes no progress.
+    """
+    time, change, still = 0.0, route.begin(), 0
+    legs: list[Leg[ModeT]] = []
+    happenings = [Happening(*what, time) for what in change.happenings]
+    margins = [(time, change.margin)]
+    while True:
+        leg = route.walk(time, change.state, change.mode, until)
+        legs.append(leg)
+        if leg.guard is None:
+            return HybridPath(tuple(legs), tuple(happenings), tuple(margins))
+        still = still + 1 if leg.end <= leg.start else 0
+        if still > _STUCK:
+            raise Diverged(f"the truth makes no progress at {leg.end:g} s, where its modes alternate at once")
+        time, change = leg.end, route.change(leg)
+        happenings += [Happening(*what, time + change.delay) for what in change.happenings]
+        margins.append((time, change.margin))
+
+
+def walked(
+    rates: Rates,
+    time: float,
+    state: State,
+    until: float,
+    *,
+    tolerance: FloatArray,
+    guards: Callable[[State], FloatArray],
+    corrected: Callable[[State], State],
+    first_step: float | None = None,
+) -> tuple[float, State, int | None]:
+    """Integrate by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
+
+    Args:
+        rates: right-hand side.
+        time: where the leg starts [s].
+        state: there.
+        until: its last end [s].
+        tolerance: absolute, of each component of the state.
+        guards: values that are negative while the mode lasts, shape (guards,).
+        corrected: puts a state back on its constraints; applied after every step.
+        first_step: [s], of the order of the leg before: rebounds get shorter and shorter. None: by the rates.
+
+    Returns:
+        Time [s], state there, and number of the guard; None: the end of time.
+
+    Raises:
+        Diverged: the integration stops.
+    """
+    if not until > time:
+        return time, state, None
+    solver = _solver(rates, time, state, until, tolerance)
+    if first_step is not None:
+        solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
+    while solver.status == "running":
+        before, begun = solver.y.copy(), solver.t
+        message = solver.step()
+        if message is not None or not np.isfinite(solver.y).all():
+            raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
+        found = _first(guards, solver.dense_output(), begun, solver.t, begun == time)
+        if found is not None:
+            end, number = _refined(rates, before, begun, solver.t, found, guards, tolerance)
+            return end, corrected(_integrated(rates, before, begun, end, tolerance)), number
+        solver.y = corrected(solver.y)
+        solver.f = rates(solver.t, solver.y)
+    return until, np.asarray(solver.y), None
+
+
+def _solver(rates: Rates, time: float, state: State, until: float, tolerance: FloatArray) -> Any:
+    from scipy.integrate import DOP853
+
+    solver = DOP853(rates, time, state, until, rtol=1e-3, atol=tolerance)
+    solver.rtol = float(np.min(tolerance))  # scipy accepts no less than 2.2e-14, which is its caution
+    return solver
+
+
+def _first(
+    guards: Callable[[State], FloatArray], between: Callable[[float], State], start: float, end: float, leaving: bool
+) -> tuple[float, int] | None:
+    """Time and number of the guard that rises first in a step; at the start of a leg none has yet (``leaving``)."""
+    known: dict[float, FloatArray] = {}
+
+    def at(time: float) -> FloatArray:
+        if time not in known:
+            values = guards(between(time))
+            known[time] = np.minimum(values, 0.0) if leaving and time <= start else values
+        return known[time]
+
+    found: tuple[float, int] | None = None
+    for number in range(len(at(start))):
+        rise = first_rise(lambda times, k=number: np.array([at(float(t))[k] for t in times]), start, end)  # type: ignore[misc]  # mypy cannot type a default
+        if rise is not None and (found is None or rise < found[0]):
+            found = rise, number
+    return found
+
+
+def _refined(
+    rates: Rates,
+    before: State,
+    start: float,
+    end: float,
+    found: tuple[float, int],
+    guards: Callable[[State], FloatArray],
+    tolerance: FloatArray,
+) -> tuple[float, int]:
+    """The time of a rise, by secants on the state integrated afresh: a dense output has fewer digits than a step."""
+    time, number = found
+    span = 1e-4 * (end - start)
+    for _ in range(3):
+        state = _integrated(rates, before, start, time, tolerance)
+        here = float(guards(state)[number])
+        rate = rates(time, state)
+        slope = float(guards(state + span * rate)[number] - guards(state - span * rate)[number]) / (2 * span)
+        better = time - here / slope if slope > 0 else time
+        if not start <= better <= end + span or abs(better - time) <= 2 * np.spacing(time):
+            break
+        time = better
+    return time, number
+
+
+def _integrated(rates: Rates, state: State, start: float, end: float, tolerance: FloatArray) -> State:
+    if not end > start:
+        return state
+    solver = _solver(rates, start, state, end, tolerance)
+    while solver.status == "running":
+        if message := solver.step():
+            raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message}")
+    return np.asarray(solver.y)
+
+
+def states_of(route: HybridRoute[ModeT], path: HybridPath[ModeT], times: FloatArray, legs: Sequence[int]) -> FloatArray:
+    """States at rising times [s], each within the leg of the given number, shape (times, state)."""
+    at = np.asarray(legs)
+    parts = [route.within(path.legs[number], times[at == number]) for number in sorted(set(legs))]
+    return np.concatenate(parts)
+
+
+def least_margin(paths: Sequence[HybridPath[Any]]) -> tuple[float, float]:
+    """Time [s] and size of the smallest distance of a decision from another outcome; inf where nothing was decided."""
+    decisions = [margin for path in paths for margin in path.margins]
+    return min(decisions, key=lambda decision: decision[1], default=(np.inf, np.inf))

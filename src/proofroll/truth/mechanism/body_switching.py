@@ -1,0 +1,221 @@
+"""Route 2 of a mechanism whose joints have dry friction or stops: maximal coordinates, modes by trial."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.record import integrated
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint
+from proofroll.truth.hybrid import Change, Leg, walked
+from proofroll.truth.mechanism.joint_switching import SETTLED, changes, guard_value, guards_of, left_by
+from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
+from proofroll.truth.mechanism.maximal_equations import Switched
+
+_MOST = 6  # joints at rest together: each has up to three candidates
+_SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
+
+
+class SwitchedBodies:
+    """The legs of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+
+    def __init__(self, equations: NumericEquations, joints: tuple[SwitchedJoint, ...], tolerance: float) -> None:
+        self.equations, self.joints = equations, joints
+        self._numbers = [joint.number for joint in joints]
+        self._tolerance = np.full(len(equations.equations.start()), tolerance)
+        self._fastest: dict[int, float] = {}
+        self._span: float | None = None
+
+    def begin(self) -> Change[Mode]:
+        """See the protocol."""
+        state = self.equations.equations.start()
+        mode, margin = self._decided(state, [False] * len(self.joints))
+        return Change(state, mode, (), margin)
+
+    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Leg[Mode]:
+        """See the protocol."""
+        equations = self.equations.switched(state, self.switched(mode))
+        end, last, guard = walked(
+            equations.rate,
+            time,
+            state,
+            until,
+            tolerance=self._tolerance,
+            guards=lambda y: self._guards(equations, y, mode),
+            corrected=equations.eliminated,
+            first_step=self._span,
+        )
+        self._span = end - time if end > time else None
+        return Leg(time, end, mode, state, last, guard)
+
+    def within(self, leg: Leg[Mode], times: FloatArray) -> FloatArray:
+        """See the protocol."""
+        equations = self.equations.switched(leg.first, self.switched(leg.mode))
+        spans = np.maximum(times - leg.start, 0.0)
+        tolerance = float(self._tolerance[0])
+        return np.array(list(integrated(equations.rate, leg.first, spans, tolerance, equations.eliminated)))
+
+    def change(self, leg: Leg[Mode]) -> Change[Mode]:
+        """See the protocol."""
+        assert leg.guard is not None  # nothing changes at the end of time
+        which, kind = guards_of(self.joints, leg.mode)[leg.guard]
+        joint, mode = self.joints[which], list(leg.mode)
+        still = [own in HOLDING for own in leg.mode]
+        if kind in {"up", "down"}:
+            was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
+            return Change(leg.last, tuple(mode), ((left_by(was), joint.name),))
+        if kind == "still":
+            still[which] = True
+            decided, margin = self._decided(leg.last, still)
+            return Change(leg.last, decided, changes(self.joints, leg.mode, decided), margin)
+        speed = abs(float(self.equations.along(leg.last, self._numbers)[1][which]))
+        fastest = self._fastest.setdefault(which, speed)
+        state, margin = self._struck(leg, which, joint.restitution)
+        delay = 0.0
+        if joint.restitution and speed < SETTLED * fastest:
+            free = self.equations.switched(state, self.switched(leg.mode))
+            pull = abs(float(self._accelerations(free, state)[which]))
+            delay = 2 * speed * joint.restitution / (pull * (1 - joint.restitution))
+            state, margin = self._struck(leg, which, 0.0)
+        rates = self.equations.along(state, self._numbers)[1]
+        still = [
+            (held and leg.mode[k] in {"low", "high"} and abs(rates[k]) <= _SLACK * speed)
+            or (k == which and (delay > 0 or not joint.restitution))
+            for k, held in enumerate(still)
+        ]
+        decided, after = self._decided(state, still)
+        settles = delay > 0 and decided[which] in HOLDING
+        happened = [("settle" if settles else "impact", joint.name)] + [
+            item for item in changes(self.joints, leg.mode, decided) if item[1] != joint.name
+        ]
+        return Change(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
+
+    def switched(self, mode: Mode) -> Switched:
+        """What a mode does to the equations."""
+        pairs = list(zip(self.joints, mode, strict=True))
+        held = tuple(joint.number for joint, own in pairs if own in HOLDING)
+        return Switched(held, {joint.number: joint.push(own) for joint, own in pairs if joint.push(own)})
+
+    def holding(self, equations: NumericEquations, state: Array, mode: Mode) -> Array:
+        """Force of what holds or rubs along each switched joint's coordinate, N or N m."""
+        held = [number for number, own in enumerate(mode) if own in HOLDING]
+        force = np.array([joint.push(own) for joint, own in zip(self.joints, mode, strict=True)])
+        if held:
+            force[held] = equations.solve(equations.normalised(state)).multipliers[-len(held) :]
+        return force
+
+    def _guards(self, equations: NumericEquations, state: Array, mode: Mode) -> FloatArray:
+        q, v = equations.along(equations.normalised(state), self._numbers)
+        force = self.holding(equations, state, mode) if any(own in HOLDING for own in mode) else np.zeros(len(mode))
+        return np.array(
+            [
+                guard_value(self.joints[k], mode[k], kind, float(q[k]), float(v[k]), float(force[k]))
+                for k, kind in guards_of(self.joints, mode)
+            ]
+        )
+
+    def _accelerations(self, equations: NumericEquations, state: Array) -> Array:
+        """Of all switched joints along their coordinates."""
+        acceleration = equations.solve(state).acceleration
+        rows = self.equations.equations.rate_rows(state.tolist(), self._numbers)
+        return np.array([sum(c * acceleration[k] for k, c in r.coefficients.items()) + r.bias for r in rows], float)
+
+    def _decided(self, state: Array, still: Sequence[bool]) -> tuple[Mode, float]:
+        """The candidate that keeps all its inequalities, and how far it is from breaking one, relative.
+
+        Args:
+            state: with joints at rest where ``still`` says so.
+            still: of each switched joint, besides those that begin at rest.
+
+        Raises:
+            Refused: none does, or there are too many.
+        """
+        state = self.equations.normalised(state)
+        q, v = self.equations.along(state, self._numbers)
+        choices = [
+            list(_candidates(joint, float(q[k]))) if still[k] or v[k] == 0 else [joint.moving(float(v[k]))]
+            for k, joint in enumerate(self.joints)
+        ]
+        open_ = [k for k, choice in enumerate(choices) if len(choice) > 1]
+        if len(open_) > _MOST:
+            raise Refused(f"{len(open_)} joints with friction or stops come to rest at once; at most {_MOST} are tried")
+        if not open_:
+            return tuple(choice[0] for choice in choices), np.inf
+        best: tuple[float, Mode] = (-np.inf, ())
+        for mode in itertools.product(*choices):
+            equations = self.equations.switched(state, self.switched(mode))
+            if equations.rank < self.equations.rank + sum(own in HOLDING for own in mode):
+                raise Refused("joints that hold lock more than can move: their forces are not determinate")
+            force, acceleration = self.holding(equations, state, mode), self._accelerations(equations, state)
+            kept = min(self._kept(k, mode[k], float(force[k]), float(acceleration[k]), state) for k in open_)
+            best = max(best, (kept, mode))
+        if best[0] < -_SLACK:
+            raise Refused("no mode of the joints with friction or stops keeps all its inequalities")
+        return best[1], max(best[0], 0.0)
+
+    def _kept(self, which: int, mode: str, force: float, acceleration: float, state: Array) -> float:
+        """How far a joint's inequality is from being broken, relative to the forces in play; negative: it is."""
+        joint = self.joints[which]
+        if mode in HOLDING:
+            low, high = joint.bounds(mode)
+            size = abs(force) + sum(abs(bound) for bound in (low, high) if np.isfinite(bound))
+            return min(high - force, force - low) / size if size else np.inf
+        q = float(self.equations.along(state, self._numbers)[0][which])
+        direction = {"forward": 1.0, "backward": -1.0}.get(mode, 1.0 if q <= joint.low else -1.0)
+        stuck = self.equations.switched(state, Switched((joint.number,)))
+        needed = abs(float(stuck.solve(state).multipliers[-1]))
+        response = self._accelerations(self.equations.switched(state, Switched((), {joint.number: 1.0})), state)
+        free = self._accelerations(self.equations.switched(state, Switched()), state)
+        inertia = 1.0 / float((response - free)[which])
+        size = needed + abs(acceleration) * inertia + joint.friction
+        return direction * acceleration * inertia / size if size else np.inf
+
+    def _struck(self, leg: Leg[Mode], which: int, restitution: float) -> tuple[Array, float]:
+        """The state after an impact of one joint on its stop; others at their stops are pressed or set free.
+
+        Raises:
+            Refused: the outcome hangs on an order.
+        """
+        state = self.equations.normalised(leg.last)
+        _, v = self.equations.along(state, self._numbers)
+        resting = [k for k, own in enumerate(leg.mode) if own in {"low", "high"} and k != which]
+        joints, e = self.joints, self.equations.equations
+        side = {k: 1.0 if leg.mode[k] == "low" else -1.0 for k in resting} | {which: -float(np.sign(v[which]))}
+        best: tuple[float, Array, int] = (-np.inf, state, 0)
+        for count in range(len(resting) + 1):
+            for pressed in itertools.combinations(resting, count):
+                held = [which, *pressed]
+                after = [-restitution * float(v[which]), *([0.0] * count)]
+                u, impulse = self.equations.struck(state, [joints[k].number for k in held], after)
+                trial = state.copy()
+                trial[e.nx : e.nx + e.nu] = u
+                rates = self.equations.along(trial, self._numbers)[1]
+                speed = max(abs(float(v[which])), np.finfo(float).tiny)
+                largest = float(np.abs(impulse).max())
+                kept = [side[k] * float(p) / largest for k, p in zip(held, impulse, strict=True)]
+                kept += [side[k] * float(rates[k]) / speed for k in resting if k not in pressed]
+                if min(kept) > best[0]:
+                    best = min(kept), trial, count
+        if best[0] < -_SLACK:
+            raise Refused("no outcome of an impact on several stops keeps all its inequalities")
+        if best[2] and (restitution or any(joints[k].restitution for k in resting)):
+            raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+        return best[1], max(best[0], 0.0)
+
+
+def _candidates(joint: SwitchedJoint, q: float) -> Iterator[str]:
+    """Modes that a joint at rest may take."""
+    near = _SLACK * max(1.0, abs(joint.low) if np.isfinite(joint.low) else 0.0)
+    if q <= joint.low + near:
+        yield from ("low", joint.moving(1.0))
+    elif q >= joint.high - near:
+        yield from ("high", joint.moving(-1.0))
+    elif joint.friction:
+        yield from ("stick", "forward", "backward")
+    else:
+        yield "free"

@@ -1,0 +1,145 @@
+"""Truths of mechanisms whose joints have dry friction or stops, against closed forms."""
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import InputError, Refused
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.switches import complementary
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room
+
+
+def motion(scene: str, times: list[float], **parameters: float):
+    """The truth of a scene of one mechanism at these times."""
+    return truth_of(load_scene(scene, **parameters).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
+
+
+def test_a_spring_that_rubs_loses_four_parts_of_friction_a_swing() -> None:
+    """Half swings last pi sqrt(m/k), end at (-1)^n (1 - 0.06 n), and the mass rests where the spring is too weak."""
+    found = motion("spring_friction", [0.0, 1.0, 2.0], start=0.3)
+    half = np.pi / 10
+    assert [event.kind for event in found.events] == ["turn"] * 4 + ["stick"]
+    for number, event in enumerate(found.events, 1):
+        assert event.time == pytest.approx(number * half, abs=TIGHT)
+        assert event.time_low <= number * half <= event.time_high
+        assert event.name == "slide"
+    swings = int(1.0 // half)
+    middle, reach = 0.03 * (-1) ** swings, 0.3 - 0.03 - 0.06 * swings
+    expected = middle + (-1) ** swings * reach * np.cos(10 * (1.0 - swings * half))
+    assert found.record.q[1, 0] == pytest.approx(expected, abs=TIGHT)
+    assert abs(found.record.q[1, 0] - expected) <= found.bars["q"][1]
+    assert found.record.q[2, 0] == pytest.approx(0.0, abs=TIGHT)
+
+
+def test_a_hinge_that_rubs_turns_where_the_work_of_friction_says() -> None:
+    """The first turns of the rod obey the balance of energy, computed to fourteen digits beforehand."""
+    found = motion("pendulum_friction", [0.0, 1.0408062066358, 2.5])
+    assert found.events[0].time == pytest.approx(1.04080620663580, abs=TIGHT)
+    assert found.record.q[1, 0] == pytest.approx(-1.61813930684291, abs=TIGHT)
+    assert [event.kind for event in found.events] == ["turn", "turn"]
+    assert found.bars["q"][-1] < TIGHT
+
+
+def test_a_stop_without_restitution_carries_the_weight() -> None:
+    """The mass falls, rests on its stop at once, and the stop pushes with its weight."""
+    found = motion("stop", [0.0, 0.3, 1.0])
+    assert [(event.kind, event.name) for event in found.events] == [("impact", "guide")]
+    assert found.events[0].time == pytest.approx(np.sqrt(2 / 9.81), abs=TIGHT)
+    assert found.record.q[:, 0] == pytest.approx([1.0, 1 - 9.81 * 0.3**2 / 2, 0.0], abs=TIGHT)
+    assert found.record.wrench[2, 0, 2] == pytest.approx(9.81, abs=1e-9)
+
+
+def test_rebounds_come_to_rest_after_infinitely_many() -> None:
+    """With e = 0.5 the impacts end after three times the time of the fall, which the last event tells."""
+    fall = np.sqrt(2 / 9.81)
+    found = motion("stop", [0.0, 1.2, 2.0], restitution=0.5)
+    assert found.events[0].time == pytest.approx(fall, abs=TIGHT)
+    assert found.events[1].time == pytest.approx(2 * fall, abs=TIGHT)
+    assert found.events[-1].kind == "settle"
+    assert found.events[-1].time == pytest.approx(3 * fall, abs=1e-9)
+    assert found.record.q[-1, 0] == 0.0
+    after = 1.2 - 2 * fall - fall / 2  # since the third impact: the flights last 1, 1/2, 1/4 of the fall
+    assert found.record.q[1, 0] == pytest.approx(9.81 * fall / 8 * after - 9.81 * after**2 / 2, abs=1e-10)
+
+
+def test_friction_that_holds_does_not_creep() -> None:
+    """A mass that its friction can hold stays, and friction carries the load."""
+    held = Mechanism(
+        (Body("b", 1.0, inertia=((1, 0, 0), (0, 1, 0), (0, 0, 1))),),
+        (Joint("j", "prismatic", "world", "b", friction=15.0),),
+    )
+    found = truth_of(held, np.array([0.0, 0.5, 1.0]))
+    assert found.record.q[:, 0].tolist() == found.record.v[:, 0].tolist() == [0.0, 0.0, 0.0]
+    assert found.record.wrench[2, 0, 2] == pytest.approx(9.81, rel=1e-12)
+    assert found.events == ()
+
+
+def test_two_joints_that_feel_each_other_stick_and_slip_alike_in_both_routes() -> None:
+    """A double pendulum with friction in both hinges has the same modes by complementarity and by trial."""
+    inertia = ((1 / 12, 0, 0), (0, 1e-3, 0), (0, 0, 1 / 12))
+    rods = (Body("a", 1.0, (0, -0.5, 0), inertia), Body("b", 1.0, (0, -0.5, 0), inertia))
+    joints = (
+        Joint("upper", "revolute", "world", "a", q0=(1.2,), friction=1.5),
+        Joint("lower", "revolute", "a", "b", position=(0, -1, 0), q0=(-0.4,), friction=1.0, limits=(-0.9, 0.3)),
+    )
+    found = truth_of(Mechanism(rods, joints, gravity=(0, -9.81, 0)), np.linspace(0, 1.5, 4))
+    assert np.isinf(found.horizon)
+    happened = [("stick", "lower"), ("slip", "lower"), ("turn", "upper"), ("stick", "lower")]
+    assert [(event.kind, event.name) for event in found.events] == happened
+    assert found.bars["q"][-1] < 1e-9
+
+
+def test_a_stop_that_is_never_reached_changes_nothing() -> None:
+    """A pendulum between stops that it does not reach has the truth of one without."""
+    free = load_scene("pendulum", angle=0.5).elements[0].mechanism  # type: ignore[attr-defined]
+    from dataclasses import replace
+
+    held = replace(free, joints=(replace(free.joints[0], limits=(-0.6, 0.6)),))
+    times = np.array([0.0, 0.7, 1.4])
+    one, two = truth_of(free, times), truth_of(held, times)
+    assert two.events == ()
+    assert np.abs(one.record.q - two.record.q).max() <= one.bars["q"][-1] + two.bars["q"][-1]
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ({"limits": (1.0, 2.0)}, "joints.j.q0 = 0.0: the joint starts beyond a stop; its limits are 1 and 2"),
+        ({"limits": (1.0, -1.0)}, "joints.j.limits"),
+        ({"limits": (-1.0, 1.0), "restitution": 1.5}, "joints.j.restitution = 1.5: no impact returns more"),
+        ({"restitution": 0.5}, "joints.j.restitution = 0.5: there is no stop without limits"),
+        ({"friction": -1.0}, "joints.j.friction = -1.0: must be at least 0"),
+    ],
+)
+def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
+    """Each impossible stop or friction names its field and what to do."""
+    with pytest.raises(InputError) as raised:
+        Joint("j", "prismatic", "world", "b", **more)  # type: ignore[arg-type]
+    assert said in str(raised.value)
+
+
+def test_forces_that_are_not_determinate_are_refused() -> None:
+    """Two rows of one velocity have no unique forces."""
+    with pytest.raises(Refused, match="not determinate"):
+        complementary(np.ones(2), np.ones((2, 2)), -5 * np.ones(2), 5 * np.ones(2))
+
+
+def test_complementarity_holds_on_random_problems() -> None:
+    """Every force lies between its bounds, and acceleration is zero inside, outward at a bound."""
+    random = np.random.default_rng(3)
+    for _ in range(200):
+        n = int(random.integers(1, 6))
+        root = random.normal(size=(n, n))
+        G, free = root @ root.T + 0.1 * np.eye(n), 3 * random.normal(size=n)
+        high = random.uniform(0, 2, n)
+        low = np.where(random.random(n) < 0.3, 0.0, -high)
+        state, f, a = complementary(free, G, low, high)
+        assert np.all((f >= low - 1e-12) & (f <= high + 1e-12))
+        assert np.all(np.abs(a[state == 0]) < 1e-9)
+        assert np.all(a[state < 0] >= -1e-12)
+        assert np.all(a[state > 0] <= 1e-12)
