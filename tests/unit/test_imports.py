@@ -194,6 +194,6 @@ def test_one_place_makes_cases() -> None:
 
 
 def test_modules_are_short_enough_to_be_read_at_once() -> None:
-    """No module has more than 300 lines."""
-    long = [str(file.relative_to(ROOT)) for file in ROOT.rglob("*.py") if len(file.read_text().splitlines()) > 300]
+    """No module has more than 400 lines: below, what counts is that it has one job."""
+    long = [str(file.relative_to(ROOT)) for file in ROOT.rglob("*.py") if len(file.read_text().splitlines()) > 400]
     assert long == []

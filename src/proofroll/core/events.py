@@ -48,7 +48,7 @@ def event_columns(events: Sequence[Event]) -> dict[str, Variable]:
         "event_name": ("to what", [event.name for event in events]),
     }
     return {
-        name: Variable(("event",), np.array(values or np.zeros(0), dtype=str), {"units": "1", "long_name": meaning})
+        name: Variable(("event",), _texts(values), {"units": "1", "long_name": meaning})
         for name, (meaning, values) in texts.items()
     } | {
         name: Variable(("event",), np.array(values, dtype=np.float64), {"units": "s", "long_name": meaning})
@@ -69,3 +69,7 @@ def events_of(dataset: xr.Dataset | Columns) -> list[Event]:
     named = "event_name" in dataset  # files of earlier runs have none
     names = dataset["event_name"].to_numpy().tolist() if named else [""] * len(columns[0])
     return [Event(*row) for row in zip(*columns, names, strict=True)]
+
+
+def _texts(values: Sequence[str]) -> np.ndarray[tuple[int], np.dtype[np.str_]]:
+    return np.array(values, dtype=str) if values else np.zeros(0, dtype="<U1")

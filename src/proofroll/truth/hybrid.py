@@ -39,7 +39,7 @@ class Happening:
 
 
 @dataclass(frozen=True)
-class Leg(Generic[ModeT]):
+class Stretch(Generic[ModeT]):
     """A stretch of time in one mode.
 
     Attributes:
@@ -59,7 +59,7 @@ class Leg(Generic[ModeT]):
 
 
 @dataclass(frozen=True)
-class Change(Generic[ModeT]):
+class Transition(Generic[ModeT]):
     """What a route makes of the end of a leg.
 
     Attributes:
@@ -79,16 +79,16 @@ class Change(Generic[ModeT]):
 class HybridRoute(Protocol[ModeT]):
     """One way of integrating the legs, in state variables of its own."""
 
-    def within(self, leg: Leg[ModeT], times: FloatArray) -> FloatArray:
+    def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
         """States at rising times from the start of a leg on [s], shape (times, state)."""
 
-    def begin(self) -> Change[ModeT]:
+    def begin(self) -> Transition[ModeT]:
         """The state and mode at time 0."""
 
-    def walk(self, time: float, state: State, mode: ModeT, until: float) -> Leg[ModeT]:
+    def walk(self, time: float, state: State, mode: ModeT, until: float) -> Stretch[ModeT]:
         """One leg from ``time`` to its first guard, or to ``until`` [s]."""
 
-    def change(self, leg: Leg[ModeT]) -> Change[ModeT]:
+    def change(self, leg: Stretch[ModeT]) -> Transition[ModeT]:
         """What comes after a leg that a guard ended."""
 
 
@@ -102,7 +102,7 @@ class HybridPath(Generic[ModeT]):
         margins: of each decision: time [s] and distance from another outcome, relative.
     """
 
-    legs: tuple[Leg[ModeT], ...]
+    legs: tuple[Stretch[ModeT], ...]
     happenings: tuple[Happening, ...]
     margins: tuple[tuple[float, float], ...]
 
@@ -119,7 +119,7 @@ def follow(route: HybridRoute[ModeT], until: float) -> HybridPath[ModeT]:
         Diverged: the route makes no progress.
     """
     time, change, still = 0.0, route.begin(), 0
-    legs: list[Leg[ModeT]] = []
+    legs: list[Stretch[ModeT]] = []
     happenings = [Happening(*what, time) for what in change.happenings]
     margins = [(time, change.margin)]
     while True:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,10 +24,11 @@ from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.switches import (
     Mode,
-    complementary,
+    decided,
     held_by,
     load_of,
-    margin,
+    refuse_dry,
+    struck,
     switched_joints,
 )
 
@@ -138,59 +140,12 @@ class JointCoordinates:
         return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
 
     def decided(self, q: Array, v: Array) -> tuple[Mode, float]:
-        """Mode of the switched joints that follows from the forces, and how far from another one it is, relative.
+        """See :func:`proofroll.elements.mechanism.switches.decided`."""
+        return decided(self.switched, q, v, partial(self._responses, q, v))
 
-        A joint at rest is held where the force that this needs lies between its bounds; all at once, for they feel
-        each other.
-        """
-        joints = self.switched
-        mode = [
-            joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
-            for joint in joints
-        ]
-        still = held_by(tuple(mode))
-        if not still:
-            return tuple(mode), np.inf
-        begun = tuple("free" if number in still else own for number, own in enumerate(mode))
-        at = [joints[number].velocity for number in still]
-        free, response = self._responses(q, v, begun, at)
-        low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
-        state, force, acceleration = complementary(free[at], response[at], low, high)
-        for number, side in zip(still, state, strict=True):
-            if side:
-                mode[number] = joints[number].moving(-side)
-        return tuple(mode), margin(free[at], response[at], low, high, force, acceleration)
-
-    def struck(self, q: Array, v: Array, hit: Sequence[int]) -> tuple[Array, float]:
-        """Velocities after an impact of the switched joints ``hit`` on their stops, by Newton's law of impact.
-
-        Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
-
-        Returns:
-            The velocities, and how far from another outcome it is, relative.
-
-        Raises:
-            Refused: several stops share the impact and one of them returns speed, so that its order decides.
-        """
-        joints = self.switched
-        resting = [
-            k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}
-        ]
-        at_stop = sorted({*hit, *resting})
-        at = [joints[number].velocity for number in at_stop]
-        _, response = self._responses(q, v, tuple("free" for _ in joints), at)
-        returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[at]
-        below = np.array([q[joints[k].coordinate] <= joints[k].low for k in at_stop])
-        low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
-        _, impulse, left = complementary(returned, response[at], low, high)
-        if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
-            raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
-        v = v + response @ impulse
-        for number, rest in zip(at_stop, left, strict=True):
-            joint = joints[number]
-            if not rest and not joint.restitution:
-                v[joint.velocity] = 0.0
-        return v, margin(returned, response[at], low, high, impulse, left)
+    def struck(self, q: Array, v: Array, hit: int) -> tuple[Array, float]:
+        """See :func:`proofroll.elements.mechanism.switches.struck`."""
+        return struck(self.switched, q, v, hit, partial(self._responses, q, v))
 
     def _responses(self, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
         """Accelerations without further forces, (nv), and what unit forces along velocities add, (nv, forces)."""
@@ -202,8 +157,10 @@ class JointCoordinates:
         """The motion at the given times, s, by DOP853.
 
         Raises:
+            Refused: the mechanism has dry friction, which switches.
             Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
         """
+        refuse_dry(self.mechanism)
         nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
         sign = RowSign(self.rank)
 

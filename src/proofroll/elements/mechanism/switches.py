@@ -7,7 +7,7 @@ friction; ``stick`` where friction holds it; ``low`` or ``high`` where a stop do
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -136,3 +136,70 @@ def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
 def held_by(mode: Mode) -> list[int]:
     """Numbers, among the switched joints, of those that are held."""
     return [number for number, own in enumerate(mode) if own in HOLDING]
+
+
+# Accelerations (nv) of the velocities in a mode, and what unit forces along some of them add, (nv, forces).
+Responses = Callable[[Mode, Sequence[int]], tuple[Array, Array]]
+
+
+def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> tuple[Mode, float]:
+    """Mode of the switched joints that follows from the forces, and how far from another one it is, relative.
+
+    A joint at rest is held where the force that this needs lies between its bounds; all at once, for they feel each
+    other.
+    """
+    mode = [
+        joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
+        for joint in joints
+    ]
+    still = held_by(tuple(mode))
+    if not still:
+        return tuple(mode), np.inf
+    at = [joints[number].velocity for number in still]
+    free, response = responses(tuple("free" if number in still else own for number, own in enumerate(mode)), at)
+    low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
+    state, force, acceleration = complementary(free[at], response[at], low, high)
+    for number, side in zip(still, state, strict=True):
+        if side:
+            mode[number] = joints[number].moving(-side)
+    return tuple(mode), margin(free[at], response[at], low, high, force, acceleration)
+
+
+def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, responses: Responses) -> tuple[Array, float]:
+    """Velocities after an impact of one switched joint on its stop, by Newton's law of impact.
+
+    Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
+
+    Returns:
+        The velocities, and how far from another outcome it is, relative.
+
+    Raises:
+        Refused: several stops share the impact and one of them returns speed, so that its order decides.
+    """
+    resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}]
+    at_stop = sorted({hit, *resting})
+    at = [joints[number].velocity for number in at_stop]
+    _, response = responses(tuple("free" for _ in joints), at)
+    returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[at]
+    below = np.array([q[joints[k].coordinate] <= joints[k].low for k in at_stop])
+    low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
+    _, impulse, left = complementary(returned, response[at], low, high)
+    if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
+        raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+    v = v + response @ impulse
+    for number, rest in zip(at_stop, left, strict=True):
+        joint = joints[number]
+        if not rest and not joint.restitution:
+            v[joint.velocity] = 0.0
+    return v, margin(returned, response[at], low, high, impulse, left)
+
+
+def refuse_dry(mechanism: Mechanism) -> None:
+    """Refuses dry friction where nothing follows its switching.
+
+    Raises:
+        Refused: a joint has some.
+    """
+    for joint in mechanism.joints:
+        if joint.friction:
+            raise Refused(f"dry friction in joint {joint.name} switches, which one smooth integration does not follow")

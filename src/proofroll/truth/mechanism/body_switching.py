@@ -12,7 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint
-from proofroll.truth.hybrid import Change, Leg, walked
+from proofroll.truth.hybrid import Stretch, Transition, walked
 from proofroll.truth.mechanism.joint_switching import SETTLED, changes, guard_value, guards_of, left_by
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
@@ -31,13 +31,13 @@ class SwitchedBodies:
         self._fastest: dict[int, float] = {}
         self._span: float | None = None
 
-    def begin(self) -> Change[Mode]:
+    def begin(self) -> Transition[Mode]:
         """See the protocol."""
         state = self.equations.equations.start()
         mode, margin = self._decided(state, [False] * len(self.joints))
-        return Change(state, mode, (), margin)
+        return Transition(state, mode, (), margin)
 
-    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Leg[Mode]:
+    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Stretch[Mode]:
         """See the protocol."""
         equations = self.equations.switched(state, self.switched(mode))
         end, last, guard = walked(
@@ -51,16 +51,16 @@ class SwitchedBodies:
             first_step=self._span,
         )
         self._span = end - time if end > time else None
-        return Leg(time, end, mode, state, last, guard)
+        return Stretch(time, end, mode, state, last, guard)
 
-    def within(self, leg: Leg[Mode], times: FloatArray) -> FloatArray:
+    def within(self, leg: Stretch[Mode], times: FloatArray) -> FloatArray:
         """See the protocol."""
         equations = self.equations.switched(leg.first, self.switched(leg.mode))
         spans = np.maximum(times - leg.start, 0.0)
         tolerance = float(self._tolerance[0])
         return np.array(list(integrated(equations.rate, leg.first, spans, tolerance, equations.eliminated)))
 
-    def change(self, leg: Leg[Mode]) -> Change[Mode]:
+    def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
         assert leg.guard is not None  # nothing changes at the end of time
         which, kind = guards_of(self.joints, leg.mode)[leg.guard]
@@ -68,11 +68,11 @@ class SwitchedBodies:
         still = [own in HOLDING for own in leg.mode]
         if kind in {"up", "down"}:
             was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
-            return Change(leg.last, tuple(mode), ((left_by(was), joint.name),))
+            return Transition(leg.last, tuple(mode), ((left_by(was), joint.name),))
         if kind == "still":
             still[which] = True
             decided, margin = self._decided(leg.last, still)
-            return Change(leg.last, decided, changes(self.joints, leg.mode, decided), margin)
+            return Transition(leg.last, decided, changes(self.joints, leg.mode, decided), margin)
         speed = abs(float(self.equations.along(leg.last, self._numbers)[1][which]))
         fastest = self._fastest.setdefault(which, speed)
         state, margin = self._struck(leg, which, joint.restitution)
@@ -93,7 +93,7 @@ class SwitchedBodies:
         happened = [("settle" if settles else "impact", joint.name)] + [
             item for item in changes(self.joints, leg.mode, decided) if item[1] != joint.name
         ]
-        return Change(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
+        return Transition(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
 
     def switched(self, mode: Mode) -> Switched:
         """What a mode does to the equations."""
@@ -175,7 +175,7 @@ class SwitchedBodies:
         size = needed + abs(acceleration) * inertia + joint.friction
         return direction * acceleration * inertia / size if size else np.inf
 
-    def _struck(self, leg: Leg[Mode], which: int, restitution: float) -> tuple[Array, float]:
+    def _struck(self, leg: Stretch[Mode], which: int, restitution: float) -> tuple[Array, float]:
         """The state after an impact of one joint on its stop; others at their stops are pressed or set free.
 
         Raises:

@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, held_by
-from proofroll.truth.hybrid import Change, Leg, walked
+from proofroll.truth.hybrid import Stretch, Transition, walked
 
 # Of the largest speed at which a joint hit its stop: of slower rebounds only the time is summed. They have 1e-12 of the
 # way of the first, which drowns in the round-off of the coordinate.
@@ -28,13 +28,13 @@ class SwitchedTree:
         self._fastest: dict[int, float] = {}
         self._span: float | None = None
 
-    def begin(self) -> Change[Mode]:
+    def begin(self) -> Transition[Mode]:
         """See the protocol."""
         state = np.concatenate(self.equations.mechanism.start())
         mode, margin = self.equations.decided(*self._parts(state))
-        return Change(state, mode, (), margin)
+        return Transition(state, mode, (), margin)
 
-    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Leg[Mode]:
+    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Stretch[Mode]:
         """See the protocol."""
         equations = self.equations
         end, last, guard = walked(
@@ -48,9 +48,9 @@ class SwitchedTree:
             first_step=self._span,
         )
         self._span = end - time if end > time else None
-        return Leg(time, end, mode, state, last, guard)
+        return Stretch(time, end, mode, state, last, guard)
 
-    def within(self, leg: Leg[Mode], times: FloatArray) -> FloatArray:
+    def within(self, leg: Stretch[Mode], times: FloatArray) -> FloatArray:
         """See the protocol."""
         return np.array(
             list(
@@ -64,7 +64,7 @@ class SwitchedTree:
             )
         )
 
-    def change(self, leg: Leg[Mode]) -> Change[Mode]:
+    def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
         assert leg.guard is not None  # nothing changes at the end of time
         which, kind = guards_of(self.joints, leg.mode)[leg.guard]
@@ -74,15 +74,15 @@ class SwitchedTree:
         if kind in {"up", "down"}:
             # The force that holds has reached its bound: the joint leaves, and nothing else feels it yet.
             was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
-            return Change(state, tuple(mode), ((left_by(was), joint.name),))
+            return Transition(state, tuple(mode), ((left_by(was), joint.name),))
         if kind == "still":
             v[joint.velocity] = 0.0
             decided, margin = self.equations.decided(q, v)
-            return Change(state, decided, self._stopped(leg.mode, decided), margin)
+            return Transition(state, decided, self._stopped(leg.mode, decided), margin)
         q[joint.coordinate] = joint.low if kind == "low" else joint.high
         speed = abs(float(v[joint.velocity]))
         fastest = self._fastest.setdefault(which, speed)
-        v[:], margin = self.equations.struck(q, v, [which])
+        v[:], margin = self.equations.struck(q, v, which)
         delay, rebound = 0.0, abs(float(v[joint.velocity]))
         if joint.restitution and speed < SETTLED * fastest:
             pull = abs(float(self.equations.solve(q, v, leg.mode).acceleration[joint.velocity]))
@@ -93,7 +93,7 @@ class SwitchedTree:
         happened = [("settle" if settles else "impact", joint.name)] + [
             item for item in self._stopped(leg.mode, decided) if item[1] != joint.name
         ]
-        return Change(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
+        return Transition(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
 
     def holding(self, state: Array, mode: Mode) -> Array:
         """Force of what holds or rubs along each switched joint's coordinate, N or N m."""

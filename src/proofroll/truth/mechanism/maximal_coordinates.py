@@ -20,6 +20,7 @@ from proofroll.core.errors import Missing
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import refuse_dry
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
@@ -209,17 +210,21 @@ class MaximalCoordinates:
         """The motion at the given times, s, by Taylor series.
 
         Raises:
+            Refused: the mechanism has dry friction, which switches.
             Missing: heyoka is not installed.
             Diverged: the integration stops.
         """
+        refuse_dry(self.mechanism)
         return self.recorded(times, np.asarray(self.taylor(long_double).run(times), dtype=float))
 
     def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853 with projection.
 
         Raises:
+            Refused: the mechanism has dry friction, which switches.
             Diverged: the integration stops.
         """
+        refuse_dry(self.mechanism)
         return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance))
 
     def growth(self, times: Array) -> Array:

@@ -31,6 +31,7 @@ from proofroll.truth.mechanism.two_routes import (
 )
 
 _TOLERANCE = 1e-14  # of each step
+_GRAZED = 1e-8  # rad or m by which a stop must be passed to act; more than the look ahead is wrong by
 _SCOUT = 1e-9  # of a look ahead: whether any stop is reached
 # Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
 CLOSE = 1e-9
@@ -48,11 +49,23 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         return find_truth(mechanism, times)
     dry = any(joint.friction for joint in equations.switched)
     try:
-        if not dry and not follow(SwitchedTree(equations, _SCOUT), float(times[-1])).happenings:
-            return find_truth(mechanism, times)  # no stop is reached
+        if (
+            not dry
+            and not follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1])).happenings
+        ):
+            return find_truth(mechanism, times)  # no stop is passed
         return _switched(mechanism, equations, times)
     except Diverged as stopped:
         raise Refused(f"no truth to the end: {stopped}; end before it") from None
+
+
+def _wider(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with its stops a little further off: a swing that just comes back to one does not pass it."""
+    joints = (
+        replace(joint, limits=(joint.limits[0] - _GRAZED, joint.limits[1] + _GRAZED)) if joint.limits else joint
+        for joint in mechanism.joints
+    )
+    return replace(mechanism, joints=tuple(joints))
 
 
 def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -> TwoRouteMotion:

@@ -170,7 +170,7 @@ def test_long_doubles_keep_more_digits(scene):
 
 
 def test_dry_friction_is_refused():
-    """Neither route pretends to follow dry friction."""
+    """Neither route follows dry friction by one smooth integration."""
     mechanism = Mechanism(
         bodies=(Body("a", 1.0, (0, 0, -1), (1, 1, 1)),),
         joints=(Joint("j", "revolute", "world", "a", axis=(1, 0, 0), friction=0.1),),
@@ -178,7 +178,7 @@ def test_dry_friction_is_refused():
     with pytest.raises(Refused, match="dry friction in joint j"):
         JointCoordinates(mechanism).run(np.array([0.1]))
     with pytest.raises(Refused, match="dry friction in joint j"):
-        MaximalCoordinates(mechanism)
+        MaximalCoordinates(mechanism).run_dop853(np.array([0.1]))
 
 
 def test_steps_of_many_bodies_do_not_chase_round_off(scene, monkeypatch):

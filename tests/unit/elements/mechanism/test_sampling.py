@@ -25,7 +25,10 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
     for law, capability in laws.items():
         assert required(wheel(**{law: 1.0})) == {MechanismCapability.REVOLUTE, MechanismCapability[capability]}
     every = required(examples.every_kind())
-    assert {"JOINT_SPRINGS", "JOINT_FRICTION", "ARMATURE", "REDUNDANT"} == {
+    stops = {"limits": (-1.0, 1.0)}
+    assert required(wheel(**stops)) == {MechanismCapability.REVOLUTE, MechanismCapability.STOPS}
+    assert MechanismCapability.REBOUNDS in required(wheel(**stops, restitution=0.5))
+    assert {"JOINT_SPRINGS", "JOINT_FRICTION", "ARMATURE", "REDUNDANT", "STOPS", "REBOUNDS"} == {
         item.name for item in set(MechanismCapability) - every
     }
 
