@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from proofroll import load_scene, simulate
 from proofroll.cli import app
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.events import events_of
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.robots.gallery import locate, read_gallery
@@ -117,8 +118,8 @@ def test_what_no_scene_has_is_refused_by_name(robot):
             ask(load_scene(mimic))
     assert "j3" in {joint.name for joint in load_scene(mimic, couplings=0).elements[0].mechanism.joints}
     rough = robot("rough.urdf", urdf(second='<dynamics friction="2"/>'))
-    with pytest.raises(Refused, match="dry friction in joint j2"):
-        truth(load_scene(rough), times)
+    with pytest.raises(Refused, match="needs dry friction in joints"):
+        simulate(load_scene(rough), "projection", until=0.1)
     assert load_scene(rough, friction=0).requires < load_scene(rough).requires
     tendon = mjcf(extra="").replace(
         "<actuator>", '<tendon><fixed name="cord" stiffness="3"><joint joint="k1" coef="1"/></fixed></tendon><actuator>'
@@ -156,12 +157,15 @@ def test_what_an_mjcf_disables_or_has_beyond_a_scene(robot):
         load_scene(robot("cubic.xml", text.replace("KIND", "hinge").replace('"9"', '"9 2"')))
 
 
-def test_stops_are_there_when_asked_for(robot, monkeypatch):
-    """With limits=1 a motion that passes a stop has no truth, and the joint and the time are named."""
-    monkeypatch.setattr(maximal_taylor, "heyoka", None)  # the equations in numbers: as symbols they take seconds
-    scene = load_scene(robot("arm.urdf", urdf()), limits=1, speed=3)
-    with pytest.raises(Refused, match=r"joint j\d passes its limit before t = "):
-        truth(scene, np.linspace(0, 1, 11))
+def test_stops_are_there_when_asked_for(robot):
+    """With limits=1 an engine must provide stops; without, the same motion goes through them."""
+    path = robot("arm.urdf", urdf())
+    assert load_scene(path, limits=1).requires - load_scene(path).requires == {"stops of joints"}
+    with pytest.raises(Refused, match="stops of joints"):
+        simulate(load_scene(path, limits=1), "projection", until=0.1)
+    struck = truth(load_scene(path, limits=1, speed=3), np.linspace(0, 1, 3))
+    assert [(event.kind, event.name) for event in events_of(struck)] == [("impact", "j2")]  # it leaves at once
+    assert "ill_posed" not in struck.attrs
 
 
 def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):

@@ -145,6 +145,7 @@ def walked(
     guards: Callable[[State], FloatArray],
     corrected: Callable[[State], State],
     first_step: float | None = None,
+    noise: FloatArray | None = None,
 ) -> tuple[float, State, int | None]:
     """Integrate by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
 
@@ -157,6 +158,7 @@ def walked(
         guards: values that are negative while the mode lasts, shape (guards,).
         corrected: puts a state back on its constraints; applied after every step.
         first_step: [s], of the order of the leg before: rebounds get shorter and shorter. None: by the rates.
+        noise: round-off of the guards, by which they must rise above zero to be seen, shape (guards,); None: none.
 
     Returns:
         Time [s], state there, and number of the guard; None: the end of time.
@@ -174,7 +176,8 @@ def walked(
         message = solver.step()
         if message is not None or not np.isfinite(solver.y).all():
             raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
-        found = _first(guards, solver.dense_output(), begun, solver.t, begun == time)
+        seen = guards if noise is None else (lambda y: guards(y) - noise)
+        found = _first(seen, solver.dense_output(), begun, solver.t, begun == time)
         if found is not None:
             end, number = _refined(rates, before, begun, solver.t, found, guards, tolerance)
             return end, corrected(_integrated(rates, before, begun, end, tolerance)), number
@@ -223,7 +226,7 @@ def _refined(
     """The time of a rise, by secants on the state integrated afresh: a dense output has fewer digits than a step."""
     time, number = found
     span = 1e-4 * (end - start)
-    for _ in range(3):
+    for _ in range(4):
         state = _integrated(rates, before, start, time, tolerance)
         here = float(guards(state)[number])
         rate = rates(time, state)

@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition, walked
-from proofroll.truth.mechanism.joint_switching import SETTLED, changes, guard_value, guards_of, left_by
+from proofroll.truth.mechanism.joint_switching import SETTLED, changes, guard_value, guards_of, left_by, noise_of
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 
@@ -49,6 +49,7 @@ class SwitchedBodies:
             guards=lambda y: self._guards(equations, y, mode),
             corrected=equations.eliminated,
             first_step=self._span,
+            noise=noise_of(self.joints, mode, self.equations.along(state, self._numbers)[0]),
         )
         self._span = end - time if end > time else None
         return Stretch(time, end, mode, state, last, guard)

@@ -16,6 +16,8 @@ from proofroll.truth.hybrid import Stretch, Transition, walked
 # Of the largest speed at which a joint hit its stop: of slower rebounds only the time is summed. They have 1e-12 of the
 # way of the first, which drowns in the round-off of the coordinate.
 SETTLED = 1e-6
+_NEAR = 1e-12  # relative: a coordinate this close to a stop is at it
+_DIGITS = 8  # last digits of a coordinate that are round-off
 
 
 class SwitchedTree:
@@ -46,6 +48,7 @@ class SwitchedTree:
             guards=lambda y: self._guards(y, mode),
             corrected=lambda y: equations.eliminated(y, mode),
             first_step=self._span,
+            noise=noise_of(self.joints, mode, state[: self._nq][[joint.coordinate for joint in self.joints]]),
         )
         self._span = end - time if end > time else None
         return Stretch(time, end, mode, state, last, guard)
@@ -152,6 +155,16 @@ def guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float, 
     if kind == "still":
         return -v if mode == "forward" else v
     return joint.low - q if kind == "low" else q - joint.high
+
+
+def noise_of(joints: tuple[SwitchedJoint, ...], mode: Mode, q: Array) -> FloatArray:
+    """Round-off of the guards of a leg that begins at coordinates q of its joints: one that leaves a stop is at it."""
+    found = []
+    for number, kind in guards_of(joints, mode):
+        at = {"low": joints[number].low, "high": joints[number].high}.get(kind)
+        leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))
+        found.append(_DIGITS * float(np.spacing(max(1.0, abs(at)))) if leaves and at is not None else 0.0)
+    return np.array(found)
 
 
 def left_by(mode: str) -> str:
