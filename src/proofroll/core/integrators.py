@@ -11,6 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
+from proofroll.core.stalling import StepWatch
 
 Rates = Callable[[FloatArray], FloatArray]
 # Called after each step with its time and state; returns the state to go on from, the very same object if unchanged.
@@ -138,7 +139,7 @@ class DormandPrince853:
         from scipy.integrate import DOP853
 
         self.t, self.x = 0.0, x
-        self._accept = accept
+        self._accept, self._watch = accept, StepWatch()
         self._solver = DOP853(lambda _, y: rates(y), 0.0, x, np.inf, rtol=resolution, atol=resolution * scales)
 
     def advance(self, t: float) -> None:
@@ -147,7 +148,10 @@ class DormandPrince853:
         if t <= self.t:
             return
         while solver.t < t:
+            begun = solver.t
             controlled_step(solver, self._accept, t)
+            self.x = solver.y
+            self._watch.took(float(solver.t), float(solver.t - begun), solver.t == t)
         self.t, self.x = t, solver.y
 
 

@@ -1,5 +1,6 @@
 """What all engines have in common on mechanisms; each through its own model."""
 
+import re
 from dataclasses import replace
 
 import held_bodies
@@ -13,6 +14,8 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism, Spring
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.capabilities import required
 from proofroll.elements.mechanism.rotations import from_quaternion
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
 
 ALL = tuple(runs.FORMULATIONS)
 ROUND_OFF = 1e-12
@@ -216,3 +219,13 @@ def test_the_inertia_of_a_drive_slows_its_coordinate(formulation):
     assert reaction < 1e-8
     plain, slow = (runs.true(each, 0.2)[0].v[-1, 0] for each in (mechanism, geared))
     assert abs(slow) < 0.8 * abs(plain)
+
+
+def test_a_stall_is_told_with_time_and_pose() -> None:
+    """Error control that stalls at a singular pose ends the run in a moment, and says when and where."""
+    run = simulate(load_scene("four_bar", windows=1), "projection", until=1.0)
+    assert run.attrs["status"] == "diverged"
+    found = re.search(r"stalls at t = ([\d.]+) s: .* singular pose; q\.A0 = (\S+) rad, q\.B0 = ", run.attrs["message"])
+    assert found, run.attrs["message"]
+    assert 0.70 < float(found[1]) < 0.72
+    assert abs(float(found[2]) + np.pi / 2) < 0.01

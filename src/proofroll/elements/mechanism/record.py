@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Diverged
+from proofroll.core.stalling import StepWatch
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import Array
 
-# So many steps in a row, so small against the largest: no smooth motion needs them. A slide of a million times the
-# crank's mass drives the crank through its dead point in a thousandth of the usual time, and is smooth.
-_STALLED, _STALLED_STEPS = 1e-7, 20
 _MOST_STEPS = 200_000  # of the whole way
 
 
@@ -86,7 +84,7 @@ def integrated(
     solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=1e-3, atol=tolerance)
     solver.atol = tolerance if least is None else least
     solver.rtol = tolerance  # scipy accepts no less than 2.2e-14, which is its caution, not the method's limit
-    steps, largest, small, lost = 0, 0.0, 0, np.zeros_like(start)
+    steps, watch, lost = 0, StepWatch(), np.zeros_like(start)
     for time in times:
         if time > solver.t:
             solver.t_bound, solver.status = float(time), "running"
@@ -100,10 +98,7 @@ def integrated(
             solver.y = before + moved
             lost = moved - (solver.y - before)
             landing = solver.status == "finished"
-            largest = max(largest, solver.step_size)
-            small = 0 if landing or solver.step_size > _STALLED * largest else small + 1
-            if small > _STALLED_STEPS:
-                raise Diverged(f"DOP853 stalls at t = {solver.t:.6g} s: its steps shrink, as at a singular pose")
+            watch.took(float(solver.t), solver.step_size, landing)
             if steps > _MOST_STEPS:
                 raise Diverged(f"DOP853 needs more than {_MOST_STEPS} steps; it reached t = {solver.t:.6g} s")
             if landing:

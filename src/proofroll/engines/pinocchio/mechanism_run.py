@@ -9,7 +9,9 @@ import pinocchio as pin
 
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
+from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, independent, unsaid
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
@@ -67,6 +69,8 @@ class MechanismRun:
             self.motion.advance(t)
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {t:g} s ({error})") from None
+        except Stalled as error:
+            raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, and what the reactions are."""

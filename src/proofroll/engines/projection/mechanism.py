@@ -10,7 +10,9 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import INTEGRATORS
+from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
+from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, independent, mechanism_of
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
@@ -57,6 +59,8 @@ class ProjectionMechanism:
                 self._motion.advance(t)
         except np.linalg.LinAlgError as error:
             raise Diverged(f"{error}, between t = {start:.6g} s and {t:.6g} s") from None
+        except Stalled as error:
+            raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
     def _solved(self) -> tuple[SolvedState, Array, Array, Array]:
         """The equations now; of the bodies rotation, angular velocity, and centre of mass from their origins."""
