@@ -26,7 +26,7 @@ def precessing(times: FloatArray) -> FloatArray:
 
 @pytest.mark.parametrize("quadrature", [QUATERNIONS, MATRICES])
 def test_precession(quadrature: Any) -> None:
-    """Seen from the turning axis the spin stands still: the rotation is a product of two, to 1e-12 after 50 turns."""
+    """Seen from the turning axis the spin stands still: the rotation is a product of two, to 1e-11 after 50 turns."""
     times = np.linspace(0, 2, 21)
     found = orientation(precessing, times, (), quadrature)
     still = 160 * np.array([np.sin(0.7), 0, np.cos(0.7)]) - [0, 0, 20]

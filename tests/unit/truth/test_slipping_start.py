@@ -62,8 +62,8 @@ def test_textbook() -> None:
     v0, mu = 2.0, 0.2
     rolls = 2 * v0 / (7 * mu * G)
     found = truth(load_scene("slide_to_roll"), np.array([0.0, rolls, 2 * rolls]))
-    assert found["down"][1] == pytest.approx(12 * v0**2 / (49 * mu * G), rel=1e-12)
-    assert found["down_rate"][2] == pytest.approx(5 / 7 * v0, rel=1e-12)
+    assert found["down"][1] == pytest.approx(12 * v0**2 / (49 * mu * G), rel=1e-11)
+    assert found["down_rate"][2] == pytest.approx(5 / 7 * v0, rel=1e-11)
 
 
 def test_backspin_returns() -> None:

@@ -79,7 +79,7 @@ PAPER_TIME = 1.720183172
 
 
 def test_state_of_the_paper_case_with_resistance() -> None:
-    """At f = 0.02a the state at 1.720183172 s is the published one to its last digit, and the friction needed 0.35."""
+    """At f = 0.02a the state at 1.720183172 s is the published one to its last digit (the bound), and the friction 0.35."""
     found = final(truth(load_scene("sphere_in_cylinder", rolling_resistance=0.02 * A), np.array([0, PAPER_TIME])))
     for name, value in PAPER_CASE.items():
         assert found[name] == pytest.approx(value, rel=4e-9, abs=1e-8), name
@@ -144,12 +144,12 @@ def test_all_routes_agree_without_resistance(parameters: dict[str, float]) -> No
 
 @pytest.mark.parametrize("speed", [2.0, 4.0])
 def test_both_routes_agree_with_resistance(speed: float) -> None:
-    """Reduced and unreduced equations agree to 1e-11 with rolling resistance, as far as the comparisons go."""
+    """Reduced and unreduced equations agree to 1e-10 with rolling resistance, as far as the comparisons go."""
     body = rolling_ball(
         load_scene("sphere_in_cylinder", speed=speed, axial_speed=0.4, radial_spin=5.0, rolling_resistance=5e-4)
     )
     t = np.linspace(0, 2, 3)
-    assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-11
+    assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-10
 
 
 def test_other_balls_and_surfaces() -> None:
@@ -181,14 +181,14 @@ def test_closed_form_only_where_it_holds() -> None:
 
 
 def test_every_value_has_an_error_bar(scene: Scene) -> None:
-    """No error bar is zero, and none exceeds 1e-11 of the sizes in the scene."""
+    """No error bar is zero, and none exceeds 1e-10 of the sizes in the scene."""
     found = truth(scene, np.linspace(0, 0.1, 3))
     body = rolling_ball(scene)
     sizes = {"rad": 1.0, "m": 1.0, "N": 50.0, "J": 10.0, "m/s": 5.0, "rad/s": 200.0, "1": 1.0}
     assert body.ball.mass == M
     for name, values in found.data_vars.items():
         bar = values.attrs["error_bar"]
-        assert bar <= 1e-11 * sizes[values.attrs["units"]], name
+        assert bar <= 1e-10 * sizes[values.attrs["units"]], name
         if np.any(values.to_numpy()):
             assert bar > 0, name
 

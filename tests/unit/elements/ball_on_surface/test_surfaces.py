@@ -11,7 +11,7 @@ from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Generator, Plane, Revolved, Torus
 
 STEP = 1e-5  # [m or rad]; a central difference is then off by STEP² and by round-off/STEP, both below 1e-9
-CLOSE = 1e-9
+CLOSE = 1e-8
 
 SURFACES = [
     Cylinder("wall", 0.2),
