@@ -51,7 +51,7 @@ def test_who_passes_the_top() -> None:
 
 @pytest.mark.parametrize("route", [SlidingTaylor, Polar, Implicit])
 def test_known_digits(route: Any) -> None:
-    """At 2.4 m/s the ball leaves at 0.242029573 s and lands at 0.594832033 s, in every route: to the last of those digits."""
+    """At 2.4 m/s the ball leaves at 0.242029573 s and lands at 0.594832033 s in every route, to the last digit."""
     body = rolling_ball(lying(2.4))
     path = follow(body, route(body), 1.0)
     assert path.events == [("lift_off", pytest.approx(0.242029573, abs=1e-9))]

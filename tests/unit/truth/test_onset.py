@@ -46,7 +46,7 @@ def test_onset_is_the_first_event_of_the_truth() -> None:
 
 
 def test_edge_separates_two_rises() -> None:
-    """The edge between μ = 0.39 and 0.40, found to six digits (the bounds), is where the first slip jumps by an oscillation."""
+    """The edge between μ = 0.39 and 0.40, found to six digits (the bounds), is where the first slip jumps."""
     edge = edge_between(cylinder(), 0.39, 0.40, 4.0)
     assert edge is not None
     before, after = (first_slip(cylinder(mu_static=edge + side), 4.0) for side in (-1e-6, 1e-6))

@@ -79,7 +79,7 @@ PAPER_TIME = 1.720183172
 
 
 def test_state_of_the_paper_case_with_resistance() -> None:
-    """At f = 0.02a the state at 1.720183172 s is the published one to its last digit (the bound), and the friction 0.35."""
+    """At f = 0.02a the state at 1.720183172 s is the published one to its last digit (the bound)."""
     found = final(truth(load_scene("sphere_in_cylinder", rolling_resistance=0.02 * A), np.array([0, PAPER_TIME])))
     for name, value in PAPER_CASE.items():
         assert found[name] == pytest.approx(value, rel=4e-9, abs=1e-8), name
