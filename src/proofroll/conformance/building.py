@@ -10,7 +10,7 @@ from unittest import SkipTest
 import numpy as np
 
 from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking, require, scenes
-from proofroll.core.certificate import certify, first_difference
+from proofroll.core.certificate import EXACT, ROUNDINGS, certify, first_difference
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import HasOptionalCapabilities
 from proofroll.core.engine import Sample
@@ -66,7 +66,7 @@ def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
 
 def certificate_holds(subject: Subject) -> None:
     """What was built is what the scene says: mass, inertia, gravity, radius, start, first accelerations and forces."""
-    difference = first_difference(certify(subject.build(), subject.scene))
+    difference = first_difference(certify(subject.build(), subject.scene, subject.settings))
     if difference is not None:
         raise UnlikeSceneError(subject, str(difference))
 
@@ -111,7 +111,9 @@ def samples_are_well_formed(subject: Subject) -> None:
     # One that can be asked for counts from the start; any other is part of the scene, and the certificate holds it.
     if orientation is not None and "orientation" in element.askable:
         identity = float(np.max(np.abs(np.abs(orientation) - [1, 0, 0, 0])))
-        require(identity < 1e-12, f"q_WB at time 0 is {orientation} instead of 1, 0, 0, 0")
+        require(
+            identity < max(EXACT, ROUNDINGS * subject.epsilon), f"q_WB at time 0 is {orientation} instead of 1, 0, 0, 0"
+        )
     moved = subject.at(subject.span(1)).sample()
     _well_formed(moved, element, "after a step")
     for name in element.sample_type.widths:

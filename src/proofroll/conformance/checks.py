@@ -22,6 +22,7 @@ _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
     declarations.settings_are_a_frozen_dataclass,
     declarations.presets_are_complete,
     declarations.resolution_and_order_are_told,
+    declarations.precision_is_told,
     declarations.bad_settings_give_one_line,
     building.provides_what_it_says,
     building.provides_for_some_scene,

@@ -10,6 +10,7 @@ from typing import Any
 
 from proofroll.conformance.subject import require
 from proofroll.core.announced import announced
+from proofroll.core.engine import EPSILON
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, resolve_settings
 
@@ -92,6 +93,16 @@ def resolution_and_order_are_told(engine: Any) -> None:
                 require(whole or order is None, f"{where}.order is {order!r}, neither a whole order nor None")
             else:
                 require(order is None, f"{where}.order is {order!r}; with a tolerance there is none")
+
+
+def precision_is_told(engine: Any) -> None:
+    """Each preset computes in double precision, or says that it computes in single precision."""
+    for formulation, presets in engine.presets.items():
+        for preset, settings in presets.items():
+            said = getattr(settings, "precision", "double")
+            require(
+                said in EPSILON, f"presets[{formulation!r}][{preset!r}].precision is {said!r}, not single or double"
+            )
 
 
 def bad_settings_give_one_line(engine: Any) -> None:

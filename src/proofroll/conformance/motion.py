@@ -16,11 +16,13 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.conformance.subject import Subject, bits, lacking, require, scenes, truth_scenes
 from proofroll.core.arrays import FloatArray
+from proofroll.core.certificate import ROUNDINGS
+from proofroll.core.engine import precision_of
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError
 
-# Below this relative difference two states differ by little more than accumulated round-off.
-_ROUND_OFF = 1e-9
+# Below this relative difference two states differ by little more than accumulated round-off, in each precision.
+_ROUND_OFF = {"double": 1e-9, "single": 1e-4}
 # The next term of the error's expansion shifts the observed order by about (h/τ)/ln 2, with τ a time of the motion, and
 # half as much at half the step: two observations are as near to the order as they are to each other.
 _SETTLED = 0.1
@@ -131,6 +133,9 @@ def velocities_are_the_rates(subject: Subject) -> None:
     before = engine.sample()
     engine.advance(start + h)
     after = engine.sample()
+    # two places and orientations, each rounded, over a short time
+    roundings = ROUNDINGS * subject.epsilon / h
+    rounding = {"v_WB": roundings * max(1.0, float(np.max(np.abs(after.p_WB)))), "w_WB": roundings}
     for name, rate, one, other in (
         ("v_WB", (after.p_WB - before.p_WB) / h, before.v_WB, after.v_WB),
         ("w_WB", _spin(before.q_WB, after.q_WB, h), before.w_WB, after.w_WB),
@@ -140,7 +145,7 @@ def velocities_are_the_rates(subject: Subject) -> None:
         mean = (one + other) / 2
         # A semi-implicit step moves with the velocity at one of its ends; the trapezoidal rule is off by (ω h)²/12, and
         # a soft contact may vibrate with its step.
-        allowed = float(np.linalg.norm(other - one)) / 2 + 1e-2 * float(np.linalg.norm(mean))
+        allowed = float(np.linalg.norm(other - one)) / 2 + 1e-2 * float(np.linalg.norm(mean)) + rounding[name]
         difference = float(np.linalg.norm(rate - mean))
         require(difference <= allowed, f"{name} is {mean}, but the state changes at the rate {rate}")
 
@@ -193,7 +198,7 @@ def _orders(subject: Subject, end: Callable[[float, float], FloatArray | None], 
             return math.inf, 0.0  # too coarse
         states.append(state)
     changes = [float(np.max(np.abs(coarse - fine))) for coarse, fine in pairwise(states)]
-    if changes[-1] < _ROUND_OFF:
+    if changes[-1] < _ROUND_OFF[precision_of(subject.settings)]:
         return math.nan, math.nan
     return math.log2(changes[0] / changes[1]), math.log2(changes[1] / changes[2])
 

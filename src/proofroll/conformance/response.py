@@ -14,9 +14,11 @@ from proofroll.conformance.subject import Subject, UnlikeSceneError, truth_scene
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
 from proofroll.core.dataset import columns_of, scales
+from proofroll.core.engine import precision_of
 from proofroll.core.first_steps import MOST, first_steps, softness
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
+from proofroll.core.verdict import round_off_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -58,7 +60,8 @@ def moves_as_the_truth(subject: Subject) -> None:
             float(np.max(np.abs(values - other))) / sizes[name] for other in (true[name].to_numpy()[1:], finer[name])
         )
         # The speed may be many times what gravity adds to it; a tolerance is relative to it.
-        rough = max(_ROUND_OFF, 10 * subject.closeness)
+        size = float(np.max(np.abs(true[name].to_numpy()))) / sizes[name]
+        rough = max(_ROUND_OFF, 10 * subject.closeness, round_off_of(precision_of(subject.settings), size))
         allowed = min(_MOST, _MARGIN * change + soft + rough)
         if error > allowed or math.isnan(error):
             made = f"of what gravity makes of it in {times[-1]:.2g} s"

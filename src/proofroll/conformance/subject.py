@@ -13,10 +13,10 @@ from unittest import SkipTest
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import certify
+from proofroll.core.certificate import ROUNDINGS, certify
 from proofroll.core.dataset import from_samples
 from proofroll.core.diagnosis.of_scene import diagnosed
-from proofroll.core.engine import Sample
+from proofroll.core.engine import EPSILON, Sample, precision_of
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
@@ -110,6 +110,11 @@ class Subject:
         return math.ceil(at_least / (parts * step)) * parts * step
 
     @property
+    def epsilon(self) -> float:
+        """Machine epsilon of the engine's arithmetic."""
+        return EPSILON[precision_of(self.settings)]
+
+    @property
     def closeness(self) -> float:
         """How far two runs of one motion may be apart that were not made of the same steps (see :meth:`distance`).
 
@@ -117,8 +122,12 @@ class Subject:
         step lost or doubled shows as 1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
         """
         if self.settings.resolution is None:
-            return 1e-9
-        return 1e-7 if self.fixed_step else max(1e-9, 1e3 * float(getattr(self.settings, self.settings.resolution)))
+            found = 1e-9
+        else:
+            found = (
+                1e-7 if self.fixed_step else max(1e-9, 1e3 * float(getattr(self.settings, self.settings.resolution)))
+            )
+        return max(found, ROUNDINGS * self.epsilon)
 
     def distance(self, one: Sample, other: Sample) -> float:
         """Largest difference of two states, relative to the size of each quantity in the scene."""
@@ -164,7 +173,7 @@ def explained(error: UnlikeSceneError) -> str:
         interval = max(math.floor(interval / step), 1) * step
     times = np.asarray(interval * np.arange(_SAMPLES), dtype=np.float64)
     try:
-        lines = [line.as_dict() for line in certify(subject.build(), scene)]
+        lines = [line.as_dict() for line in certify(subject.build(), scene, subject.settings)]
         causes = [] if all(line["holds"] for line in lines) else diagnosed(scene, lines, step=step)
         if not causes:
             run = from_samples(scene, times, subject.samples(times))

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.engine import Regularised
+from proofroll.core.engine import EPSILON, Regularised, precision_of
 from proofroll.core.errors import Diverged
 from proofroll.core.number_text import number
 from proofroll.core.scene import Scene
@@ -18,6 +18,10 @@ from proofroll.core.several import sample_of, shaped
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12
+# What an engine that computes in single precision may lose of a quantity, in roundings of the quantity's scale.
+ROUNDINGS = 64.0
+# How the reason of a line ends that allows the roundings of such an engine.
+ROUNDED = "single precision"
 # Numbers of one quantity that fit into a sentence: an inertia has nine.
 _SHOWN = 9
 
@@ -41,6 +45,7 @@ class Line:
         difference: relative to the quantity's scale; None where the engine is silent.
         tolerance: largest difference that is accepted.
         because: why the tolerance is not round-off; empty if it is.
+        roundings: how many roundings of the scale an honest engine may lose in whatever precision.
     """
 
     quantity: str
@@ -50,6 +55,7 @@ class Line:
     difference: float | None
     tolerance: float
     because: str = ""
+    roundings: float = ROUNDINGS
 
     @property
     def standing(self) -> Standing:
@@ -68,8 +74,10 @@ class Line:
         return {**dataclasses.asdict(self), "holds": self.holds, "standing": self.standing.value}
 
 
-def certify(engine: Any, scene: Scene) -> list[Line]:
+def certify(engine: Any, scene: Scene, settings: Any = None) -> list[Line]:
     """Compares a freshly built engine with the scene: the lines of all its elements.
+
+    ``settings`` are those with which it was built; in single precision each line allows its roundings.
 
     Raises:
         Diverged: what it samples or says that it built has another shape than the scene's bodies.
@@ -79,8 +87,16 @@ def certify(engine: Any, scene: Scene) -> list[Line]:
     for element in scene.elements:
         own = built[element.name] if len(scene.elements) > 1 else built
         for line in element.certify(own, sample_of(scene, element, sample)):
-            lines.append(replace(line, quantity=scene.label(element, line.quantity)))
+            lines.append(_rounded(replace(line, quantity=scene.label(element, line.quantity)), precision_of(settings)))
     return lines
+
+
+def _rounded(line: Line, precision: str) -> Line:
+    """The line with room for the roundings of a precision less than double."""
+    room = line.roundings * EPSILON[precision]
+    if precision == "double" or room <= line.tolerance:
+        return line
+    return replace(line, tolerance=room, because="; ".join(filter(None, (line.because, ROUNDED))))
 
 
 def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: float, because: str) -> tuple[float, str]:
@@ -173,4 +189,6 @@ def _single(line: Line) -> str:
     if len(line.found) != len(line.expected) or line.found == line.expected:
         return ""
     one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)
-    return "; it is the same number in single precision (float32)" if np.array_equal(one, other) else ""
+    if not np.array_equal(one, other):
+        return ""
+    return '; it is the same number in single precision (float32): settings of such an engine say precision = "single"'

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.number_text import number
 
 # A ladder is asymptotic if its observed order is the scheme's to this much.
 _ASYMPTOTIC = 0.1
@@ -17,6 +18,8 @@ _ASYMPTOTIC = 0.1
 _ORDERS = (1e-3, 20.0)
 # A tightening that changes less than this part of what another one does changes round-off alone.
 _SAME = 1e-6
+# Two changes of a power law of the step have one shape but for this part; those of round-off have not.
+_ONE_SHAPE = 0.3
 # Differences that shrink more slowly than this say nothing about a limit.
 _NO_CONVERGENCE = 0.25
 
@@ -34,6 +37,7 @@ class Limit:
         saturated: whether two tolerances gave the same run: something else limits its steps, as samples at which they
             end, and no limit of small ones follows.
         beside: what one step beside its events does to the finest curve (:mod:`proofroll.core.beside_events`).
+        floor: what ends the refinement instead of a limit, as a clause; empty: nothing does.
     """
 
     values: FloatArray
@@ -42,9 +46,12 @@ class Limit:
     shown: bool = True
     saturated: bool = False
     beside: float = 0.0
+    floor: str = ""
 
 
-def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None) -> Limit:
+def richardson(
+    curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None, precision: str = "double"
+) -> Limit:
     """Extrapolates three curves computed with three steps, coarse first.
 
     The observed order p follows from the size of the two differences (Roache 1998, section 5.9). Where it is that of
@@ -54,10 +61,14 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
     rounding of that order changes, too. Elsewhere extrapolating would spread the error of the coarse curves; the finest
     curve stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
 
+    In single precision each step rounds the state, so that smaller steps may be worse: there an order is that of an
+    asymptotic ladder of one shape, and any other shows neither an order nor a limit.
+
     Args:
         curves: three arrays of one shape.
         steps: their steps, falling; only the ratios matter.
         declared: order of the scheme; None: the nearest integer to the observed one.
+        precision: of the arithmetic, see :func:`proofroll.core.engine.precision_of`.
     """
     coarse, middle, fine = curves
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
@@ -65,6 +76,8 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
     if last == 0:  # exact, or told in steps that are coarser than what the refinement changed
         return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
+    if precision == "single" and not _one_law(order, declared, (middle - coarse) / first, (fine - middle) / last):
+        return Limit(fine, max(first, last, _walked(middle - coarse, fine - middle)), float("nan"), False)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
         shown = last < first * (h[1] / h[0]) ** _NO_CONVERGENCE
@@ -83,6 +96,12 @@ def richardson(curves: Sequence[FloatArray], steps: Sequence[float], declared: i
     change = size(after - before)
     bar = max(2 * abs(finer) * change, abs(hidden - finer) * change, 2 * rounding)
     return Limit(after + (after - before) * finer, bar, order)
+
+
+def _one_law(order: float, declared: int | None, before: FloatArray, after: FloatArray) -> bool:
+    """Whether two changes, over their sizes, are of one power law of the step, with the declared or a whole order."""
+    whole = declared or (round(order) if np.isfinite(order) else 0)
+    return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and size(after - before) <= _ONE_SHAPE
 
 
 def _walked(first: FloatArray, last: FloatArray) -> float:
@@ -138,6 +157,20 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
     shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
     rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
     return Limit(curves[-1], max(last, rest), float("nan"), shown)
+
+
+def floor_text(step: float, error: float, unit: str, worse: bool) -> str:
+    """What single precision leaves of a refinement, as a clause.
+
+    Args:
+        step: with the least error [s].
+        error: at that step.
+        unit: of the error; 1: none.
+        worse: whether smaller steps than that have been run.
+    """
+    if not worse:
+        return "no order shows in single precision"
+    return f"best step {number(step)} s, floor {number(error)}{'' if unit == '1' else f' {unit}'}: single precision"
 
 
 def size(values: FloatArray) -> float:

@@ -52,7 +52,10 @@ class Regularised:
 
 
 class Settings(Protocol):
-    """A frozen dataclass with at least these fields; every field has a default."""
+    """A frozen dataclass with at least these fields; every field has a default.
+
+    One of an engine that computes in single precision has ``precision = "single"`` besides, see :func:`precision_of`.
+    """
 
     @property
     def formulation(self) -> str:
@@ -113,6 +116,22 @@ class Engine(Protocol):
 
     def built(self) -> Any:
         """What was built, read back from the engine, as its kind of element has it. At time 0; changes nothing."""
+
+
+# Machine epsilon of the arithmetic in which an engine may compute, by its precision.
+EPSILON: Mapping[str, float] = {"double": 2.0**-52, "single": 2.0**-23}
+
+
+def precision_of(settings: Any) -> str:
+    """The precision in which an engine computes with some settings, a key of :data:`EPSILON`; double if they say none.
+
+    Raises:
+        InputError: they say another one.
+    """
+    precision = getattr(settings, "precision", "double")
+    if precision not in EPSILON:
+        raise InputError("precision", precision, f"settings say {' or '.join(EPSILON)}")
+    return str(precision)
 
 
 def fixed_step(settings: Settings) -> float | None:

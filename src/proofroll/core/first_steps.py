@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import Line, Standing, certify
+from proofroll.core.certificate import ROUNDINGS, Line, Standing, certify
 from proofroll.core.element import Element, FirstMotion
-from proofroll.core.engine import fixed_step
+from proofroll.core.engine import EPSILON, fixed_step, precision_of
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.number_text import number
@@ -40,7 +40,8 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
 
     Velocities after one, two and three steps give the derivative at time 0 by a parabola and by a cubic; half the step
     gives it again. Half a step's error of a method of order p is the change over 2^p - 1: that is taken off. What the
-    two polynomials and the two steps differ by is what the derivation does not know; the tolerance is three times that.
+    two polynomials and the two steps differ by is what the derivation does not know, and what rounding each velocity
+    makes of a derivative over so short a step; the tolerance is three times that.
     An engine without a step is looked at after small times. Empty for a ball at rest under rolling resistance, which
     has no direction yet, and for a contact so soft that its springs move first.
 
@@ -63,12 +64,14 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
     element, step = scene.elements[index], fixed_step(settings)
     h = step or start.moment
     finer = replace(settings, dt=h / 2) if step else settings
-    (_, coarse), (parabola, fine) = (
+    (_, coarse, _), (parabola, fine, rounding) = (
         _derivatives(kind, scene, element, chosen, interval) for chosen, interval in ((settings, h), (finer, h / 2))
     )
     order = declared_order(kind, settings, scene) if step else None
     found = fine + ((fine - coarse) / (2**order - 1) if order else 0.0)
-    unknown = np.abs(fine - coarse) + np.abs(fine - parabola)
+    epsilon = EPSILON[precision_of(settings)]
+    # a velocity of a point at rest is rounded as that of one at its body's end
+    unknown = np.abs(fine - coarse) + np.abs(fine - parabola) + epsilon * rounding
     turning = max(start.scale / element.length, float(np.max(np.abs(start.angular_acceleration))))
     lines = []
     for row, (quantity, unit, expected, scale) in enumerate(
@@ -85,7 +88,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
                 tuple(np.ravel(expected).tolist()),
                 tuple(np.ravel(found[row]).tolist()),
                 difference if np.isfinite(difference) else float("inf"),
-                _MARGIN * bar + _FLOOR + soft,
+                _MARGIN * bar + max(_FLOOR, ROUNDINGS * epsilon) + soft,
                 f"derived from velocities after steps of {number(h)} s and {number(h / 2)} s",
             )
         )
@@ -109,7 +112,7 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
     Numbers that only repeat the scene's are believed of nobody. An acceleration that an engine says is held to the
     scene exactly; its steps may differ by :data:`_STIFF`, and by what is granted to a softened one.
     """
-    lines = certify(engine, scene)
+    lines = certify(engine, scene, settings)
     granted = {line.quantity: line.tolerance for line in lines if line.standing is not Standing.NOT_REPORTED}
     found = []
     for line in derivable(kind, scene, settings):
@@ -128,8 +131,13 @@ def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     return []
 
 
-def _derivatives(kind: Any, scene: Scene, element: Element, settings: Any, h: float) -> tuple[FloatArray, FloatArray]:
-    """Accelerations of all bodies' centres and turning at time 0, by a parabola and a cubic; (2, bodies, 3)."""
+def _derivatives(
+    kind: Any, scene: Scene, element: Element, settings: Any, h: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Accelerations of all bodies' centres and turning at time 0, by a parabola and a cubic; (2, bodies, 3).
+
+    Besides what rounding each velocity by its natural size makes of them, over the machine epsilon; (2, 1, 1).
+    """
     engine = build(kind, scene, settings)
     samples = []
     for t in (0.0, h, 2 * h, 3 * h):
@@ -140,4 +148,7 @@ def _derivatives(kind: Any, scene: Scene, element: Element, settings: Any, h: fl
     pairs = [[np.reshape(part, shape) for part in (sample.v_WB, sample.w_WB)] for sample in samples]
     velocities = np.array(pairs)
     by_parabola, by_cubic = (np.tensordot(weights, velocities, 1) / h for weights in (_PARABOLA, _CUBIC))
-    return by_parabola, by_cubic
+    sizes = np.max(np.abs(velocities), axis=(0, 2, 3))
+    speed = max(sizes[0], sizes[1] * element.length)
+    natural = np.array([speed, speed / element.length]).reshape(2, 1, 1)
+    return by_parabola, by_cubic, np.sum(np.abs(_CUBIC)) * natural / h

@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import Limit
+from proofroll.core.engine import EPSILON
 from proofroll.core.number_text import number
 
 # A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
@@ -23,7 +24,7 @@ _SHOWN_WRONG = 10
 # the limit of small steps, which is that of the samples, excuses nothing.
 _BETWEEN = 10
 # Round-off of a curve, relative to its size: a thousand operations, each off by one machine epsilon.
-_ROUND_OFF = 1e3 * np.finfo(float).eps
+_ROUNDINGS = 1e3
 
 
 class Verdict(StrEnum):
@@ -109,6 +110,7 @@ def judge(
     sampled_bar: float = np.inf,
     between: tuple[FloatArray, FloatArray] | None = None,
     magnitude: float = 0.0,
+    precision: str = "double",
 ) -> Judgement:
     """Holds a curve and its limit of small steps against the true curve. The only place that gives a verdict.
 
@@ -129,11 +131,12 @@ def judge(
         sampled_bar: how far its samples leave that open; no run excuses itself by more.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
         magnitude: of the numbers of which the curve is a difference, as positions are of a gap: it has their round-off.
+        precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
     """
     error = largest_difference(values, true)
     off_grid = 0.0 if between is None else largest_difference(*between)
     hidden = off_grid > max(tolerance, _BETWEEN * error)
-    round_off = _ROUND_OFF * max(scale, magnitude, float(np.max(np.abs(true), initial=0.0)))
+    round_off = round_off_of(precision, max(scale, magnitude, float(np.max(np.abs(true), initial=0.0))))
     shown_unit = "" if unit == "1" else f" {unit}"
     rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
     if limit is not None:
@@ -170,6 +173,11 @@ def judge(
     )
 
 
+def round_off_of(precision: str, size: float) -> float:
+    """Round-off of a curve of this size."""
+    return _ROUNDINGS * EPSILON[precision] * size
+
+
 @dataclass(frozen=True)
 class _Ladder:
     """What a ladder of steps tells.
@@ -199,7 +207,7 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
     flat = bar <= truth_bar + round_off
     settled = limit.shown or flat or bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
-    doubted = bar + limit.beside
+    doubted = bar + limit.beside + round_off
     finding, leaves = LimitFinding.NOT_SHOWN, error - doubted > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitFinding.WITHIN
@@ -212,6 +220,8 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
         text = "it has not as many values as the truth"
     elif limit.beside > bar:
         text += f"; one step beside an event does {number(limit.beside, 1)}{unit}"
+    if limit.floor:
+        text += f"; {limit.floor}"
     if limit.saturated:
         text += "; two tolerances give the same run, for something else limits its steps, as near samples do"
     return _Ladder(finding, error, bar, order, leaves, wrong, text)

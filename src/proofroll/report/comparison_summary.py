@@ -21,6 +21,7 @@ from proofroll.report.comparison_records import (
     WorstJudgement,
     in_words,
 )
+from proofroll.report.labels import precision_words
 from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
 from proofroll.running.store import Store
@@ -169,11 +170,11 @@ def _worst(runs: list[Run], name: str) -> WorstJudgement:
 
 
 def _setting(engine: str, facts: EngineFacts) -> str:
-    """The preset, and whatever else the comparison file chose besides the step: ``cone=pyramidal``."""
+    """The preset, whatever else the comparison file chose besides the step (``cone=pyramidal``), and f32."""
     usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
     chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
     shown = [] if preset is None or (chosen and preset == "matched") else [preset]
-    return " ".join([*shown, *chosen])
+    return " ".join([*shown, *chosen, *precision_words(facts.precision)])
 
 
 def _settings(run: Run) -> dict[str, Any]:
@@ -189,6 +190,7 @@ def _settings(run: Run) -> dict[str, Any]:
         "resolution_value": facts.settings.get(facts.resolution or ""),
         "declared_order": facts.order,
         "caveat": facts.caveat,
+        "precision": facts.precision,
     }
 
 

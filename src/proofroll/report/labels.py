@@ -40,6 +40,11 @@ MEANINGS = {
 }
 
 
+def precision_words(precision: str) -> tuple[str, ...]:
+    """How a precision is told beside an engine's settings: double is what nobody asks about."""
+    return ("f32",) if precision == "single" else ()
+
+
 def unjudged(content: ReportedComparison) -> int:
     """How many runs could not be judged, though their rows expect a verdict."""
     from proofroll.studies.expectations import NOBODY
@@ -116,9 +121,10 @@ def names(rows: Sequence[Setting]) -> list[str]:
 
 
 def name_of(point: BoundaryPoint | MeasuredPoint) -> str:
-    """Engine, formulation and preset of a point of a study."""
+    """Engine, formulation and preset of a point of a study, and f32."""
     settings = point.settings
-    return " ".join(filter(None, (point.engine, settings.get("formulation"), settings.get("preset"))))
+    words = point.engine, settings.get("formulation"), settings.get("preset"), *precision_words(point.precision)
+    return " ".join(filter(None, words))
 
 
 def listed(parameters: Mapping[str, float]) -> str:

@@ -13,7 +13,7 @@ from proofroll.core.number_text import number
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns
-from proofroll.report.labels import settings_text
+from proofroll.report.labels import precision_words, settings_text
 from proofroll.running.case import Case, Result
 
 _EVENTS = 8  # of so many the terminal tells; the JSON document has all
@@ -26,6 +26,7 @@ class RunContent:
     Attributes:
         parameters: every parameter of the scene with its value, also those that nobody set.
         asks: what was wanted besides the motion.
+        precision: in which the engine computes, single or double.
         until, every: last time and sampling interval [s].
         final: variable -> value at the last sample; empty if there is none.
         units: of these.
@@ -41,6 +42,7 @@ class RunContent:
     asks: list[str]
     engine: str
     settings: dict[str, Any]
+    precision: str
     status: str
     message: str
     until: float
@@ -70,6 +72,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         asks=list(scene.asks),
         engine=case.engine.name,
         settings=case.engine.settings,
+        precision=case.engine.precision,
         status=result.status.value,
         message=result.message,
         until=case.until,
@@ -114,7 +117,7 @@ def run_lines(content: RunContent) -> list[Any]:
     from rich.table import Table
     from rich.text import Text
 
-    settings = settings_text(content.settings)
+    settings = ", ".join(filter(None, (settings_text(content.settings), *precision_words(content.precision))))
     lines: list[Any] = [Text(f"{content.scene} in {content.engine}" + (f" ({settings})" if settings else ""))]
     lines.append(Text(f"{content.status}: {content.message}"))
     lines += [Text(f"  {cause.sentence}") for cause in content.diagnosis]

@@ -71,6 +71,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest(sorted({place for truth in load_truths() for place in _of(truth)}))
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
+    from proofroll.core.engine import precision_of
     from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.handshake import libraries
@@ -88,6 +89,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
+        precision=precision_of(settings),
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)

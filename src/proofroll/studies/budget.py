@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.convergence import Limit, observed_order, richardson, size, tightest
+from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, size, tightest
 from proofroll.core.number_text import number
+from proofroll.core.verdict import round_off_of
 from proofroll.studies.curve import Curve, CurvePoint
 from proofroll.studies.tradeoff_records import CurveBudget
 
@@ -62,7 +63,9 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     the coarsest of them counts, as the coarse end.
     """
     used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
-    bar = _bar(used, quantity)
+    bar, single = _bar(used, quantity), curve.floor(quantity)
+    if single:  # runs with smaller steps show their roundings alone
+        used = used[: max(sum((p.step or 0.0) >= (single.best.step or 0.0) for p in used), 3)]
     found = CurveBudget(
         engine=curve.facts.name,
         curve=curve.engine,
@@ -77,10 +80,12 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
-        limit = richardson(values[-3:], steps[-3:], curve.facts.order)
+        limit = richardson(values[-3:], steps[-3:], curve.facts.order, curve.facts.precision)
         stalled = not observed_order(differences[-2], differences[-1], steps[-3:]) > _STALLED
         seen = differences
-        if stalled:  # what lies in the scatter of the finest runs shows no order
+        if single:
+            seen = list(itertools.takewhile(lambda difference: difference > _ABOVE * single.scatter, differences))
+        elif stalled:  # what lies in the scatter of the finest runs shows no order
             scatter = _ABOVE * max(differences[-2:])
             seen = list(itertools.takewhile(lambda difference: difference > scatter, differences))
         order = order_of(steps[: len(seen) + 1], seen)
@@ -89,6 +94,10 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         # A tolerance that limits nothing any more gives the same run again; one at the floor gives scatter.
         stalled = differences[-1] >= differences[-2]
     floor = max(differences[-2:]) if stalled else None
+    if single:
+        floor = single.error
+    if curve.facts.precision == "single":
+        limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", size(true))))
     model_form, error = size(limit.values - true), used[-1].errors[quantity]
     first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
     coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
@@ -103,6 +112,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         order_to=order.finest,
         contradicts_declaration=_contradicted(order, curve.facts.order),
         floor=floor,
+        best_step=single.best.step if single else None,
         coarse=coarse,
         coarse_step=first.step or 0.0,
         fine=TRUTH if error <= bar else fine,
@@ -206,7 +216,9 @@ def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
     else:
         seen = max(found.model_form_bar, found.truth)
         said += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
-    if found.floor is not None:
+    if found.floor is not None and found.best_step is not None:
+        said += f"; {floor_text(found.best_step, found.floor, unit, worse=True)}, smaller steps are worse"
+    elif found.floor is not None:
         said += f"; refining ends at a scatter of {number(found.floor, 1)} {unit}"
     return said + "."
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.beside_events import beside_events
 from proofroll.core.comparison import Band, Comparison
-from proofroll.core.convergence import Limit, richardson, tightest
+from proofroll.core.convergence import Limit, floor_text, richardson, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
@@ -148,16 +148,17 @@ def _judgements(
         if tolerance is None:
             continue
         true, bar = reference.true(name, curve)
-        scale = reference.sizes.get(name, 1.0)
+        scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
+        limit = _with_floor(run, name, _limit(run, name, curves), curves, true, unit)
         judgement = judge(
             name,
-            reference.scene.observables[name].unit,
+            unit,
             curve,
             true,
             truth_error_bar=bar,
             tolerance=tolerance.absolute(scale),
             scale=scale,
-            limit=_with_events(run, name, _limit(run, name, curves), reference, trajectories),
+            limit=_with_events(run, name, limit, reference, trajectories),
             ladder=_has_ladder(run, curve),
             lost=lost,
             doubt=reference.doubt(name),
@@ -165,6 +166,7 @@ def _judgements(
             sampled_bar=reference.sampled_bar,
             between=reference.between(name, trajectories[1.0]),
             magnitude=reference.magnitude(name),
+            precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
         )
         judgements.append(judgement)
     return judgements
@@ -183,7 +185,26 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) 
         return None
     if not stepped:
         return tightest(values)
-    return richardson(values, run.row.ladder, run.facts.order)
+    return richardson(values, run.row.ladder, run.facts.order, run.facts.precision)
+
+
+def _with_floor(
+    run: Planned,
+    name: str,
+    limit: Limit | None,
+    curves: dict[float, dict[str, FloatArray]],
+    true: FloatArray,
+    unit: str,
+) -> Limit | None:
+    """The limit, or in single precision without one what ended the refinement."""
+    facts = run.facts
+    if limit is None or not isinstance(facts, EngineFacts) or facts.step is None or np.isfinite(limit.order):
+        return limit
+    if facts.precision == "double":
+        return limit
+    errors = {factor: largest_difference(found[name], true) for factor, found in curves.items()}
+    best = min(errors, key=lambda factor: errors[factor])
+    return replace(limit, floor=floor_text(facts.step * best, errors[best], unit, best > min(errors)))
 
 
 def _with_events(

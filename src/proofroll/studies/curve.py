@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -104,6 +106,20 @@ class CurvePoint:
         return None if facts.resolution is None else float(facts.settings[facts.resolution])
 
 
+class Floor(NamedTuple):
+    """Where the runs of a curve come no closer, for each step rounds the state.
+
+    Attributes:
+        best: the most accurate run; those with smaller steps are worse.
+        error: of that run.
+        scatter: what the next smaller step changes.
+    """
+
+    best: CurvePoint
+    error: float
+    scatter: float
+
+
 @dataclass
 class Curve:
     """One engine, formulation and preset over its range.
@@ -133,8 +149,29 @@ class Curve:
         return {point.step for point in self.points} | self.dropped.keys()
 
     def envelope(self, quantity: str) -> list[float]:
-        """Of each point's error, see :func:`proofroll.studies.pareto.envelope`."""
-        return envelope([point.errors.get(quantity, np.inf) for point in self.points])
+        """Of each point's error, see :func:`proofroll.studies.pareto.envelope`.
+
+        That round-off of single precision grows below the best step says nothing of this one.
+        """
+        errors, floor = [point.errors.get(quantity, np.inf) for point in self.points], self.floor(quantity)
+        last = self.points.index(floor.best) + 1 if floor else len(errors)
+        return envelope(errors[:last]) + errors[last:]
+
+    def floor(self, quantity: str) -> Floor | None:
+        """Where smaller steps become worse in single precision; None: double, or none of them is."""
+        if self.facts.precision == "double" or not self.fixed_step:
+            return None
+        done = [point for point in self.points if np.isfinite(point.errors.get(quantity, np.inf))]
+        used = [point for point in done if point.curves[quantity].shape == done[-1].curves[quantity].shape]
+        changes = [largest_difference(a.curves[quantity], b.curves[quantity]) for a, b in itertools.pairwise(used)]
+        if not changes or changes[-1] == min(changes):
+            return None
+        least = int(np.argmin(changes))
+        errors = [point.errors[quantity] for point in done]
+        best = done.index(used[least + 1])
+        while best and errors[best - 1] <= errors[best]:  # an error that cancels at one step alone is not reached
+            best -= 1
+        return Floor(done[best], errors[best], changes[least + 1])
 
     def saturated(self, quantity: str) -> bool:
         """Whether the two loosest tolerances give the same run: something else than they limits its steps.

@@ -49,7 +49,7 @@ class BoundaryPoint:
     """One engine with its settings at one value of an axis.
 
     Attributes:
-        engine, settings, curve, level, caveat, resolution: which.
+        engine, settings, curve, level, caveat, precision, resolution: which.
         axis, value, parameters: where.
         until: length of every run [s].
         period: natural time of the scene there [s].
@@ -94,6 +94,7 @@ class BoundaryPoint:
     reproducer: str | None = None
     reproducer_needs: list[str] = field(default_factory=list)
     reproducer_note: str | None = None
+    precision: str = "double"
 
     @property
     def shown(self) -> Boundary:

@@ -103,6 +103,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
         curve=point.curve.engine,
         level=point.curve.level,
         caveat=facts.caveat,
+        precision=facts.precision,
         resolution=facts.resolution,
         axis=place.axis,
         value=place.value,

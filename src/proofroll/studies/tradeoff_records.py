@@ -79,7 +79,8 @@ class MeasuredPoint(MeasuredCost):
 
     Attributes:
         id: number of the point in its study.
-        engine, curve, level, settings, resolution, step, order, caveat: which, and what it says of itself.
+        engine, curve, level, settings, resolution, step, order, caveat, precision: which, and what it says of
+            itself.
         status, message, host: how the run ended, and on which machine of a cluster.
         error: largest distance from the truth, by observable; None: not finite.
         envelope: the largest of that and of the next finer runs.
@@ -96,6 +97,7 @@ class MeasuredPoint(MeasuredCost):
     step: float | None
     order: int | None
     caveat: str = ""
+    precision: str = "double"
     status: Status
     message: str
     host: str = ""
@@ -149,6 +151,8 @@ class CurveBudget:
         declared: order that the engine declares.
         contradicts_declaration: whether that lies outside the interval of the observed one.
         floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
+        best_step: step of the most accurate run where finer ones are worse, for they round more often in single
+            precision [s]; None: there is none.
         truth: error bar of the truth; None: it is not finite.
         coarse, fine: what dominates at either end.
         coarse_step, fine_step: those ends.
@@ -169,6 +173,7 @@ class CurveBudget:
     declared: int | None = None
     contradicts_declaration: bool = False
     floor: float | None = None
+    best_step: float | None = None
     truth: float | None = None
     coarse: str = ""
     coarse_step: float | None = None

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.convergence import floor_text
 from proofroll.core.number_text import counted, number
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
@@ -160,6 +161,7 @@ def _point(curve: Curve, point: CurvePoint, number: int, envelope: dict[str, flo
         step=point.step,
         order=facts.order,
         caveat=facts.caveat,
+        precision=facts.precision,
         status=point.result.status,
         message=point.result.message,
         host=point.result.host,
@@ -194,6 +196,10 @@ def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
         if other := [item for item in judged if item.curve == curve.engine]:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
+    for item in budgets:
+        if item.quantity == quantity and item.best_step is not None and item.floor is not None:
+            told = floor_text(item.best_step, item.floor, unit, worse=True)
+            said.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
     whole = [
         c for c in found.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
     ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.core.comparison import Tolerance
+from proofroll.core.convergence import floor_text
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_text import number
 
@@ -110,6 +111,11 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
     budget = next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
     if budget is None or budget.model_form is None:
         return "too few finer runs reached the end to say whether a finer step would do"
+    if budget.floor is not None and budget.best_step is not None and budget.floor > absolute:
+        floor = floor_text(budget.best_step, budget.floor, study.quantities[quantity].unit, worse=True)
+        return f"no step would do: {floor}"
+    if budget.best_step is not None and (point.step or 0.0) < budget.best_step:
+        return f"the step is too small for single precision, the best one is {number(budget.best_step)} s"
     if budget.model_form - (budget.model_form_bar or 0.0) > absolute:
         return f"no step would do, for {number(budget.model_form)} remain in the limit of small steps"
     return "the step is too coarse"

@@ -19,7 +19,7 @@ from proofroll.running.case import Result, Status
 
 
 def _case(scene: str, **parameters: float) -> Any:
-    engine = SimpleNamespace(name="e", settings={})
+    engine = SimpleNamespace(name="e", settings={}, precision="double")
     return SimpleNamespace(scene=scene, parameters=parameters, engine=engine, until=1.0, every=0.1, asks=())
 
 

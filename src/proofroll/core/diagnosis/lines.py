@@ -103,5 +103,5 @@ def single_precision(lines: Sequence[Mapping[str, Any]]) -> Iterator[Cause]:
     if exact:
         before = max(line["difference"] for line in exact)
         name, says = str(exact[0]["quantity"]), "what the engine holds are single-precision numbers (float32)"
-        remedy = "compute in double precision, or declare a tolerance of 1e-6 for what float32 cannot hold"
+        remedy = 'compute in double precision, or say precision = "single" in the settings'
         yield Cause("float32", says, f"at time 0 {name}, relative", "1", before, 0.0, remedy)

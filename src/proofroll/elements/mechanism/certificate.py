@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import Line, require_shapes, tolerated
-from proofroll.core.engine import Regularised
+from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
+from proofroll.core.engine import EPSILON, Regularised
 from proofroll.elements.mechanism.dataset import reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
@@ -62,11 +62,12 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         if soft is None and quantity in {"forces", "torques"}:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda one: one.tolerance, default=None)
         tolerance, because = tolerated(soft, CAPS.get(quantity), COMPOSED, _COMPOSED)
-        if quantity in _FROM_ACCELERATIONS:
-            noise = _MARGIN * element.noise / (scale if "acceleration" in quantity else found.scale)
-            tolerance, because = max((tolerance, because), (noise, _NOISY))
+        own = scale if "acceleration" in quantity else found.scale
+        noise = _MARGIN * element.noise / own if quantity in _FROM_ACCELERATIONS else 0.0
+        tolerance, because = max((tolerance, because), (noise, _NOISY))
+        roundings = max(ROUNDINGS, noise / EPSILON["double"])
         shown = tuple(np.ravel(want).tolist()), tuple(np.ravel(got).tolist())
-        lines.append(Line(quantity, unit, *shown, difference, tolerance, because))
+        lines.append(Line(quantity, unit, *shown, difference, tolerance, because, roundings))
 
     size, bodies = element.length, mechanism.bodies
     masses = np.array([body.mass for body in bodies])
