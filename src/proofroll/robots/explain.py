@@ -16,6 +16,8 @@ from proofroll.robots.robot_file import RobotFile
 _HELPS = 0.999
 # Where no cause closes a layer alone, so many of the best are followed: the largest step is not always a right one.
 _BRANCHES = 3
+# At so many states hypotheses are tried: random ones tell two robots apart. The causes found are proven at all states.
+_TRIED_AT = 2
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,7 +70,28 @@ class Search:
     recompiled: Callable[[Element], Robot | None] = lambda _: None
 
     def causes(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
-        """The causes of all differences, and the first layer that they leave unexplained."""
+        """The causes of all differences, and the first layer that they leave unexplained.
+
+        They are looked for at a few of the states, and proven at all; where that fails all states are searched.
+        """
+        if truth.states.count > _TRIED_AT:
+            few = dataclasses.replace(self, reading=self.reading.first(_TRIED_AT))
+            found, layer = few._searched(truth.first(_TRIED_AT))
+            step = self._proven(truth, found)
+            if step is not None and first_failing(step.found, self.tolerances) == layer:
+                return step.causes, layer
+        return self._searched(truth)
+
+    def _proven(self, truth: RobotTruth, causes: tuple[RobotCause, ...]) -> _Step | None:
+        """The step after causes that were found at other states; None: one gives no other robot here."""
+        known = {item.id: item for item in hypotheses()}
+        step: _Step | None = _Step(truth, differences(truth, self.reading))
+        for cause in causes:
+            step = None if step is None else self._tried(step, known[cause.id], cause.layer)
+        return step
+
+    def _searched(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
+        """See :meth:`causes`, at the states of the truth."""
         step = _Step(truth, differences(truth, self.reading))
         while (layer := first_failing(step.found, self.tolerances)) is not None:
             closed = self._closed(step, layer)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from proofroll.core.arrays import slices
-from proofroll.robots.model import Array, Robot, RobotBody
+from proofroll.robots.model import Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, passive, poses, world_jacobians
@@ -51,7 +51,13 @@ class RobotTruth:
         Joints that the states do not have are at rest.
         """
         states = states.completed(robot)
-        return cls(robot, states, world_jacobians(robot, states), passive(robot, states), like)
+        same = like is not None and _moves_alike(robot, like.robot)
+        dynamics = like.dynamics if like is not None and same else world_jacobians(robot, states)
+        return cls(robot, states, dynamics, passive(robot, states), like)
+
+    def first(self, count: int) -> RobotTruth:
+        """The truth at the first states alone."""
+        return RobotTruth(self.robot, self.states.first(count), self.dynamics.first(count), self.passive[:count])
 
     @cached_property
     def scales(self) -> dict[str, float]:
@@ -75,11 +81,7 @@ class RobotTruth:
     @cached_property
     def singular(self) -> bool:
         """Whether the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
-        own = np.sqrt(np.abs(np.diagonal(self.dynamics.M, axis1=1, axis2=2)))
-        if not own.size or not own.min():
-            return True
-        scaled = self.dynamics.M / own[:, :, None] / own[:, None, :]
-        return float(np.linalg.eigvalsh(scaled).min()) < _SINGULAR
+        return self.dynamics.smallest < _SINGULAR
 
     @cached_property
     def inverse(self) -> Array:
@@ -108,6 +110,25 @@ class RobotTruth:
             }
         found = self.inverse + self.passive
         return {name: found[:, columns] for name, columns in self.robot.columns.items()}
+
+
+# What acts in joints beside M a + h.
+_PASSIVE = {"damping", "friction", "stiffness", "rest"}
+_MOTION = [field.name for field in dataclasses.fields(RobotJoint) if field.name not in _PASSIVE]
+
+
+def _moves_alike(robot: Robot, other: Robot) -> bool:
+    """True if one was made of the other by changes of passive forces and couplings alone."""
+    return (
+        robot.bodies is other.bodies
+        and robot.gravity is other.gravity
+        and len(robot.joints) == len(other.joints)
+        and all(
+            getattr(one, name) is getattr(two, name)
+            for one, two in zip(robot.joints, other.joints, strict=True)
+            for name in _MOTION
+        )
+    )
 
 
 def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:

@@ -82,6 +82,19 @@ class Reading:
     coupled: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
+    def first(self, count: int) -> Reading:
+        """What was evaluated at the first states alone."""
+        return dataclasses.replace(
+            self,
+            position={joint: rows[:count] for joint, rows in self.position.items()},
+            rotation={joint: rows[:count] for joint, rows in self.rotation.items()},
+            M=self.M[:count],
+            g=self.g[:count],
+            h=self.h[:count],
+            inverse=None if self.inverse is None else self.inverse[:count],
+            forward=None if self.forward is None else self.forward[:count],
+        )
+
 
 @dataclasses.dataclass(frozen=True)
 class Whole:

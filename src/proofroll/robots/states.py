@@ -41,6 +41,11 @@ class RobotStates:
         """How many states there are."""
         return len(next(iter(self.velocity.values()), ()))
 
+    def first(self, count: int) -> RobotStates:
+        """The first states alone."""
+        parts = {name: {joint: rows[:count] for joint, rows in each.items()} for name, each in vars(self).items()}
+        return RobotStates(**parts)
+
     def stacked(self, rates: dict[str, Array], robot: Robot) -> Array:
         """Velocities or accelerations in the order of a robot's joints, shape (states, velocities)."""
         return np.concatenate([np.zeros((self.count, 0)), *(rates[joint.name] for joint in robot.moving)], axis=1)

@@ -7,6 +7,7 @@ B, :mod:`proofroll.robots.body_recursion`: recursive Newton-Euler with spatial v
 from __future__ import annotations
 
 import dataclasses
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -28,6 +29,18 @@ class Dynamics:
     M: Array
     g: Array
     h: Array
+
+    def first(self, count: int) -> Dynamics:
+        """Those of the first states alone."""
+        return Dynamics(self.M[:count], self.g[:count], self.h[:count])
+
+    @cached_property
+    def smallest(self) -> float:
+        """The smallest eigenvalue of M with velocities scaled by their own inertia; 0 where one has none."""
+        own = np.sqrt(np.abs(np.diagonal(self.M, axis1=1, axis2=2)))
+        if not own.size or not own.min():
+            return 0.0
+        return float(np.linalg.eigvalsh(self.M / own[:, :, None] / own[:, None, :]).min())
 
 
 def passive(robot: Robot, states: RobotStates) -> Array:
