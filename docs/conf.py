@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import re
+import sys
+from pathlib import Path
 from typing import Any
 
 import proofroll
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 project = "proofroll"
 author = "the proofroll authors"
 copyright = author  # noqa: A001 -- the name is Sphinx's
 release = proofroll.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "sphinx.ext.mathjax", "sphinx.ext.viewcode"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "formulas", "sphinx.ext.viewcode"]
+html_math_renderer = "pictures"
 myst_enable_extensions = ["dollarmath", "amsmath", "colon_fence"]
 myst_heading_anchors = 3
 exclude_patterns = ["_build", "examples/*.md"]
@@ -19,6 +24,7 @@ suppress_warnings = ["myst.header"]
 html_theme = "furo"
 html_title = "proofroll"
 html_static_path = ["_static"]
+html_search_scorer = "_static/scorer.js"
 html_css_files = ["proofroll.css"]
 html_show_sourcelink = False
 autodoc_member_order = "bysource"

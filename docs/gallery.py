@@ -63,16 +63,24 @@ def failures(content: ReportedComparison) -> str:
 
 def picture(scene: str) -> str:
     """Draws the scene into a file; its line of Markdown, empty where there is no drawing."""
+    text, label = drawn_scene(scene, scene)
+    if not text:
+        return ""
+    (PICTURES / f"{scene}.svg").write_text(text, encoding="utf-8")
+    return f"```{{image}} gallery/{scene}.svg\n:alt: {scene}, {label}\n```\n"
+
+
+def drawn_scene(scene: str, name: str) -> tuple[str, str]:
+    """A scene as SVG that stands alone, and what it shows; both empty where there is no drawing."""
     drawings = scene_sheet(scene, []).drawings
     if not drawings:
-        return ""
-    markup = str(templates().get_template("scene.html").module.picture(drawings[0], scene))  # type: ignore[attr-defined]
+        return "", ""
+    markup = str(templates().get_template("scene.html").module.picture(drawings[0], name))  # type: ignore[attr-defined]
     width, height = drawings[0].box[2:]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:g}" height="{height:g}"'
     lines = [line for line in markup.splitlines() if line.strip()]
     text = "\n".join(lines).replace("<svg", head, 1).replace(">", f">\n{STYLE}", 1)
-    (PICTURES / f"{scene}.svg").write_text(text + "\n", encoding="utf-8")
-    return f"```{{image}} gallery/{scene}.svg\n:alt: {scene}, {drawings[0].label}\n```\n"
+    return text + "\n", drawings[0].label
 
 
 def truth(outcome: Outcome, runner: Runner) -> str:
