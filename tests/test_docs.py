@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 import shlex
 import subprocess
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
 
 ROOT = Path(__file__).resolve().parents[1]
 # README.md and the pages whose snippets have tests of their own.
@@ -111,3 +114,20 @@ def test_the_workflow_runs_the_two_commands() -> None:
     assert {word for line in made for word in line.split()} >= {"check", "docs", "test"}
     for line in [*commands[1:], *made]:
         subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
+
+
+@pytest.mark.parametrize("kind", [Mechanism, Body, Joint, Loop, Spring, Point])
+def test_authors_of_engines_find_each_field(kind: type) -> None:
+    """The table of a mechanism's fields has all that an engine is given, and nothing that they have not."""
+    text = (ROOT / "docs" / "write_an_engine.md").read_text(encoding="utf-8")
+    rows = text.partition("### Fields of a mechanism\n")[2].partition("\nLoops have")[0].splitlines()
+    table: dict[str, set[str]] = {}
+    owner = ""
+    for line in rows:
+        if line.startswith("| ") and line.count("|") >= 4:
+            first, names, *_ = (part.strip() for part in line.strip("|").split("|"))
+            owner = first.partition("`")[2].partition("`")[0] or owner
+            table.setdefault(owner, set()).update(re.findall(r"`(\w+)", names))
+    fields = {item.name for item in dataclasses.fields(kind)}
+    assert fields <= table[kind.__name__]
+    assert all(hasattr(kind, name) or name in fields for name in table[kind.__name__])

@@ -124,6 +124,23 @@ def test_versions_that_are_none(versions: Callable[..., tuple[int, str, str]], o
     assert err.count("\n") == 1
 
 
+def test_versions_are_understood_as_engines_are_written(
+    versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path], tmp_path: Path
+) -> None:
+    """NAME@OLD NAME@NEW SUBJECT is NAME OLD NEW SUBJECT, and a name alone is what is installed here."""
+    del versions  # it announces the engine
+    old, new = (str(pythons[version]) for version in ("2.0", "2.0.1"))
+    claim = str(tmp_path / "balls.toml")
+    more = (claim, "--rounds", "0", "--out", str(tmp_path / "out"))
+    code, out, err = proofroll("versions", f"aged@{old}", f"aged@{new}", *more)
+    assert code == 0, err
+    assert "2 cases: 2 with the same bits" in out
+    for words in ((f"aged@{old}", new, "2.0", claim), ("aged", "2.0")):
+        code, out, err = proofroll("versions", *words)
+        assert (code, out, err.count("\n")) == (2, "", 1)
+    assert "name two versions: proofroll versions aged 2.0 VERSION" in err
+
+
 def test_lower_bounds_are_those_of_the_adapters() -> None:
     """What `pip install proofroll[ENGINE]` brings at least is no older than the adapter supports."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]

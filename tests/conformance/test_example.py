@@ -20,24 +20,26 @@ from proofroll.studies.cases import single_case
 EXAMPLE = Path(__file__).resolve().parents[2] / "docs" / "examples" / "semi_implicit.py"
 
 
-def example() -> ModuleType:
-    """The example's module, imported from its path, as its entry point will find it."""
-    spec = importlib.util.spec_from_file_location(EXAMPLE.stem, EXAMPLE)
+def example(path: Path = EXAMPLE) -> ModuleType:
+    """An example's module, imported from its path, as its entry point will find it."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[EXAMPLE.stem] = module
+    sys.modules[path.stem] = module
     spec.loader.exec_module(module)
     return module
 
 
 SEMI_IMPLICIT = example().SemiImplicit
+TREE = EXAMPLE.with_name("tree_euler.py")
+TREE_EULER = example(TREE).TreeEuler
 
 
 @pytest.fixture(autouse=True)
 def example_is_installed(install_engines: Callable[[Mapping[str, str]], None], monkeypatch: pytest.MonkeyPatch) -> None:
     """The example as an installed package, to this process and to its workers."""
-    install_engines({"semi_implicit": "semi_implicit:SemiImplicit"})
+    install_engines({"semi_implicit": "semi_implicit:SemiImplicit", "tree_euler": "tree_euler:TreeEuler"})
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(EXAMPLE.parent), os.environ["PYTHONPATH"]]))
 
 
@@ -53,7 +55,7 @@ def test_the_example_is_checked_on_both_scenes() -> None:
         assert f"certificate_holds[newton_euler-default-{scene}]" in names
 
 
-@pytest.mark.parametrize("check", checks(SEMI_IMPLICIT))
+@pytest.mark.parametrize("check", [*checks(SEMI_IMPLICIT), *checks(TREE_EULER)])
 def test_the_example_conforms(check: Check) -> None:
     """The example keeps a promise of the protocol."""
     check()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, require_known
 
 if TYPE_CHECKING:
     from proofroll.core.scene import Scene
@@ -21,6 +21,21 @@ Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the 
 _TEMPLATES = Path(__file__).parent / "templates"
 _UNTIL, _EVERY = 1.0, 0.02
 _ANOTHER = "choose another name"
+# For --for: the example that the engine begins as, the name of its class, a scene that it runs, what it does.
+_EXAMPLES = {
+    "ball": (
+        "semi_implicit",
+        "SemiImplicit",
+        "inclined_plane",
+        "semi-implicit Euler on the equations of a rolling ball",
+    ),
+    "mechanism": (
+        "tree_euler",
+        "TreeEuler",
+        "double_pendulum",
+        "semi-implicit Euler in the coordinates of a tree of joints",
+    ),
+}
 
 
 @new.command()
@@ -53,24 +68,36 @@ def comparison(name: Name, scene: Annotated[str, typer.Option(help="The scene, o
 
 
 @new.command()
-def engine(name: Name) -> None:
-    """Write a package NAME with a working engine, its entry point and its conformance test."""
+def engine(
+    name: Annotated[str, typer.Argument(help="The engine's name: letters, digits and _; commands take it so.")],
+    kind: Annotated[str, typer.Option("--for", help="What it moves: ball (on a surface) or mechanism.")] = "",
+) -> None:
+    """Write a package proofroll_NAME with a working engine NAME, its entry point and its conformance test."""
     from importlib.util import find_spec
 
     from proofroll.core.plugins import engine_names
     from proofroll.files.data_folders import data_folder
 
-    folder = _fresh(name, name)
-    if name in {*engine_names(), "truth"} or find_spec(name):
-        raise InputError("name", name, f"an engine or a package that is installed is called so; {_ANOTHER}")
-    names = {"name": name, "Class": "".join(part.capitalize() for part in name.split("_")) or name}
+    package = f"proofroll_{name}"  # of its own: one called NAME would hide the library of the engine
+    folder = _fresh(name, package)
+    if name in {*engine_names(), "truth"} or find_spec(package):
+        raise InputError("name", name, f"an engine or its package that is installed is called so; {_ANOTHER}")
+    require_known("--for", kind, _EXAMPLES, "say what the engine moves:")
+    file, former, scene, does = _EXAMPLES[kind]
+    names = {
+        "name": name,
+        "package": package,
+        "Class": "".join(part.capitalize() for part in name.split("_")) or name,
+        "scene": scene,
+        "does": does,
+    }
     for template in sorted((_TEMPLATES / "engine").rglob("*")):
         if template.is_file():  # those end in .txt of which tools would think that they are files of this project
             target = folder / template.relative_to(_TEMPLATES / "engine")
             _write(target.with_suffix("") if target.suffix == ".txt" else target, _filled(template, names))
-    example = (data_folder("docs/examples") / "semi_implicit.py").read_text(encoding="utf-8")
-    source = example.replace("SemiImplicit", names["Class"]).replace("semi_implicit", name)
-    _write(folder / "src" / name / "__init__.py", source)
+    example = (data_folder("docs/examples") / f"{file}.py").read_text(encoding="utf-8")
+    source = example.replace(former, names["Class"]).replace(f'"{file}"', f'"{name}"')
+    _write(folder / "src" / package / "__init__.py", source)
     _say(folder, f"pip install --editable {folder}", f"pytest {folder}")
 
 

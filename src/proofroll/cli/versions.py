@@ -24,7 +24,7 @@ SUBJECTS = "proofroll.version_subjects"
 def versions(
     engine: Annotated[str, typer.Argument(help="Name of the engine, e.g. mujoco.")],
     old: Annotated[str, typer.Argument(help="A version, a label of `proofroll engines`, or the path of a Python.")],
-    new: Annotated[str, typer.Argument(help="The version to which it is compared, likewise.")],
+    new: Annotated[str, typer.Argument(help="The version to which it is compared, likewise.")] = "",
     subject: Annotated[
         str, typer.Argument(help="A comparison, a scene or a robot file; by default all comparisons.")
     ] = "",
@@ -42,6 +42,7 @@ def versions(
     """
     from proofroll.report.versions import heading, lines, page, robot_table, table
 
+    engine, old, new, subject = _spelled(engine, old, new, subject)
     readers = {point.name: point for point in announced(SUBJECTS)}
     robot = readers.get(Path(subject).suffix.removeprefix("."))
     if robot is not None and scheduler is not None:
@@ -72,6 +73,23 @@ def versions(
     raise typer.Exit(options.CONTRADICTED if content.changed else options.OK)
 
 
+def _spelled(engine: str, old: str, new: str, subject: str) -> tuple[str, str, str, str]:
+    """Engine, two versions and subject, also where they are written as other commands do: NAME@OLD NAME@NEW SUBJECT."""
+    from proofroll.core.plugins import place_of, plain_name
+
+    name = plain_name(engine)
+    if place_of(engine):
+        if subject:
+            raise InputError(
+                "engine", engine, f"the version stands behind it: {name} {place_of(engine)} {new} {subject}"
+            )
+        old, new, subject = place_of(engine), old, new
+    if not new:
+        raise InputError("new", "nothing", f"name two versions: proofroll versions {name} {old} VERSION")
+    old, new = (place_of(text) if plain_name(text) == name and "@" in text else text for text in (old, new))
+    return name, old, new, subject
+
+
 def _keep(content: VersionsStudy, page: str, out: Path) -> Path:
     """Writes page and document; their file, without an ending."""
     from proofroll.running.store import write_text
@@ -90,6 +108,8 @@ def _place(engine: str, text: str) -> str:
     from proofroll.running import environments
     from proofroll.running.asking import describe
 
+    if text == engine:
+        return engine  # as it is installed here
     if os.sep in text or text.startswith(("~", ".")) or environments.find(engine, text) is not None:
         return f"{engine}@{text}"
     if not re.fullmatch(r"\d[\w.+]*", text):

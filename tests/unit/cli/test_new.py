@@ -51,16 +51,28 @@ def test_a_comparison(
     assert ("reduced" in names) == (scene == "inclined_plane")  # it has no equations of a rod
 
 
-def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
-    """A new engine announces its class, and passes its own conformance test."""
-    assert proofroll("new", "engine", "my_engine")[0] == 0
-    project = tomllib.loads((folder / "my_engine" / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    assert project["entry-points"]["proofroll.engines"] == {"my_engine": "my_engine:MyEngine"}
-    install = ["pip", "install", "--quiet", "--no-deps", "--no-build-isolation", "--target", "site", "./my_engine"]
+@pytest.mark.parametrize("kind", ["ball", "mechanism"])
+def test_an_engine(proofroll: Proofroll, folder: Path, kind: str) -> None:
+    """A new engine announces its class from a package that hides no other, and passes its own conformance test."""
+    assert proofroll("new", "engine", "my_engine", "--for", kind)[0] == 0
+    package = folder / "proofroll_my_engine"
+    project = tomllib.loads((package / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["entry-points"]["proofroll.engines"] == {"my_engine": "proofroll_my_engine:MyEngine"}
+    assert [path.name for path in (package / "src").iterdir()] == ["proofroll_my_engine"]
+    install = [
+        "pip",
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-build-isolation",
+        "--target",
+        "site",
+        f"./{package.name}",
+    ]
     subprocess.run([sys.executable, "-m", *install], cwd=folder, capture_output=True, timeout=600, check=True)
     done = subprocess.run(
         [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"],
-        cwd=folder / "my_engine",
+        cwd=package,
         env=os.environ | {"PYTHONPATH": str(folder / "site")},
         capture_output=True,
         text=True,
@@ -74,22 +86,37 @@ def test_an_engine(proofroll: Proofroll, folder: Path) -> None:
 @pytest.mark.usefixtures("folder")
 @pytest.mark.parametrize(
     ("what", "name"),
-    [("scene", "pendulum"), ("engine", "mujoco"), ("engine", "truth"), ("engine", "numpy"), ("scene", "class"),
+    [("scene", "pendulum"), ("engine", "mujoco"), ("engine", "truth"), ("scene", "class"),
      ("comparison", "paper"), ("comparison", "tradeoff")],
 )  # fmt: skip
 def test_a_name_that_stands_for_something_else(proofroll: Proofroll, what: str, name: str) -> None:
     """A scene is not called as one of the package, which commands would take, nor an engine as what is installed."""
-    scene = ["--scene", "pendulum"] if what == "comparison" else []
-    code, out, err = proofroll("new", what, name, *scene)
+    more = {"comparison": ["--scene", "pendulum"], "engine": ["--for", "ball"]}.get(what, [])
+    code, out, err = proofroll("new", what, name, *more)
     assert (code, out, list(Path().iterdir())) == (2, "", [])
     assert f"name = '{name}': a" in err
     assert err.endswith("choose another name\n")
 
 
-@pytest.mark.parametrize("what", [["scene"], ["engine"], ["comparison", "--scene", "pendulum"]])
+def test_an_engine_may_be_called_as_its_library(proofroll: Proofroll, folder: Path) -> None:
+    """An engine has the name of its library, from a package that has another."""
+    assert proofroll("new", "engine", "numpy", "--for", "ball")[0] == 0
+    assert (folder / "proofroll_numpy" / "src" / "proofroll_numpy" / "__init__.py").exists()
+
+
+@pytest.mark.parametrize("kind", [[], ["--for", "robot"]])
+def test_an_engine_is_for_something(proofroll: Proofroll, folder: Path, kind: list[str]) -> None:
+    """Who does not say what the engine moves is asked."""
+    code, out, err = proofroll("new", "engine", "mine", *kind)
+    assert (code, out, list(folder.iterdir())) == (2, "", [])
+    assert "--for" in err
+    assert "say what the engine moves: ball, mechanism" in err
+
+
+@pytest.mark.parametrize("what", [["scene"], ["engine", "--for", "ball"], ["comparison", "--scene", "pendulum"]])
 def test_nothing_is_overwritten(proofroll: Proofroll, folder: Path, what: list[str]) -> None:
     """What is there already stays, and so does a place that a name would lead out of the folder."""
-    file = folder / ("mine.toml" if what[0] == "comparison" else "mine")
+    file = folder / {"comparison": "mine.toml", "engine": "proofroll_mine", "scene": "mine"}[what[0]]
     file.write_text("dear to me")
     for name in ("mine", "../mine", "Mine", "class"):
         code, out, err = proofroll("new", what[0], name, *what[1:])

@@ -1,0 +1,77 @@
+"""A complete engine of mechanisms: the mass matrix of a tree of joints, stepped by semi-implicit Euler."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from annotated_types import Gt
+
+from proofroll.core.engine import whole_steps
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Mechanism, Tree
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.rotations import Array, skew, to_quaternion
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+
+JOINTS = frozenset({MechanismCapability.FIXED, MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC})
+
+
+@dataclass(frozen=True)
+class Settings:
+    formulation: Literal["tree"] = "tree"
+    preset: Literal["default"] = "default"
+    dt: Annotated[float, Gt(0)] = 1e-3  # step [s]
+    resolution = "dt"
+    order = 1
+
+
+class TreeEuler:
+    """Semi-implicit Euler on the equations in joint coordinates."""
+
+    name: ClassVar[str] = "tree_euler"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"tree": JOINTS}
+    settings: ClassVar[type[Settings]] = Settings
+    presets: ClassVar[Mapping[str, Mapping[str, Settings]]] = {"tree": {"default": Settings()}}
+
+    @staticmethod
+    def version() -> str:
+        return "1.0"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Settings) -> TreeEuler:
+        return cls(mechanism_of(scene), settings.dt)
+
+    def __init__(self, mechanism: Mechanism, dt: float) -> None:
+        self.mechanism, self.tree, self.dt, self.t = mechanism, Tree(mechanism), dt, 0.0
+        self.q, self.v = mechanism.start()
+
+    def acceleration(self) -> Array:
+        motion, n = self.tree.at(self.q, self.v), len(self.v)  # of all bodies, the last one is the world
+        M, push = np.zeros((n, n)), np.zeros(n)
+        for i, body in enumerate(self.mechanism.bodies):
+            R, w, J, bias = motion.R_WB[i], motion.w_WB[i], motion.J[i], motion.bias[i]
+            c, inertia = R @ body.com, R @ body.inertia @ R.T
+            linear = J[:3] - skew(c) @ J[3:]
+            drift = bias[:3] + np.cross(bias[3:], c) + np.cross(w, np.cross(w, c))
+            M += body.mass * linear.T @ linear + J[3:].T @ inertia @ J[3:]
+            push += body.mass * linear.T @ (np.array(self.mechanism.gravity) - drift)
+            push -= J[3:].T @ (inertia @ bias[3:] + np.cross(w, inertia @ w))
+        return np.asarray(np.linalg.solve(M, push))
+
+    def advance(self, t: float) -> None:
+        for _ in range(whole_steps(self.t, t, self.dt)):
+            self.v = self.v + self.dt * self.acceleration()
+            self.q = self.q + self.dt * self.v
+        self.t = t
+
+    def sample(self) -> MechanismSample:
+        motion = self.tree.at(self.q, self.v)
+        turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
+        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
+
+    def built(self) -> MechanismBuilt:
+        masses = np.array([body.mass for body in self.mechanism.bodies])
+        return MechanismBuilt(mass=masses, gravity=np.array(self.mechanism.gravity), mobility=len(self.v))
