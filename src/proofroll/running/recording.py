@@ -15,6 +15,7 @@ from proofroll.core.columns import Columns
 from proofroll.core.dataset import add_events, columns_of, off_grid_apart
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import WatchesRuns
+from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event
@@ -88,6 +89,7 @@ def record(
             wall += time.perf_counter() - start
             inside += time.process_time() - before
             sample = _finite(engine.sample(), t, scene)
+            _require_state(scene, samples[0], sample, t)
         except Diverged as error:
             if lack_behind(error):
                 raise
@@ -144,6 +146,15 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
         if name == "q_WB":
             require_unit(values, f"at {t:g} s")
     return sample
+
+
+def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) -> None:
+    """A state that is told at time 0 is told at all times."""
+    for element in scene.elements:
+        before, now = sample_of(scene, element, first), sample_of(scene, element, sample)
+        for name in Sample.widths:
+            if getattr(now, name) is None and getattr(before, name) is not None:
+                raise Diverged(f"{name} is given at 0 s and not at {t:g} s")
 
 
 def require_unit(q_WB: FloatArray, where: str) -> None:

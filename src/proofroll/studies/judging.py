@@ -14,22 +14,22 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.number_text import number
-from proofroll.core.observable import Role
+from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
-from proofroll.core.several import REQUIRED
 from proofroll.core.truth import truth
 from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Doubt, Judgement, Verdict
 from proofroll.core.verdict import judge as judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.given_run import GivenRun, Run, read_run
-from proofroll.studies.reference import Reference
+from proofroll.studies.reference import Reference, turned_alike
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _USUAL = Tolerance(0.01, True)
 _LEAST = 0.01
+_NO_TOLERANCE = "no tolerance is given for it"
 _MOST_TRUTHS = 64
 _truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
 
@@ -63,7 +63,8 @@ class Compared:
         bar = f"the truth is known to {number(found.truth_error_bar)}{unit}"
         if found.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
-        return f"{said}; {bar}" + ("; the question is ill-posed here" if found.verdict is Verdict.ILL_POSED else "")
+        remarks = ["the question is ill-posed here"] if found.verdict is Verdict.ILL_POSED else []
+        return "; ".join([said, bar, *remarks, *found.remarks])
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ class Judged:
         names = ("observable", "unit", "error", "tolerance", "truth_error_bar", "scale")
         rows = [
             {name: getattr(item.judgement, name) for name in names}
-            | {"at": item.at, "verdict": item.judgement.verdict.value}
+            | {"at": item.at, "verdict": item.judgement.verdict.value, "remarks": list(item.judgement.remarks)}
             for item in self.compared
         ]
         said = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
@@ -121,7 +122,7 @@ def judge(
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
             one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,
-            and of places, velocities and spins that are given.
+            of every force and moment, and of places, velocities, spins and orientations that are given.
         because: why that is close enough.
 
     Raises:
@@ -143,6 +144,8 @@ def judge(
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
     unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
+    if tolerance is None:
+        unjudged |= _events_left(scene, observed, bounds)
     return Judged(scene.name, tuple(compared), because, unjudged)
 
 
@@ -153,8 +156,14 @@ def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolera
         if not _comparable(reference, name):
             found[name] = "the truth has nothing of that name"
         elif why or name not in judged:
-            found[name] = why or "no tolerance is given for it"
+            found[name] = why or _NO_TOLERANCE
     return found
+
+
+def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mapping[str, Tolerance]) -> dict[str, str]:
+    """What a run says of its events, for which nobody gives a tolerance -> why it is not judged."""
+    names = [name for name in observed if scene.observables[name].role is Role.EVENT and name not in judged]
+    return dict.fromkeys(names, _NO_TOLERANCE) if any(observed[name].size for name in names) else {}
 
 
 def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
@@ -192,7 +201,7 @@ def _bounds(
         known = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
         raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
     if given is None:
-        main = [name for name in observed if scene.observables[name].headline]
+        main = [name for name in observed if _is_main(scene.observables[name])]
         return dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
     if not isinstance(given, Mapping):
         if len(able) > 1 and scene.deciding not in able:
@@ -205,14 +214,22 @@ def _bounds(
     return {name: _tolerance(name, text, _unit(reference, name)) for name, text in given.items()}
 
 
+def _is_main(item: Observable) -> bool:
+    """Whether it is judged where nobody says what: what a person asks for first, and every force and moment."""
+    return item.headline or (item.role is Role.REACTION and item.unit != "1")
+
+
 def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
-    """What is given of the state, and is judged as it is: places, velocities and spins."""
-    states = {reference.scene.label(element, name) for element in reference.scene.elements for name in REQUIRED}
+    """What is given of the state, and is judged as it is: places, velocities, spins and orientations."""
+    scene = reference.scene
+    states = {scene.label(element, name) for element in scene.elements for name in element.sample_type.widths}
     return [name for name in variables if name in states and _comparable(reference, name)]
 
 
 def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
     """What a percentage of a variable refers to: its range, but no less than a hundredth of what is natural."""
+    if unit == "1":
+        return 1.0  # of quaternions
     natural = 0.0
     for element in reference.scene.elements:
         speed = 2 * np.pi / element.natural_time
@@ -254,10 +271,11 @@ def _compared(
         true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
             true, values = true[1:], values[1:]  # several engines define reactions only after a first step
-        if truth_of.dims[-1:] == ("wxyz",) and values.shape == true.shape:  # q and -q are the same orientation
-            values = values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+        between = reference.between(name, dataset)
+        if truth_of.dims[-1:] == ("wxyz",):
+            values = turned_alike(values, true)
         scale, doubt = _size(reference, name, true, _unit(reference, name)), Doubt.NONE
-        own, between = 0.0, None
+        own = 0.0
     found = judge_curve(
         name, _unit(reference, name), values, true,
         truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,

@@ -120,12 +120,12 @@ class Reference:
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 
     def between(self, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
-        """An observable of a run off the grid, and its true values there; None: there is nothing to compare.
+        """An observable or state of a run off the grid, and its true values there; None: there is nothing to compare.
 
         Where a sampling interval holds an event, of the run or of the truth, nobody is held to it: within a step of
         the engine forces may still be those before.
         """
-        own, item = f"{BETWEEN}.{name}", self.scene.observables[name]
+        own, item = f"{BETWEEN}.{name}", self.scene.observables.get(name)
         if own not in dataset or own not in self.dataset:
             return None
         times, known = dataset[BETWEEN].to_numpy(), self.dataset[BETWEEN].to_numpy()
@@ -134,8 +134,10 @@ class Reference:
         alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
         both = np.isin(times, known) & alone & (times < grid[-1])
         values, true = dataset[own].to_numpy()[both], self.dataset[own].to_numpy()[np.isin(known, times[both])]
-        if item.role is Role.RESIDUAL:
+        if item is not None and item.role is Role.RESIDUAL:
             return values, np.zeros_like(values)
+        if dataset[own].dims[-1:] == ("wxyz",):
+            values = turned_alike(values, true)
         turned = on_turns_of(true, values, name, (dataset, self.dataset))
         said = np.isfinite(true)
         return None if turned is None else (turned[said], true[said])
@@ -168,6 +170,13 @@ class Reference:
     def events_of(self, dataset: xr.Dataset) -> list[Event]:
         """Of all elements, in another run."""
         return [event for item in self.scene.elements for event in events_of(part(self.scene, item, dataset))]
+
+
+def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
+    """Quaternions with the signs of the true ones, for q and -q are the same orientation; shape (…, 4)."""
+    if values.shape != true.shape:
+        return values
+    return np.asarray(values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0))
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:

@@ -148,13 +148,20 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
     proven.sort(key=lambda cause: (cause.fitted, cause.left))
     found: list[Cause] = []
     for cause in proven:
-        rivals = [other for other in found if {cause.quantity, *cause.covers} & {other.quantity, *other.covers}]
+        rivals = [other for other in found if _share(cause, other)]
         if not rivals:
             found.append(cause)
         elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
             found.append(dataclasses.replace(cause, alternative=True))
     known = [cause for cause in found if cause.says and not any(_unsure(cause, other) for other in proven)]
-    return sorted(known, key=lambda cause: cause.alternative)
+    told = [cause for cause in known if not cause.alternative]
+    # an alternative is one to a cause that is told
+    return told + [cause for cause in known if cause.alternative and any(_share(cause, first) for first in told)]
+
+
+def _share(one: Cause, other: Cause) -> bool:
+    """Whether they explain the same quantity."""
+    return bool({one.quantity, *one.covers} & {other.quantity, *other.covers})
 
 
 def _rivals(cause: Cause, first: Cause) -> bool:

@@ -30,6 +30,8 @@ _EXACT = 1e-3
 # A step in an otherwise constant curve fits any shift: that a time is another shows where the curve changes, at this
 # many samples at least, each by this part of the largest difference.
 _SEEN, _FEW = 6, 1e-2
+# A delay is half a step to this part of the step.
+_HALF = 0.1
 # A difference within so many bars of the truth is none.
 _BARS = 10.0
 # Part of the largest number of a matrix from which on a component has a share.
@@ -190,7 +192,9 @@ class Reported:
         if shift is None:
             return
         delay, before, after = shift
-        says = f"{self.name} is {said_delay(delay, step)}"
+        # Half a step is what a method of first order makes of places, x + h v, by itself
+        own = self.unit == "m" and bool(step) and abs(abs(delay) / (step or 1.0) - 0.5) < _HALF
+        says = "" if own else f"{self.name} is {said_delay(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
         yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1)
 

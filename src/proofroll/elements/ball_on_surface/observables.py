@@ -106,7 +106,8 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     curves["slip"] = dataset["slip"].to_numpy()
     if dataset.sizes["time"] > 2 * (DEGREE + 1) + 2 * ENDS:
         # What impacts take of the energy nobody tells.
-        told = "N" in dataset or not (body.contact.rolling_resistance or body.wall_rate is not None)
+        dissipates = body.contact.rolling_resistance or body.wall_rate is not None or "sticking" in dataset
+        told = "N" in dataset or not dissipates
         if told and not body.flies:
             curves["energy_balance"] = energy_balance(body, dataset)
         if "N" in dataset:

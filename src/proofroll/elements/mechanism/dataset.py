@@ -24,7 +24,13 @@ UNDETERMINED, UNSAID = "not determined by the equations", "not given by the engi
 
 
 def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
-    """The variables of a run, from one sample per time [s]."""
+    """The variables of a run, from one sample per time [s].
+
+    Raises:
+        Diverged: the engine does not give what all variables follow from.
+    """
+    if lacking := element.lacks(samples, ()):
+        raise Diverged(lacking)
     count = len(element.bodies)
 
     def stacked(name: str, width: int, rows: int) -> FloatArray:

@@ -13,6 +13,7 @@ from proofroll.core.diagnosis.samples import both
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of
 from proofroll.elements.mechanism.diagnosis.held import COVERED, held_against
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
 
 
 @hypothesis("joint axis", "seen from the parent, the child turns about one direction throughout, which is not the axis")
@@ -34,12 +35,20 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
         own = np.linalg.svd(seen)[2][0]
         own = own * np.sign(own @ axis or 1.0)
         before, after = (float(np.max(np.linalg.norm(seen - np.outer(seen @ n, n), axis=-1))) for n in (axis, own))
-        if above_round_off(before, float(np.max(np.abs(seen)))):
+        if above_round_off(before, float(np.max(np.abs(seen)))) and _turns_about(placed, parent, child, own, axis):
             says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
             remedy = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
             covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
             what = (f"turning of {joint.name} across its axis", "rad/s", before, after)
             yield Cause(f"axis of {joint.name}", says, *what, remedy, 2, covered)
+
+
+def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis: FloatArray) -> bool:
+    """Whether the poses, too, turn about the one axis and not about the other: a spin alone may be said wrongly."""
+    relative = np.swapaxes(placed.R_WB[:, parent], 1, 2) @ placed.R_WB[:, child]
+    turns = relative @ relative[0].T
+    moved, unmoved = (float(np.max(np.linalg.norm(turns @ n - n, axis=-1))) for n in (own, axis))
+    return moved <= CLOSES * unmoved
 
 
 def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:

@@ -1,0 +1,179 @@
+"""Lies around an honest engine are found out, whatever they are about; honest engines are not accused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from honest import TABLEAUS, Jointed, Rolling
+from liars import ALL, EVERY, UNTIL, Lie, liar, scene_of, table
+
+from proofroll.core.convergence import richardson, tightest
+from proofroll.core.dataset import BETWEEN
+from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.first_steps import certificate
+from proofroll.core.observable import Role
+from proofroll.core.plugins import resolve_settings
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.core.verdict import Judgement, LimitFinding, Verdict, judge
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
+from proofroll.studies.judging import judge as judge_run
+from proofroll.studies.reference import Reference
+
+LIES = [(about, lie) for lie in table() for about in lie.scenes]
+# What is judged: all that an honest run gives, and its state.
+_STATE = ("v_WB", "w_WB", "q_WB")
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What is said of a run: that it agrees in all, or what is wrong; and causes."""
+
+    agrees: bool
+    words: str
+    causes: tuple[str, ...] = ()
+
+
+def hear(scene: Scene, kind: Any, band: dict[str, str], until: float, **settings: Any) -> Heard:
+    """Runs an engine as a user does, and judges all of it."""
+    try:
+        run = simulate(scene, kind, until=until, every=EVERY, **settings)
+        if run.attrs["status"] != "done":
+            return Heard(False, str(run.attrs["message"]))
+        found = judge_run(run, scene, band)
+    except (Refused, Diverged, InputError) as error:
+        return Heard(False, str(error))
+    wrong = [item for item in found.compared if not item.agrees or item.judgement.remarks]
+    return Heard(
+        not wrong,
+        "\n".join(map(str, wrong)),
+        _causes(scene, kind, run, [item.judgement for item in found.compared], settings),
+    )
+
+
+def _causes(
+    scene: Scene, kind: Any, run: Any, judgements: Sequence[Judgement], settings: dict[str, Any]
+) -> tuple[str, ...]:
+    chosen = resolve_settings(kind, settings, scene.requires)
+    lines = [line.as_dict() for line in certificate(kind, kind.build(scene, chosen), scene, chosen)]
+    step = getattr(chosen, chosen.resolution) if chosen.resolution == "dt" else None
+    return tuple(item.sentence for item in diagnosed(scene, lines, run, _true(scene, run), step, judgements))
+
+
+_TRUTHS: dict[tuple[str, bytes], Any] = {}
+
+
+def _true(scene: Scene, run: Any) -> Any:
+    """The truth at the times of a run."""
+    times, between = run["time"].to_numpy(), run[BETWEEN].to_numpy() if BETWEEN in run else np.zeros(0)
+    key = scene.digest, times.tobytes() + between.tobytes()
+    if key not in _TRUTHS:
+        _TRUTHS[key] = truth(scene, times, between=between)
+    return _TRUTHS[key]
+
+
+@cache
+def band_of(about: str) -> dict[str, str]:
+    """0.1 % of all that an honest run of a scene gives, and 1 % of what has to be zero."""
+    scene = scene_of(about)
+    run = simulate(scene, liar(about, Lie("nothing", (about,))), until=UNTIL[about], every=EVERY)
+    true = _true(scene, run)
+    reference = Reference.of(scene, true)
+    given = [*reference.observed(run), *(name for name in _STATE if name in run and name in true)]
+    items = {name: scene.observables.get(name) for name in given}
+    return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
+
+
+@pytest.mark.parametrize(("about", "lie"), LIES, ids=[f"{about}-{lie.name}" for about, lie in LIES])
+def test_a_lie(about: str, lie: Lie) -> None:
+    """It is found out, and what is said names what it is about; one far below the tolerance is none."""
+    heard = hear(scene_of(about), liar(about, lie), band_of(about), UNTIL[about])
+    if not lie.said:
+        assert heard.agrees, heard
+        assert not heard.causes
+        return
+    assert not heard.agrees
+    assert any(word in heard.words for word in lie.said), heard
+    for cause in heard.causes:
+        assert any(word in cause for word in lie.causes), cause
+
+
+@pytest.mark.parametrize("about", ALL)
+def test_the_truth_told_is_believed(about: str) -> None:
+    """The engine around which the lies are agrees in all that is judged, without a remark and without a cause."""
+    assert len(band_of(about)) >= 9
+    heard = hear(scene_of(about), liar(about, Lie("nothing", (about,))), band_of(about), UNTIL[about])
+    assert heard == Heard(True, "")
+
+
+# Scenes of honest engines -> parameters; those of balls first.
+ROLL: dict[str, dict[str, float]] = {
+    "sphere_in_cylinder": {}, "inclined_plane": {"normal_spin": 3.0}, "tilted_cylinder": {}, "bowl": {}, "cone": {},
+    "torus_rim": {}, "rolling_stop": {},
+}  # fmt: skip
+SWING = ("double_pendulum", "pendulum", "oscillators", "gyroscope_cart", "driven", "chain")
+FACTORS = (1.0, 0.5, 0.25)
+_FORMULATIONS = [f"order_{order}" for order in TABLEAUS] + ["adaptive"]
+# Every method on a ball and on a tree, and two of them on each other scene.
+HONEST = [
+    (scene, formulation)
+    for scenes in (tuple(ROLL), SWING)
+    for index, scene in enumerate(scenes)
+    for place, formulation in enumerate(_FORMULATIONS)
+    if index == 0 or (place - index) % 5 in {0, 2}
+]
+
+
+def _honest_scene(name: str) -> tuple[Scene, Any]:
+    if name in ROLL:
+        return load_scene(name, **ROLL[name]), Rolling
+    return scene_of(name) if name == "driven" else load_scene(name), Jointed
+
+
+@pytest.mark.parametrize(("name", "formulation"), HONEST)
+def test_an_honest_engine(name: str, formulation: str) -> None:
+    """A textbook method is not accused at a coarse step, nor its limit of small steps, and no cause is told."""
+    scene, kind = _honest_scene(name)
+    step = {"rtol": 1e-6} if formulation == "adaptive" else {"dt": 5e-3}
+    ((field, coarse),) = step.items()
+    factors = FACTORS if field == "dt" else (1.0, 0.1, 0.01)
+    runs = {
+        factor: simulate(scene, kind, until=0.15, every=EVERY, formulation=formulation, **{field: coarse * factor})
+        for factor in factors
+    }
+    assert {run.attrs["status"] for run in runs.values()} == {"done"}
+    reference = Reference.of(scene, _true(scene, runs[1.0]))
+    curves = {factor: reference.observed(run) for factor, run in runs.items()}
+    judgements = []
+    for item, curve in curves[1.0].items():
+        ladder = [curves[factor][item] for factor in factors]
+        order = kind.presets[formulation]["matched"].order
+        limit = richardson(ladder, factors, order) if field == "dt" else tightest(ladder)
+        true, bar = reference.true(item, curve)
+        size = reference.sizes.get(item, 1.0)
+        judgements.append(
+            judge(
+                item,
+                scene.observables[item].unit,
+                curve,
+                true,
+                truth_error_bar=bar,
+                tolerance=0.01 * size,
+                scale=size,
+                limit=limit,
+                ladder=True,
+                between=reference.between(item, runs[1.0]),
+                magnitude=reference.magnitude(item),
+            )
+        )
+    assert not [item for item in judgements if item.limit is LimitFinding.ANOTHER or item.remarks]
+    # where the coarse steps show no limit, as of the chain, a difference is none of the model
+    assert {item.limit for item in judgements if item.verdict is Verdict.DIFFERS} <= {LimitFinding.NOT_SHOWN}
+    assert not _causes(scene, kind, runs[1.0], judgements, {"formulation": formulation, **step})

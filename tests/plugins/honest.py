@@ -1,0 +1,134 @@
+"""Honest engines of several orders: textbook methods on the scene's own equations, with their own errors alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Self
+
+import numpy as np
+from annotated_types import Gt
+from scipy.integrate import solve_ivp
+from tiny import Tiny
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import whole_steps
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
+from proofroll.engines.projection import Projection
+
+# Stages of methods: weights of the stages before, and of all.
+TABLEAUS: Mapping[int, tuple[list[list[float]], list[float]]] = {
+    1: ([[]], [1.0]),
+    2: ([[], [0.5]], [0.0, 1.0]),
+    3: ([[], [0.5], [-1.0, 2.0]], [1 / 6, 2 / 3, 1 / 6]),
+    4: ([[], [0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
+}
+
+
+@dataclass(frozen=True)
+class HonestSettings:
+    """The method is the formulation."""
+
+    formulation: str = "order_4"
+    preset: str = "matched"
+    dt: Annotated[float, Gt(0)] = 1e-3
+    rtol: Annotated[float, Gt(0)] = 1e-10
+
+    @property
+    def resolution(self) -> str:
+        """See :class:`proofroll.core.engine.Settings`."""
+        return "rtol" if self.formulation == "adaptive" else "dt"
+
+    @property
+    def order(self) -> int | None:
+        """See :class:`proofroll.core.engine.Settings`."""
+        return None if self.formulation == "adaptive" else int(self.formulation[-1])
+
+
+def _stepped(x: FloatArray, rates: Any, settings: HonestSettings, t: float, until: float) -> FloatArray:
+    """The state at a later time, by a method of fixed step or by DOP853."""
+    if settings.formulation == "adaptive":
+        found = solve_ivp(lambda _, y: rates(y), (t, until), x, "DOP853", rtol=settings.rtol, atol=settings.rtol)
+        return np.asarray(found.y[:, -1])
+    stages, weights = TABLEAUS[int(settings.formulation[-1])]
+    for _ in range(whole_steps(t, until, settings.dt)):
+        slopes: list[FloatArray] = []
+        for before in stages:
+            moved = (settings.dt * w * k for w, k in zip(before, slopes, strict=True))
+            slopes.append(rates(x + sum(moved, np.zeros_like(x))))
+        x = x + settings.dt * sum((w * k for w, k in zip(weights, slopes, strict=True)), np.zeros_like(x))
+    return x
+
+
+_FORMULATIONS = (*(f"order_{order}" for order in TABLEAUS), "adaptive")
+
+
+class Rolling(Tiny):
+    """A rolling ball in the reduced coordinates."""
+
+    name: ClassVar[str] = "rolling"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(_FORMULATIONS, Tiny.provides["midpoint"])
+    settings: ClassVar[type[Any]] = HonestSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        name: {"matched": HonestSettings(name)} for name in _FORMULATIONS
+    }
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.chosen = settings
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.x = _stepped(self.x, self.rates, self.chosen, self.t, t)
+        self.t = t
+
+
+class Jointed:
+    """A tree of joints with one coordinate each, in these coordinates; says nothing of reactions."""
+
+    name: ClassVar[str] = "jointed"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(_FORMULATIONS, Projection.provides["dependent"])
+    settings: ClassVar[type[Any]] = HonestSettings
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = Rolling.presets
+
+    @staticmethod
+    def version() -> str:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return "1"
+
+    @classmethod
+    def build(cls, scene: Scene, settings: Any) -> Self:
+        """See :class:`proofroll.core.engine.Engine`."""
+        return cls(scene, settings)
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        self.mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]  # it has one
+        self.equations, self.chosen, self.t = JointCoordinates(self.mechanism), settings, 0.0
+        self.x = np.concatenate(self.mechanism.start())
+
+    def _halves(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        half = len(x) // 2
+        return x[:half], x[half:]
+
+    def _rates(self, x: FloatArray) -> FloatArray:
+        q, v = self._halves(x)
+        return np.concatenate([v, self.equations.solve(q, v).acceleration])
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.x = _stepped(self.x, self._rates, self.chosen, self.t, t)
+        self.t = t
+
+    def sample(self) -> MechanismSample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        from scipy.spatial.transform import Rotation
+
+        motion = self.equations.solve(*self._halves(self.x)).motion
+        turned = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
+        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`; its first acceleration is derived from its steps."""
+        return MechanismBuilt(gravity=np.asarray(self.mechanism.gravity))
