@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from honest import TABLEAUS, Jointed, Rolling
-from liars import ALL, EVERY, UNTIL, Lie, liar, scene_of, table
+from liars import ALL, EVERY, UNTIL, Lie, liar, scene_of
+from lies import table
 
 from proofroll.core.convergence import richardson, tightest
 from proofroll.core.dataset import BETWEEN
@@ -103,6 +104,26 @@ def test_a_lie(about: str, lie: Lie) -> None:
     assert any(word in heard.words for word in lie.said), heard
     for cause in heard.causes:
         assert any(word in cause for word in lie.causes), cause
+
+
+UNASKED = [
+    ("rolls", "quaternions of the start", "q_WB is"),
+    ("loop", "quaternions of another body", "q_WB is"),
+    ("rolls", "v + 7 m/s between samples", "v_WB is"),
+    ("slips", "spins x 3 between samples", "w_WB is"),
+    ("tree", "moments + 5 N m", "torques is"),
+    ("slips", "always sticking", "not judged: event_times, first_slip, event_order; no tolerance is given"),
+]
+
+
+@pytest.mark.parametrize(("about", "name", "words"), UNASKED)
+def test_a_lie_where_nobody_says_what_is_judged(about: str, name: str, words: str) -> None:
+    """Without a tolerance a lie about states or reactions is found, and events that are not judged are named."""
+    lie = next(lie for lie in table() if lie.name == name)
+    run = simulate(scene_of(about), liar(about, lie), until=UNTIL[about], every=EVERY)
+    found = judge_run(run, scene_of(about))
+    assert words in str(found)
+    assert found.agrees is ("not judged" in words)
 
 
 @pytest.mark.parametrize("about", ALL)

@@ -1,0 +1,300 @@
+"""The table of lies: what is replaced in what an honest engine says, and the words that have to be said of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+from liars import ALL, AT_ONCE, BALLS, EVERY, MECHANISMS, Lie, Moment, of_mechanism
+
+from proofroll.core.events import Event
+from proofroll.core.gravity import Gravity
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import changed
+from proofroll.elements.mechanism.element import MechanismElement
+
+
+def gravity(magnitude: float) -> Callable[[Scene], Scene]:
+    """The scene with gravity changed by a factor."""
+
+    def model(scene: Scene) -> Scene:
+        (element,) = scene.elements
+        if isinstance(element, MechanismElement):
+            return of_mechanism(scene, gravity=magnitude * np.asarray(element.mechanism.gravity))
+        old = element.gravity  # type: ignore[attr-defined]  # a ball has it
+        return changed(scene, gravity=Gravity(magnitude * old.magnitude, old.direction))
+
+    return model
+
+
+def heavier(part: str, factor: float) -> Callable[[Scene], Scene]:
+    """The scene with mass, or another number, of the ball or of the first body changed by a factor."""
+
+    def model(scene: Scene) -> Scene:
+        (element,) = scene.elements
+        if isinstance(element, MechanismElement):
+            first, *others = element.mechanism.bodies
+            more = dataclasses.replace(first, **{part: factor * np.asarray(getattr(first, part))})
+            return of_mechanism(scene, bodies=(more, *others))
+        ball = element.ball  # type: ignore[attr-defined]  # a ball is one
+        part_of = "inertia_ratio" if part == "inertia" else part
+        return changed(scene, ball=dataclasses.replace(ball, **{part_of: factor * getattr(ball, part_of)}))
+
+    return model
+
+
+def echo(_: Any, true: Any) -> Any:
+    """The scene's own numbers, repeated."""
+    return true
+
+
+# Words of which one is said of what differs.
+_PLACES, _FIRST, _MODEL = (
+    ("positions is", "z is", "gamma is"),
+    ("first steps",),
+    ("differs from the scene", "does not say"),
+)
+_V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitudes is")
+_FORCES, _EVENTS = ("N is", "F3 is", "forces is"), ("event_times is", "first_slip is", "event_order is", "creep is")
+_TURNED = ("rolls", *MECHANISMS)
+_STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")
+_LATE, _FACTOR, _AXES, _SIGN, _OMITTED = ("0.003 s late",), ("times",), ("other axes",), ("wrong sign",), ("left out",)
+
+
+def _times() -> Iterator[Lie]:
+    yield Lie("3 ms late from the start", ALL, _FIRST, lambda m: m.at(max(m.t - 0.003, 0)), begins=AT_ONCE)
+    yield Lie("3 ms late", ALL, _PLACES, lambda m: m.at(m.t - 0.003), ("late",))
+    yield Lie("3 ms early", ALL, _PLACES, lambda m: m.at(m.t + 0.003), ("early",))
+    yield Lie("a clock 1 % slow from the start", ALL, _FIRST, lambda m: m.at(0.99 * m.t), begins=AT_ONCE)
+    yield Lie("a clock 1 % slow", ALL, _PLACES, lambda m: m.at(0.99 * m.t), ("0.99 times as fast",))
+    yield Lie("frozen at the start", ALL, _PLACES, lambda m: m.at(0.0), _OMITTED)  # all was at rest
+    yield Lie("frozen from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until / 2)))
+    yield Lie("every other sample repeated", ALL, _PLACES, lambda m: m.at(int(m.t / EVERY / 2 + 1e-9) * 2 * EVERY))
+    yield Lie("back again from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until - m.t)))
+    yield Lie("right on the grid alone", ALL, _PLACES, _off_grid(lambda m: m.at(m.t - 0.002)))
+
+
+def _places() -> Iterator[Lie]:
+    yield Lie("1 % of its size further", ALL, _PLACES, lambda m: {"p_WB": m.right.p_WB + 0.01 * m.length})
+    yield Lie("places in mm", ALL, _PLACES, lambda m: {"p_WB": 1e3 * m.right.p_WB}, ("prefix",))
+    yield Lie("places with x and y swapped", ALL, _PLACES, lambda m: {"p_WB": m.right.p_WB[..., [1, 0, 2]]}, _AXES)
+    yield Lie(
+        "places with y mirrored", ALL, (*_PLACES, "drift is"), lambda m: {"p_WB": m.right.p_WB * [1, -1, 1]}, _AXES
+    )
+    yield Lie("places right on the grid alone", ALL, _PLACES, _off_grid(lambda m: {"p_WB": m.right.p_WB + m.length}))
+    yield Lie("a beat with the period of the grid", ALL, _PLACES, _beat)
+    yield Lie("places not finite", ALL, ("p_WB is not finite",), lambda m: {"p_WB": np.nan * m.right.p_WB})
+    yield Lie("bodies swapped", MECHANISMS, _PLACES, lambda m: {n: getattr(m.right, n)[::-1] for n in _STATE})
+    yield Lie("the last body frozen", MECHANISMS, _PLACES, _last_frozen, _OMITTED)  # all was at rest, the first one is
+
+
+def _velocities() -> Iterator[Lie]:
+    yield Lie("v + 7 m/s", ALL, _V, lambda m: {"v_WB": m.right.v_WB + 7})
+    yield Lie("v + 7 m/s between samples", ALL, _V, _off_grid(lambda m: {"v_WB": m.right.v_WB + 7}))
+    yield Lie("v of nothing", ALL, _V, lambda m: {"v_WB": 0 * m.right.v_WB}, (*_OMITTED, "contact point"))
+    yield Lie("v backwards", ALL, _V, lambda m: {"v_WB": -m.right.v_WB}, _SIGN)
+    yield Lie("v with x and y swapped", ALL, _V, lambda m: {"v_WB": m.right.v_WB[..., [1, 0, 2]]}, _AXES)
+    yield Lie("v of the start", ALL, _V, lambda m: {"v_WB": m.at(0.0).v_WB}, _OMITTED)
+    yield Lie("v not finite", ALL, ("v_WB is not finite",), lambda m: {"v_WB": np.nan * m.right.v_WB})
+    yield Lie("v of another body", MECHANISMS, _V, lambda m: {"v_WB": m.right.v_WB[::-1]})
+
+
+def _spins() -> Iterator[Lie]:
+    yield Lie("spins x 3", ALL, _W, lambda m: {"w_WB": 3 * m.right.w_WB}, _FACTOR)
+    yield Lie("spins x 3 between samples", ALL, _W, _off_grid(lambda m: {"w_WB": 3 * m.right.w_WB}))
+    yield Lie("spins in deg/s", ALL, _W, lambda m: {"w_WB": np.degrees(m.right.w_WB)}, ("degrees",))
+    yield Lie("spins of nothing", ALL, _W, lambda m: {"w_WB": 0 * m.right.w_WB}, _OMITTED)
+    yield Lie("spins of 1e30 rad/s", ALL, _W, lambda m: {"w_WB": 1e30 + m.right.w_WB})
+    yield Lie("spins backwards", ALL, _W, lambda m: {"w_WB": -m.right.w_WB}, _SIGN)
+    yield Lie("spins of the start", ALL, _W, lambda m: {"w_WB": m.at(0.0).w_WB}, _OMITTED)
+    yield Lie(
+        "spins in body axes", ("rolls",), _W, lambda m: {"w_WB": m.turns.inv().apply(m.right.w_WB)}, ("body axes",)
+    )
+    yield Lie("spins of another body", MECHANISMS, _W, lambda m: {"w_WB": m.right.w_WB[::-1]})
+
+
+def _orientations() -> Iterator[Lie]:
+    yield Lie("quaternions x 1.01", _TURNED, ("has length 1.01",), lambda m: {"q_WB": 1.01 * m.right.q_WB})
+    yield Lie("quaternions x 7", _TURNED, ("has length 7",), lambda m: {"q_WB": 7 * m.right.q_WB})
+    yield Lie("quaternions of zeros", _TURNED, ("has length 0",), lambda m: {"q_WB": 0 * m.right.q_WB})
+    yield Lie("quaternions not finite", _TURNED, ("q_WB is not finite",), lambda m: {"q_WB": np.nan * m.right.q_WB})
+    yield Lie("quaternions of the start", _TURNED, _Q, lambda m: {"q_WB": m.at(0.0).q_WB})
+    yield Lie("quaternions frozen between samples", _TURNED, _Q, _off_grid(lambda m: {"q_WB": m.at(0.0).q_WB}))
+    yield Lie(
+        "quaternions of the inverse", _TURNED, _Q, lambda m: {"q_WB": m.right.q_WB * [1, -1, -1, -1]}, ("inverse",)
+    )
+    yield Lie(
+        "quaternions with the scalar last", _TURNED, _Q, lambda m: {"q_WB": np.roll(m.right.q_WB, -1, -1)}, ("last",)
+    )
+    yield Lie("quaternions 3 ms late", _TURNED, _Q, lambda m: {"q_WB": m.at(m.t - 0.003).q_WB}, _LATE)
+    yield Lie("quaternions of another body", MECHANISMS, _Q, lambda m: {"q_WB": m.right.q_WB[::-1]})
+    yield Lie("quaternions left out later", _TURNED, ("not at 0.01 s",), lambda _: {"q_WB": None})
+    yield Lie("no quaternions", _TURNED, ("does not give",), lambda _: {"q_WB": None}, begins=0.0)
+
+
+def _forces_of_balls() -> Iterator[Lie]:
+    yield Lie("forces x 100", BALLS, _FORCES, lambda m: {"force": 100 * m.right.force}, _FACTOR)
+    yield Lie("forces x 1.02", BALLS, _FORCES, lambda m: {"force": 1.02 * m.right.force}, _FACTOR)
+    yield Lie("forces x 100 between samples", BALLS, _FORCES, _off_grid(lambda m: {"force": 100 * m.right.force}))
+    yield Lie("forces of nothing", BALLS, _FORCES, lambda m: {"force": 0 * m.right.force}, _OMITTED)
+    yield Lie("forces on the wall", BALLS, _FORCES, lambda m: {"force": -m.right.force}, _SIGN)
+    yield Lie("forces of the start", BALLS, _FORCES, lambda m: {"force": m.at(0.0).force})
+    yield Lie("forces 3 ms late", BALLS, _FORCES, lambda m: {"force": m.at(m.t - 0.003).force}, ("late",))
+    yield Lie("forces without friction", BALLS, _FORCES, lambda m: {"force": _normal(m)}, ("friction",))
+    yield Lie(
+        "forces in body axes",
+        ("rolls",),
+        _FORCES,
+        lambda m: {"force": m.turns.inv().apply(m.right.force)},
+        ("body axes",),
+    )
+    yield Lie("forces left out later", BALLS, ("this trajectory has",), lambda _: {"force": None})
+    yield Lie("no forces", BALLS, ("this trajectory has",), lambda _: {"force": None}, begins=0.0)
+
+
+def _reactions_of_joints() -> Iterator[Lie]:
+    def each(change: Callable[[Moment, str], Any]) -> Callable[[Moment], Any]:
+        return lambda m: {name: change(m, name) for name in _WRENCH}
+
+    times_100 = each(lambda m, name: 100 * getattr(m.right, name))
+    yield Lie("reactions x 100", MECHANISMS, _FORCES, times_100, _FACTOR)
+    yield Lie("reactions x 100 between samples", MECHANISMS, _FORCES, _off_grid(times_100))
+    yield Lie("reactions x 1.02", MECHANISMS, _FORCES, each(lambda m, name: 1.02 * getattr(m.right, name)), _FACTOR)
+    yield Lie("reactions of nothing", MECHANISMS, _FORCES, each(lambda m, name: 0 * getattr(m.right, name)), _OMITTED)
+    yield Lie("reactions on the parent", MECHANISMS, _FORCES, each(lambda m, name: -getattr(m.right, name)), _SIGN)
+    yield Lie(
+        "reactions of another joint",
+        MECHANISMS,
+        _FORCES,
+        each(lambda m, name: getattr(m.right, name)[::-1]),
+        ("another joint",),
+    )
+    yield Lie(
+        "reactions in body axes", MECHANISMS, _FORCES, lambda m: {"joint_force": _in_body_axes(m)}, ("body axes",)
+    )
+    yield Lie("reactions of the start", MECHANISMS, _FORCES, each(lambda m, name: getattr(m.at(0.0), name)))
+    yield Lie("reactions 3 ms late", MECHANISMS, _FORCES, each(lambda m, name: getattr(m.at(m.t - 0.003), name)), _LATE)
+    yield Lie("reactions not finite", MECHANISMS, _FORCES, each(lambda m, name: np.nan * getattr(m.right, name)))
+    yield Lie("no reactions", MECHANISMS, _FORCES, each(lambda *_: None), begins=0.0)
+    yield Lie("moments + 5 N m", MECHANISMS, ("torques is",), lambda m: {"joint_torque": m.right.joint_torque + 5})
+
+
+def _slips() -> Iterator[Lie]:
+    def each(**change: Callable[[Event, float], Any]) -> Callable[[list[Event], float], list[Event]]:
+        return lambda right, until: [
+            dataclasses.replace(event, **{name: how(event, until) for name, how in change.items()}) for event in right
+        ]
+
+    def later(by: float) -> Any:
+        names = "time", "time_low", "time_high"
+        return each(**{name: lambda event, _, name=name: getattr(event, name) + by for name in names})
+
+    def lie(name: str, events: Any, sample: Any = None, said: tuple[str, ...] = _EVENTS) -> Lie:
+        return Lie(name, ("slips",), said, sample, events=events)
+
+    slips = ("slips",)
+    yield Lie("always sticking", slips, _EVENTS, lambda _: {"sticking": True}, begins=0.0)
+    yield Lie("never sticking", slips, _EVENTS, lambda _: {"sticking": False}, begins=0.0)
+    yield Lie("slipping 30 ms early", slips, _EVENTS, lambda m: {"sticking": m.at(m.t + 0.03).sticking})
+    yield lie("always sticking, without events", lambda *_: [], lambda _: {"sticking": True})
+    yield lie("no events", lambda *_: [])
+    yield lie("an event too many", lambda right, _: [*right, Event("stick", 0.35, 0.35, 0.35)])
+    yield lie("events of the wrong kind", each(kind=lambda *_: "stick"))
+    yield lie("events 30 ms late", later(0.03))
+    yield lie("events 5 ms late", later(0.005))
+    yield lie("events before they are", later(-0.03))
+    yield lie("event times not finite", each(time=lambda *_: np.nan))
+    wide: dict[str, Any] = {"time_low": lambda *_: 0.0, "time_high": lambda _, until: until}
+    yield lie("brackets as wide as the run", each(**wide), said=("by luck",))
+    yield lie("events 30 ms late in brackets as wide as the run", each(time=lambda event, _: event.time + 0.03, **wide))
+
+
+def _models() -> Iterator[Lie]:
+    standard = gravity(9.80665 / 9.81)
+    yield Lie("g = 9.80665, told", ALL, ("gravity is",), model=standard)
+    yield Lie("g = 9.80665, the scene repeated", ALL, _MODEL, model=standard, built=echo)
+    yield Lie("half of gravity, told", ALL, ("gravity is",), model=gravity(0.5))
+    yield Lie("half of gravity, the scene repeated", ALL, _MODEL, model=gravity(0.5), built=echo)
+    yield Lie("half of gravity, nothing told", ALL, _MODEL, model=gravity(0.5), built=lambda right, _: type(right)())
+    yield Lie("gravity halved in place", ALL, _MODEL, model=halve_in_place, built=echo)
+    yield Lie("mass x 1.02, the scene repeated", ALL, _MODEL, model=heavier("mass", 1.02), built=echo)
+    yield Lie("inertia x 1.1, the scene repeated", ALL, _MODEL, model=heavier("inertia", 1.1), built=echo)
+    yield Lie("half of gravity from the first sample on", ALL, (*_PLACES, *_FORCES), _from_first_sample(gravity(0.5)))
+    yield Lie(
+        "mass x 1.02 from the first sample on",
+        ALL,
+        _FORCES,
+        _from_first_sample(heavier("mass", 1.02)),
+        ("mass", "times"),
+    )
+    yield Lie(
+        "inertia x 1.1 from the first sample on",
+        ALL,
+        (*_PLACES, *_FORCES),
+        _from_first_sample(heavier("inertia", 1.1)),
+        ("inertia",),
+    )
+
+
+def _small() -> Iterator[Lie]:
+    yield Lie("single precision", ALL, (), _single)
+    yield Lie("single precision from the start", ALL, _MODEL, _single, begins=0.0)
+    yield Lie("1e-9 of its size further", ALL, (), lambda m: {"p_WB": m.right.p_WB + 1e-9 * m.length})
+    yield Lie("forces x (1 + 1e-9)", BALLS, (), lambda m: {"force": (1 + 1e-9) * m.right.force})
+    yield Lie("1 ns late", ALL, (), lambda m: m.at(m.t - 1e-9))
+
+
+def table() -> list[Lie]:
+    """All lies."""
+    parts = _times, _places, _velocities, _spins, _orientations, _forces_of_balls, _reactions_of_joints, _slips, _models
+    return [lie for part in (*parts, _small) for lie in part()]
+
+
+def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:
+    """The change between samples, and no lie at them."""
+    return lambda m: {} if abs(m.t / EVERY - round(m.t / EVERY)) < 1e-6 else change(m)
+
+
+def _last_frozen(m: Moment) -> dict[str, Any]:
+    return {name: np.concatenate([getattr(m.right, name)[:-1], getattr(m.at(0.0), name)[-1:]]) for name in _STATE}
+
+
+def _beat(m: Moment) -> dict[str, Any]:
+    return {"p_WB": m.right.p_WB + 0.02 * m.length * np.sin(2 * np.pi * m.t / EVERY)}
+
+
+def _from_first_sample(model: Callable[[Scene], Scene]) -> Callable[[Moment], Any]:
+    """The honest sample of another model."""
+    return lambda m: m.of(model)
+
+
+def _single(m: Moment) -> dict[str, Any]:
+    names = [each.name for each in dataclasses.fields(m.right)]
+    arrays = {name: getattr(m.right, name) for name in names if isinstance(getattr(m.right, name), np.ndarray)}
+    return {name: values.astype(np.float32).astype(np.float64) for name, values in arrays.items()}
+
+
+def _normal(m: Moment) -> Any:
+    body = m.scene.elements[0].rolling  # type: ignore[attr-defined]  # a ball rolls
+    e1 = body.surface.normal(m.right.p_WB)
+    return (m.right.force @ e1) * e1
+
+
+def _in_body_axes(m: Moment) -> Any:
+    mechanism = m.scene.elements[0].mechanism  # type: ignore[attr-defined]  # it has one
+    turns = np.concatenate([m.turns.as_matrix(), np.eye(3)[None]])
+    children = turns[[mechanism.body_index[each.b] for each in mechanism.connections]]
+    return np.einsum("jba,jb->ja", children, m.right.joint_force)
+
+
+def halve_in_place(scene: Scene) -> Scene:
+    """Gravity of the very scene that was given, by force."""
+    (element,) = scene.elements
+    if isinstance(element, MechanismElement):
+        object.__setattr__(element.mechanism, "gravity", 0.5 * np.asarray(element.mechanism.gravity))
+        return of_mechanism(scene)
+    old = element.gravity  # type: ignore[attr-defined]  # a ball has it
+    object.__setattr__(old, "magnitude", 0.5 * old.magnitude)
+    return changed(scene, gravity=Gravity(old.magnitude, old.direction))
