@@ -101,6 +101,19 @@ class Orderless(Breaking, breaks="resolution_and_order_are_told"):
 
 
 @dataclass(frozen=True)
+class HalfSettings(TinySettings):
+    """A precision that nobody knows."""
+
+    precision: ClassVar[str] = "half"
+
+
+class Half(Breaking, breaks="precision_is_told"):
+    """Computes in neither single nor double precision."""
+
+    settings = HalfSettings
+
+
+@dataclass(frozen=True)
 class LaxSettings(TinySettings):
     """Takes any step."""
 
