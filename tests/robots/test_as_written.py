@@ -114,3 +114,15 @@ def test_json(proofroll: Proofroll, arm: Path) -> None:
     """The JSON has what engines do with the file as it is."""
     _, out, _ = proofroll("check", str(arm), "--engine", "pinocchio", "--states", "2", "--json")
     assert json.loads(out)["engines"][0]["as_written"] == "read"
+
+
+def test_defaults_of_an_included_file(tmp_path: Path) -> None:
+    """What an engine reads from a file and one that it includes, both with defaults, it reads from our copy."""
+    pytest.importorskip("pinocchio")
+    (tmp_path / "common.xml").write_text('<mujoco><default><geom condim="4"/></default></mujoco>')
+    own = '<default><geom condim="3"/><default class="k"><joint damping="0.1"/></default></default><worldbody>'
+    path = tmp_path / "robot.xml"
+    path.write_text(mjcf(joint='class="k"').replace("<worldbody>", '<include file="common.xml"/>' + own))
+    row = _rows(path, "pinocchio")["pinocchio"]
+    assert (row.status, row.as_written) == ("explained", "read")
+    assert [cause.id for cause in row.causes] == ["damping_left_out"]

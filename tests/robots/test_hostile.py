@@ -45,6 +45,7 @@ HOSTILE = {
     "no parent": (urdf().replace('parent link="slide"', 'parent link="nothing"'), "there is no such link"),
     "two parents": (urdf().replace('child link="tool"', 'child link="slide"'), "a tree"),
     "planar": (urdf(kinds=("planar", "fixed", "fixed")), "the check covers"),
+    "follows none": (urdf(third='<mimic joint="1"/>'), "no joint of this name; name the one that is meant, j1"),
     "follows itself": (urdf(first='<mimic joint="j1"/>'), "name another joint"),
     "follows in a ring": (
         urdf(first='<mimic joint="j2"/>', second='<mimic joint="j1"/>'),

@@ -144,6 +144,18 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ),
     ("mesh", held_by(MESHED, outside=PLAIN_CLASS + CORNER, inertial=""), "pinocchio", {"meshes_weigh_one_kilogram"}),
     (
+        "mesh beside a shape of a class",
+        held_by(MESHED + RODS, outside=CLASS_K.format("", 'mass="1"') + CORNER, inertial=""),
+        "pinocchio",
+        {"meshes_weigh_one_kilogram", "class_mass_ignored"},
+    ),
+    (
+        "mesh beside one that hits nothing",
+        held_by(MESHED + MESHED.replace("<geom", f"<geom {HIDDEN}"), outside=PLAIN_CLASS + CORNER, inertial=""),
+        "pinocchio",
+        {"meshes_weigh_one_kilogram", "noncolliding_shapes_weightless"},
+    ),
+    (
         "mesh of a class",
         held_by('<geom class="k" mesh="t"/>', outside=CLASS_K.format("", 'type="mesh" mass="2"') + CORNER, inertial=""),
         "pinocchio",

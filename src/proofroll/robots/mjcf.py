@@ -82,7 +82,9 @@ def _add(
     """
     root = copy.deepcopy(root)
     root.tag = "mujoco"
-    _include(root, path, place.parent, inside, (place,))
+    if root.find(".//include") is not None:
+        _include(root, path, place.parent, inside, (place,))
+        _merge_defaults(root)
     contained = names_files_inside(root, place.parent, inside)
     for part in ("actuator", "extension"):
         for element in [*root.iter(part)]:
@@ -128,6 +130,27 @@ def _include(element: Element, path: Path, folder: Path, inside: Path, open_file
             raise InputError(
                 "<include file>", child.get("file", ""), f"more than {MOST_ELEMENTS} elements are included"
             )
+
+
+def _merge_defaults(root: Element) -> None:
+    """Puts the defaults of included files and those of the file into one element, where that means the same.
+
+    Pinocchio reads them from two files and refuses them from one; classes take from the one above what it has so far.
+    """
+    whole, *others = root.findall("default") or [Element("default")]
+    for other in others:
+        inherits, plain = whole.find("default") is not None, [each for each in other if each.tag != "default"]
+        if other.get("class", "main") != whole.get("class", "main") or (inherits and plain):
+            whole = other
+            continue
+        for each in plain:
+            given = whole.find(each.tag)
+            if given is None or len(given) or len(each):
+                whole.append(each)
+            else:
+                given.attrib |= each.attrib
+        whole.extend(other.findall("default"))
+        root.remove(other)
 
 
 def _gravity_compensations(root: Element) -> Iterator[LintFinding]:

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.errors import InputError, told_of
+from proofroll.core.errors import InputError, choices, told_of
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
 
@@ -209,6 +209,10 @@ def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
             seen.add(other)
             following = by_joint[other]
             factor, offset, other = factor * following.multiplier, offset + factor * following.offset, following.other
+        if other not in {joint.name for joint in robot.joints}:
+            meant = [name for name in kinds if name != mimic.joint and name.endswith(other)]
+            advice = f"; name the one that is meant, {choices(meant)}" if meant else "; name one that moves"
+            raise InputError(f"<joint {mimic.joint} mimic>", other, f"the file has no joint of this name{advice}")
         if other in seen or kinds.get(other) not in {"revolute", "prismatic"}:
             raise InputError(f"<joint {mimic.joint} mimic>", mimic.other, "name another joint that moves")
         found.append(Mimic(mimic.joint, other, factor, offset))

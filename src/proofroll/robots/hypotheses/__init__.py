@@ -25,6 +25,18 @@ from proofroll.robots.robot_file import RobotFile
 _Part = TypeVar("_Part", RobotBody, RobotJoint)
 
 
+@dataclasses.dataclass(frozen=True, kw_only=True)
+class EditedRobot(Robot):
+    """A robot with the content of a file that causes have edited."""
+
+    root: Element
+
+    @classmethod
+    def of(cls, robot: Robot, root: Element) -> EditedRobot:
+        """The robot with this content."""
+        return cls(**{field.name: getattr(robot, field.name) for field in dataclasses.fields(Robot)}, root=root)
+
+
 @dataclasses.dataclass(frozen=True)
 class RobotEvidence:
     """What a hypothesis may look at.
@@ -41,16 +53,23 @@ class RobotEvidence:
     reading: Reading
     recompiled: Callable[[Element], Robot | None] = lambda _: None
 
+    @property
+    def root(self) -> Element:
+        """Content of the file, with the edits of the causes found so far."""
+        return self.robot.root if isinstance(self.robot, EditedRobot) else self.file.root
+
     def edited(self, edit: Callable[[Element], bool]) -> Robot | None:
         """The robot with all that an edit of the file changes in bodies and joints; None: nothing, or no meaning.
 
-        What the edit leaves as it is keeps the causes found so far. It says whether it changed the file.
+        What the edit leaves as it is keeps the causes found so far; edits of one body add up. It says whether it
+        changed the file.
         """
-        root = copy.deepcopy(self.file.root)
+        root = copy.deepcopy(self.root)
         if not edit(root):
             return None
-        before, after = self.recompiled(self.file.root), self.recompiled(root)
-        return None if before is None or after is None else self.carried_over(before, after)
+        before, after = self.recompiled(self.root), self.recompiled(root)
+        found = None if before is None or after is None else self.carried_over(before, after)
+        return None if found is None else EditedRobot.of(found, root)
 
     def carried_over(self, before: Robot, after: Robot) -> Robot | None:
         """The robot with all that differs between two others; None: nothing does."""

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import SubElement
 
 import numpy as np
 
-from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import EditedRobot, RobotEvidence, hypothesis
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 
 # Bullet's margin around shapes, also around none [m].
@@ -68,7 +68,7 @@ _STAND_IN = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
 )
 def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
     """Shapes that collide with nothing (contype 0, conaffinity 0) give no mass."""
-    root = copy.deepcopy(evidence.file.root)
+    root = copy.deepcopy(evidence.root)
     bare, touched = set(), False
     for body in root.iter("body"):
         name, shapes = str(body.get("name")), body.findall("geom")
@@ -82,13 +82,14 @@ def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
         if not any(collides) and body.find("inertial") is None:
             SubElement(body, "inertial", _STAND_IN)
             bare.add(name)
-    before = evidence.recompiled(evidence.file.root) if touched else None
+    before = evidence.recompiled(evidence.root) if touched else None
     compiled = evidence.recompiled(root) if touched else None
     if before is None or compiled is None:
         return None
     nothing = np.zeros((3, 3))
     lighter = (RobotBody(name, 0.0, np.zeros(3), nothing) for name in bare if name in compiled.bodies)
-    return evidence.carried_over(before, compiled.with_bodies(lighter))
+    found = evidence.carried_over(before, compiled.with_bodies(lighter))
+    return None if found is None else EditedRobot.of(found, root)
 
 
 _DENSITY = 1000.0

@@ -1,0 +1,31 @@
+"""Defaults of included files: one element where that means the same."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from proofroll.robots.robot_file import open_robot
+
+NESTED = '<default class="k"><joint damping="1"/></default>'
+
+
+@pytest.mark.parametrize(
+    ("included", "own", "count"),
+    [
+        ('<joint armature="1"/>', '<joint damping="2"/>' + NESTED, 1),
+        ('<joint armature="1"/>' + NESTED, '<default class="l"/>', 1),
+        ('<joint armature="1"/>' + NESTED, '<joint damping="2"/>', 2),
+    ],
+    ids=["classes below both", "classes beside", "a class that has less"],
+)
+def test_merged(included: str, own: str, count: int, tmp_path: Path) -> None:
+    """Defaults are merged unless a class of the included file would take what stands later."""
+    (tmp_path / "common.xml").write_text(f"<mujoco><default>{included}</default></mujoco>")
+    path = tmp_path / "robot.xml"
+    path.write_text(
+        f'<mujoco><include file="common.xml"/><default>{own}</default><worldbody><body><joint/>'
+        '<geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    assert len(open_robot(path).root.findall("default")) == count
