@@ -317,6 +317,15 @@ def test_what_is_not_judged_is_named() -> None:
     assert {name for name, why in of_places.items() if why == "no tolerance is given for it"} == {"v_WB", "w_WB"}
 
 
+def test_a_notebook_shows_a_verdict() -> None:
+    """A verdict is a table with a row for each quantity; what somebody else wrote is text in it."""
+    given = swing(9.7) | {"<b>mine": swing()["time"]}
+    shown = proofroll.judge(given, "pendulum", {"q.pivot": "1e-3 rad"}, because="<i>a look")._repr_html_()
+    assert re.search(r"<th>q\.pivot</th><td>✗ differs</td><td>[\d.]+ rad</td><td>1e-3 rad</td>", shown)
+    assert "differs from the truth of pendulum (tolerance: &lt;i&gt;a look)" in shown
+    assert "not judged: &lt;b&gt;mine; the truth has nothing of that name" in shown
+
+
 def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:
     """A file of somebody's is judged: exit 0 if it agrees, 1 if not, with the numbers as JSON; 2 for another scene."""
     import xarray as xr

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,6 +97,24 @@ class Judged:
         for why in dict.fromkeys(self.unjudged.values()):
             lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
         return "\n".join([head, *lines])
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for a notebook."""
+        head, *lines = str(self).splitlines()
+        rows = []
+        for item in self.compared:
+            found, sign = item.judgement, "✓" if item.agrees else "✗"
+            unit = "" if found.unit == "1" else f" {found.unit}"
+            numbers = (number(value) + unit for value in (found.error, found.tolerance, found.truth_error_bar))
+            when = "" if item.at is None else f"{item.at:.4g} s"
+            cells = [f"{sign} {found.verdict.value}", *numbers, when]
+            rows.append(
+                f"<tr><th>{escape(found.observable)}</th>{''.join(f'<td>{escape(c)}</td>' for c in cells)}</tr>"
+            )
+        columns = ("", "verdict", "off by", "allowed", "truth known to", "at")
+        header = "".join(f"<th>{name}</th>" for name in columns)
+        rest = "".join(f"<p>{escape(line.strip())}</p>" for line in lines[len(rows) :])
+        return f"<p><b>{escape(head)}</b></p><table><tr>{header}</tr>{''.join(rows)}</table>{rest}"
 
     def content(self) -> dict[str, Any]:
         """As plain data."""
