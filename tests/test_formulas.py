@@ -35,3 +35,16 @@ def test_formulas_of_a_page_are_drawn(page: Path) -> None:
 def test_no_page_asks_the_network_for_formulas() -> None:
     """No script from elsewhere draws them."""
     assert "mathjax" not in (DOCS / "conf.py").read_text(encoding="utf-8")
+
+
+def test_the_search_finds_pages_before_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wherever Sphinx is called, the search has the scores that put objects of the reference last."""
+    monkeypatch.chdir(tmp_path)
+    scorer = Path(runpy.run_path(str(DOCS / "conf.py"))["html_search_scorer"]).read_text(encoding="utf-8")
+    assert 'kind === "object"' in scorer
+    assert "score - 100" in scorer
+
+
+def test_definitions_of_the_glossary_are_lists() -> None:
+    """A term and its definition are a list on the page, not a paragraph with a colon."""
+    assert "deflist" in runpy.run_path(str(DOCS / "conf.py"))["myst_enable_extensions"]
