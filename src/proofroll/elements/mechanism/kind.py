@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.errors import InputError
@@ -15,6 +16,23 @@ from proofroll.elements.mechanism.reader import KINDS, made_mechanism
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
+
+
+# A mechanism without laws of joints, and one of each that changes its motion by far more than any step does [SI].
+_PLAIN = "double_pendulum"
+_LAWS: Mapping[str, float] = {"damping": 2.0, "torque": 3.0, "armature": 0.3, "friction": 0.7}
+_SPEED = 1.0  # rad/s, at which a damper acts
+
+
+def _with_law(scene: Scene, law: str, value: float) -> Scene:
+    """A scene of hinges whose joints all move, with the law in each."""
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)  # it is one of ours
+    mechanism = element.mechanism
+    changes: dict[str, Any] = {law: value, "v0": (_SPEED,)}
+    joints = tuple(replace(joint, **changes) for joint in mechanism.joints)
+    changed = replace(element, mechanism=replace(mechanism, joints=joints))
+    return replace(scene, name=f"{scene.name}-{law}", elements=(changed,))
 
 
 class MechanismKind:
@@ -48,10 +66,11 @@ class MechanismKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Those with a loop, with oblique axes, with a spinning body, and with springs."""
+        """Those with a loop, with oblique axes, with a spinning body, with springs, and with each law of a joint."""
         from proofroll.files.scene_file import load_scene
 
-        return {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators")}
+        found = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators")}
+        return found | {f"{_PLAIN}-{law}": _with_law(load_scene(_PLAIN), law, value) for law, value in _LAWS.items()}
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:
