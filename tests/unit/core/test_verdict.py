@@ -40,6 +40,13 @@ def test_agrees_within_tolerance() -> None:
     assert "one step only" in found.reason
 
 
+def test_tolerances_that_begin_to_matter_show_no_limit() -> None:
+    """Where samples limited the steps, a first tightening changes next to nothing: what is left is no wrong limit."""
+    off = (2e-10, 2e-10 + 7e-14, 2e-10 - 7e-12)
+    found = verdict_of(off[0], tightest([TRUE + value for value in off]), ladder=True)
+    assert (found.verdict, found.remarks) == (Verdict.AGREES, ())
+
+
 @pytest.mark.parametrize(
     ("on_grid", "off_grid", "verdict"),
     [
