@@ -16,8 +16,8 @@ from proofroll.report.pages import element
 
 # What TeX has and matplotlib's formulas write otherwise.
 _SPELT = (
-    (re.compile(r"\\[td]?frac\s*(\d)(\d)"), r"\\frac{\1}{\2}"),
-    (re.compile(r"\\[td]frac"), r"\\frac"),
+    (re.compile(r"\\t?frac\s*(\d)(\d)"), r"\\frac{\1}{\2}"),
+    (re.compile(r"\\tfrac"), r"\\frac"),
     (re.compile(r"\\big[lr]"), ""),
     (re.compile(r"\\(ge|le)\b"), r"\\\1q"),
     (re.compile(r"\\(mathsf|mathbf|boldsymbol)\s*(\\?\w+)(?!\w|\{)"), r"\\\1{\2}"),
@@ -50,7 +50,7 @@ def markup(tex: str, number: int) -> str:
     """A formula as an element of a page; ``number``: no other on the page has it."""
     svg, width, height, depth = drawn(tex)
     look = f"width:{width:.3f}em;height:{height:.3f}em;vertical-align:{-depth:.3f}em"
-    picture = element(svg, f"m{number}-").replace("<svg ", f'<svg style="{look}" fill="currentColor" ', 1)
+    picture = element(svg.strip(), f"m{number}-").replace("<svg ", f'<svg style="{look}" fill="currentColor" ', 1)
     return f'<span class="formula" role="math" aria-label="{html.escape(" ".join(tex.split()))}">{picture}</span>'
 
 
@@ -66,7 +66,8 @@ def _display(writer: Any, node: Any) -> None:
     from docutils import nodes
 
     writer.formulas = getattr(writer, "formulas", 0) + 1
-    writer.body.append(f'<div class="formula">{markup(node.astext(), writer.formulas)}</div>')
+    tall = node.astext().replace("\\frac", "\\dfrac")
+    writer.body.append(f'<div class="formula">{markup(tall, writer.formulas)}</div>')
     raise nodes.SkipNode
 
 

@@ -29,6 +29,7 @@ def test_formulas_of_a_page_are_drawn(page: Path) -> None:
         found = FORMULAS["markup"](tex, 1)
         assert "<path" in found
         assert 'role="math" aria-label="' in found
+        assert found.endswith("</svg></span>")  # no space before what follows it
         assert not re.search(r'(?:src|href)="(?!#)', found)
 
 
