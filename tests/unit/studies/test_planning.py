@@ -9,7 +9,7 @@ import pytest
 from proofroll.core.comparison import Row
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
-from proofroll.studies import planning
+from proofroll.studies import first_look, planning
 
 
 def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -52,3 +52,10 @@ def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) ->
     found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["mujoco"])
     assert {tuple(run.row.ladder) for run in found.runs} == {tuple(factors)}
     assert all(run.ladder.keys() == set(factors) for run in found.runs)
+
+
+def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
+    """Engines with a fixed step have that of the scene's file where their own is longer; adaptive ones have theirs."""
+    engines = [row.engine for row in first_look.compared("andrews_squeezer", {}).rows]
+    assert "exudyn[formulation=redundant,dt=0.0001]" in engines
+    assert "projection[formulation=dependent]" in engines
