@@ -142,6 +142,7 @@ class ReportedRun(Setting):
     judgements: list[Judgement]
     certificate: list[dict[str, Any]]
     seconds_per_second: float | None
+    build_seconds: float | None
     timings: list[float]
     cost: Cost | None
     versions: dict[str, str]

@@ -214,6 +214,7 @@ def _run(run: Run, row: int) -> ReportedRun:
         judgements=run.judgements,
         certificate=run.result.certificate,
         seconds_per_second=run.result.seconds_per_second,
+        build_seconds=run.result.build_seconds,
         timings=run.result.timings,
         cost=Cost.of(run.result.timings),
         versions=run.result.versions,

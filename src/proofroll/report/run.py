@@ -27,6 +27,7 @@ class RunContent:
         parameters: every parameter of the scene with its value, also those that nobody set.
         asks: what was wanted besides the motion.
         precision: in which the engine computes, single or double.
+        build_seconds: before the first step, with what is compiled [s]; None: nothing was built.
         until, every: last time and sampling interval [s].
         final: variable -> value at the last sample; empty if there is none.
         units: of these.
@@ -48,6 +49,7 @@ class RunContent:
     until: float
     every: float
     wall_seconds: float
+    build_seconds: float | None
     versions: dict[str, str]
     certificate: list[dict[str, Any]]
     diagnosis: list[Diagnosis]
@@ -78,6 +80,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
         until=case.until,
         every=case.every,
         wall_seconds=result.wall_seconds,
+        build_seconds=result.build_seconds,
         versions=result.versions,
         certificate=result.certificate,
         diagnosis=causes,
@@ -144,7 +147,8 @@ def run_lines(content: RunContent) -> list[Any]:
         said = ", ".join(_told(event) for event in content.events[:_EVENTS])
         more = len(content.events) - _EVENTS
         lines.append(Text(f"events: {said}{f' and {more} more' if more > 0 else ''}"))
-    lines.append(Text(f"{content.wall_seconds:.3g} s of wall time"))
+    before = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"
+    lines.append(Text(f"{content.wall_seconds:.3g} s of wall time{before}"))
     for what, file in (("trajectory", content.trajectory), ("plot", content.plot)):
         if file:
             lines.append(Text(f"The {what} is in {file}."))

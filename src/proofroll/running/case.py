@@ -163,6 +163,7 @@ class Result:
         status: how it ended.
         message: one sentence about it.
         wall_seconds: inside ``advance`` during the sampled run [s].
+        build_seconds: before the first step: one ``build`` with what it compiles [s], or None.
         seconds_per_second: median wall seconds per simulated second of clean runs that only advance, or None.
         timings: of the single clean runs, wall seconds per simulated second.
         certificate: lines of the certificate, as dictionaries.
@@ -179,6 +180,7 @@ class Result:
     status: Status
     message: str
     wall_seconds: float = 0.0
+    build_seconds: float | None = None
     seconds_per_second: float | None = None
     timings: list[float] = field(default_factory=list)
     certificate: list[dict[str, Any]] = field(default_factory=list)

@@ -70,6 +70,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     try:
         engine = build(kind, scene, settings)
         spent.on("building")
+        building = spent.seconds["building"]
         found = certificate(kind, engine, scene, settings)
         difference = first_difference(found)
         spent.on("certificate")
@@ -94,6 +95,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         status=Status.DONE if recording.failure is None else Status.DIVERGED,
         message="; ".join([recording.message(case.until), *remarks]),
         wall_seconds=recording.wall_seconds,
+        build_seconds=building,
         seconds_per_second=statistics.median(timings) if timings else None,
         timings=timings,
         certificate=lines,

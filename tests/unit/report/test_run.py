@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import io
 from pathlib import Path
 from types import SimpleNamespace
@@ -55,3 +56,15 @@ def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
     assert text.count("not determined by the equations") == 1
     assert all(name in text for name in held)
     assert max(map(len, text.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.25, "1 s of wall time, after 0.25 s before the first step"), (None, "1 s of wall time")]
+)
+def test_what_comes_before_the_first_step_is_told(seconds: float | None, said: str, tmp_path: Path) -> None:
+    """The seconds of building, with what an engine compiles, stand beside those of the run."""
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0, build_seconds=seconds)
+    content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
+    assert content.build_seconds == seconds
+    lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}))
+    assert said in [str(line) for line in lines]
