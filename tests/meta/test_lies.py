@@ -199,3 +199,16 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
     # where the coarse steps show no limit, as of the chain, a difference is none of the model
     assert {item.limit for item in judgements if item.verdict is Verdict.DIFFERS} <= {LimitFinding.NOT_SHOWN}
     assert not _causes(scene, kind, runs[1.0], judgements, {"formulation": formulation, **step})
+
+
+@pytest.mark.parametrize("about", ALL)
+def test_places_alone(about: str) -> None:
+    """Who gives places and nothing else is judged by them, right or 3 ms late."""
+    for lie, agrees in (
+        (Lie("nothing", (about,)), True),
+        (next(lie for lie in table() if lie.name == "3 ms late"), False),
+    ):
+        run = simulate(scene_of(about), liar(about, lie), until=UNTIL[about], every=EVERY)
+        places = {name: run[name].to_numpy() for name in ("time", "p_WB")}
+        found = judge_run(places, scene_of(about), {"p_WB": "0.1 %"})
+        assert (found.agrees, found.unjudged) == (agrees, {})
