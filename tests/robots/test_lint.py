@@ -116,3 +116,12 @@ def test_loops_of_an_mjcf_are_told(tmp_path: Path) -> None:
     path.write_text(mjcf().replace("</mujoco>", f"<equality>{held}</equality></mujoco>"))
     found = [item for item in lint(open_robot(path), Robot("", {}, ())) if item.where == "equality"]
     assert [(item.level, item.what.partition(":")[0]) for item in found] == [("warning", "1 <connect>, 1 <weld>")]
+
+
+def test_trees_in_frames(tmp_path: Path) -> None:
+    """Trees that hang in frames of the world, one in another, are counted."""
+    path = tmp_path / "robot.xml"
+    inner = '<frame><frame><body name="c"><joint/><geom size="0.1"/></body></frame></frame>'
+    path.write_text(mjcf(extra=inner))
+    found = lint(open_robot(path), Robot("r", {}, ()))
+    assert [item.what for item in found if item.where == "worldbody"] == ["2 trees: some engines keep only the first"]

@@ -41,7 +41,8 @@ def compare(
     from proofroll.running.worker_pool import Workers
 
     workers = Workers()
-    loaded = asked(comparison, options.assignments(settings), workers)
+    with options.spinner(comparison):
+        loaded = asked(comparison, options.assignments(settings), workers)
     tell_left_out([loaded], engine or [])
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
     content = outcome_content(outcomes[0])
@@ -86,7 +87,8 @@ def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stag
     from proofroll.studies.compare import evaluate
     from proofroll.studies.planning import plan
 
-    plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
+    with options.spinner(f"{stage}cases"):
+        plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
     with options.progress_bar(f"{stage}cases", total=len(cases)) as advance:
         results = runner.run(cases.values(), lambda case, _: advance(f"{stage}{case.engine.name}"))

@@ -27,7 +27,7 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
     from proofroll.running.environments import remembered, root
 
     others = {f"{item.name}@{item.label}": f"in Python {item.interpreter} of its own" for item in remembered()}
-    with ThreadPoolExecutor() as pool:
+    with options.spinner("engines"), ThreadPoolExecutor() as pool:
         found = list(pool.map(_described, [*engine_names(), *others]))
     if as_json:
         options.write_json(found)

@@ -86,9 +86,14 @@ def progress_bar(what: str, total: int | None = None) -> Iterator[Callable[..., 
 
     Where standard error is no terminal, or nothing may move there, it is a line now and then.
     """
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, Task, TextColumn, TimeElapsedColumn
+    from rich.text import Text
 
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    class Described(TextColumn):
+        def render(self, task: Task) -> Text:
+            return super().render(task).append(_waited_for())
+
+    columns = (Described("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     console, moves = _standard_error()
     with Progress(*columns, console=console, transient=True, disable=not moves) as progress:
         task = progress.add_task(what, total=total)
@@ -108,7 +113,7 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
 
     def say() -> None:
         while not ended.wait(_SAID_EVERY):
-            complain(f"{line()}, {time.monotonic() - start:.0f} s")
+            complain(f"{line()}{_waited_for()}, {time.monotonic() - start:.0f} s")
 
     speaker = threading.Thread(target=say, daemon=True)
     speaker.start()
@@ -117,6 +122,14 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
     finally:
         ended.set()
         speaker.join()
+
+
+def _waited_for() -> str:
+    """Engines that have not yet answered what they were asked, as the end of a line."""
+    asking = sys.modules.get("proofroll.running.asking")  # if nothing has imported it nobody was asked
+    names = dict.fromkeys(asking.waited_for) if asking else ()
+    what = "what they are" if len(names) > 1 else "what it is"
+    return f": waiting for {', '.join(names)} to say {what}" if names else ""
 
 
 def _standard_error() -> tuple[Console, bool]:

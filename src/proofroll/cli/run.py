@@ -71,7 +71,7 @@ def run(
         raise InputError("--out", out, f"end the name of the file in {NETCDF}, {CSV} or {STORED}")
     if plot is not None:
         require_ending(plot, "--plot")
-    with options.spinner(f"waiting for {engine} to say what it is"):
+    with options.spinner(f"{scene} in {engine}"):
         preparing.join()
         case = single_case(
             scene,

@@ -129,6 +129,11 @@ def _closed(file: RobotFile) -> Iterator[_Noticed]:
         )
 
 
+def _trees(parent: Element) -> int:
+    """Bodies that hang in the world, also within frames."""
+    return len(parent.findall("body")) + sum(map(_trees, parent.findall("frame")))
+
+
 def _mjcf(file: RobotFile) -> Iterator[_Noticed]:
     for compiler in file.root.iter("compiler"):
         for name, what in (
@@ -150,8 +155,8 @@ def _mjcf(file: RobotFile) -> Iterator[_Noticed]:
         yield "note", "tendon", "springs and damping of tendons are not compared"
     if any(body.get("gravcomp") for body in file.root.iter("body")):
         yield "note", "bodies", "compensation of gravity (gravcomp) is not compared"
-    if len(trees := [body for world in file.root.iter("worldbody") for body in world.findall("body")]) > 1:
-        yield "warning", "worldbody", f"{len(trees)} trees: some engines keep only the first"
+    if (trees := sum(map(_trees, file.root.iter("worldbody")))) > 1:
+        yield "warning", "worldbody", f"{trees} trees: some engines keep only the first"
     for body in file.root.iter("body"):
         if len([*body.findall("joint"), *body.findall("freejoint")]) > 1:
             yield "note", "bodies", "several joints in one body: engines place them differently"

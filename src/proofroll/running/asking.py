@@ -17,6 +17,17 @@ from proofroll.running.worker_pool import Workers
 
 _START_UP_SECONDS = 60.0
 _WRITING_SECONDS = 300.0
+# Engines that have been asked something and have not answered yet, for whoever tells what is waited for.
+waited_for: list[str] = []
+
+
+@contextlib.contextmanager
+def _waiting_for(engine: str) -> Iterator[None]:
+    waited_for.append(engine)
+    try:
+        yield
+    finally:
+        waited_for.remove(engine)
 
 
 def _answers(
@@ -30,7 +41,7 @@ def _answers(
             if name != engine:
                 continue
             try:
-                with lent.lend(engine) as worker:
+                with _waiting_for(engine), lent.lend(engine) as worker:
                     found[index] = worker.request(request, seconds)
             except ProofrollError as error:
                 found[index] = error
@@ -101,9 +112,10 @@ def prepare(engine: str, workers: Workers) -> None:
 
     What is wrong with the engine is left to whoever asks it next.
     """
-    with contextlib.suppress(ProofrollError), workers.lend(parse_engine(engine).name) as worker:
-        worker.request({"do": "resolve", "engine": parse_engine(engine).name, "options": {}}, _START_UP_SECONDS)
-        if parse_engine(engine).name == "truth":
+    name = parse_engine(engine).name
+    with contextlib.suppress(ProofrollError), _waiting_for(name), workers.lend(name) as worker:
+        worker.request({"do": "resolve", "engine": name, "options": {}}, _START_UP_SECONDS)
+        if name == "truth":
             importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
             worker.request({"do": "call", **importing}, _START_UP_SECONDS)
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from proofroll.core.errors import Missing
 from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
@@ -103,10 +104,13 @@ def tradeoff(
 
     Raises:
         InputError: something that does not exist, or a quantity that the scene does not have.
+        Missing: no engine can be asked.
     """
     scene = question.loaded()
     scene.observable(question.quantity)
     curves, absent = curves_of(engines, runner.workers, scene.requires)
+    if not curves:
+        raise Missing("there is no engine to measure: " + "; ".join(f"{name}: {why}" for name, why in absent.items()))
     tell = progress or (lambda _: None)
 
     def told(case: Case, _: Result) -> None:

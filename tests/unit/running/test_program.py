@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -129,12 +130,19 @@ def test_a_preset_that_no_run_could_take(tmp_path: Path, values: dict[str, Any],
         engine(f"rod@program:{program}")
 
 
+@pytest.mark.parametrize("command", ["run", "compare", "tradeoff"])
 def test_a_program_that_is_waited_for(
-    command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run says now and then that it waits for a program to say what it is."""
+    """A command says now and then that it waits for a program to say what it is."""
     program = script(tmp_path / "rod", "read -r line; sleep 2; exit 1")
     monkeypatch.setattr("proofroll.cli.options._SAID_EVERY", 0.1)
-    code, _, err = command_line("run", "pendulum", "--engine", f"rod@program:{program}")
+    row = f'[[rows]]\nengine = "rod@program:{program}"\nexpect = "agrees"\ntolerance = "any"\n'
+    bands = '[tolerances.any]\nbecause = "none is needed"\npositions = "1 %"\n'
+    claim = tmp_path / "claim.toml"
+    claim.write_text(f'title = "a"\nquestion = "a?"\nscene = "pendulum"\nuntil = 0.1\nevery = 0.1\n{bands}{row}')
+    asked = str(claim) if command == "compare" else "pendulum"
+    out = [] if command == "run" else ["--out", str(tmp_path / "out")]
+    code, _, err = command_line(command, asked, "--engine", f"rod@program:{program}", *out)
     assert code == 3
-    assert f"waiting for rod@program:{program} to say what it is, " in err
+    assert re.search(rf"waiting for .*rod@program:{program}.* to say what", err)
