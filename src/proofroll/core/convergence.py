@@ -20,6 +20,9 @@ _ORDERS = (1e-3, 20.0)
 _SAME = 1e-6
 # Two changes of a power law of the step have one shape but for this part; those of round-off have not.
 _ONE_SHAPE = 0.3
+# Changes that grow by more are no law's: halving the step makes four of h^-2. Times that are told in whole steps change
+# by ratios of small integers, 9/2 among them, which this is none of.
+_GROWS = 22**0.5
 # Differences that shrink more slowly than this say nothing about a limit.
 _NO_CONVERGENCE = 0.25
 
@@ -110,7 +113,7 @@ def _walked(first: FloatArray, last: FloatArray) -> float:
     By more than a factor of four, what halving does to h^-2, no law grows: that is a jump of one of the runs.
     """
     growth = size(last) / max(size(first), sys.float_info.min)
-    if not 1 < growth <= 4.5 or size(last - growth * first) > size(last) / 2:
+    if not 1 < growth <= _GROWS or size(last - growth * first) > size(last) / 2:
         return 0.0
     return size(last) * (growth + growth**2 + growth**3) / 3
 

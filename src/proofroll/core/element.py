@@ -7,6 +7,7 @@ certificate and its signs of failure. The harness holds nothing of that, so a ne
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol
@@ -68,6 +69,7 @@ class FirstMotion:
         moment: a time in which little happens: when an engine without a step is looked at first [s].
         pull: acceleration by the loads alone [m/s²]. A fast start has many times that, and an error of the loads would
             be small beside it, so short runs are measured by this; None: the scale.
+        lasts: before this time nothing that moves can have stopped [s]; later the acceleration may be another.
     """
 
     acceleration: FloatArray
@@ -75,6 +77,7 @@ class FirstMotion:
     scale: float
     moment: float
     pull: float | None = None
+    lasts: float = math.inf
 
     def __post_init__(self) -> None:
         read_only(self)

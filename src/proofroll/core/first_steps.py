@@ -21,6 +21,8 @@ from proofroll.core.several import build, sample_of, shaped
 # Derivative at the first of equally spaced values, over the spacing: by a parabola, by a cubic.
 _PARABOLA = np.array([-3.0, 4.0, -1.0, 0.0]) / 2
 _CUBIC = np.array([-11.0, 18.0, -9.0, 2.0]) / 6
+# What may stop within so many steps, one more than are looked at, tells nothing of the first acceleration.
+_STEPS = 4
 # Three times the observed differences, as for every error bar; the rest is what a cubic misses in the part above.
 _MARGIN = 3.0
 _FLOOR = 1e-6
@@ -43,7 +45,8 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     two polynomials and the two steps differ by is what the derivation does not know, and what rounding each velocity
     makes of a derivative over so short a step; the tolerance is three times that.
     An engine without a step is looked at after small times. Empty for a ball at rest under rolling resistance, which
-    has no direction yet, and for a contact so soft that its springs move first.
+    has no direction yet, for one that may stop within these steps, and for a contact so soft that its springs move
+    first.
 
     Raises:
         Diverged, Refused: by the engine.
@@ -53,7 +56,7 @@ def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
     for index, element in enumerate(scene.elements):
         start = element.first_motion
         soft = softness(built, scene)
-        if start is None or soft > _SPRINGS:
+        if start is None or soft > _SPRINGS or _STEPS * (fixed_step(settings) or 0.0) > start.lasts:
             continue
         lines += _lines(kind, scene, settings, index, start, soft)
     return lines

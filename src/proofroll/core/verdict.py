@@ -204,16 +204,16 @@ class _Ladder:
 def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_off: float, unit: str) -> _Ladder:
     """Reads a limit that is off by ``error``. Rungs that differ by as much as their error show no limit."""
     bar, order = limit.error_bar + truth_bar, limit.order if np.isfinite(limit.order) else None
-    flat = bar <= truth_bar + round_off
-    shown = limit.shown or flat
-    settled = shown or bar <= _FLAT * tolerance
+    settled = limit.shown or limit.error_bar <= _FLAT * tolerance
     far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
     doubted = bar + limit.beside + round_off
+    drifted = doubted - limit.error_bar + limit.error_bar / _FLAT  # twenty further halvings that change as much
     finding, leaves = LimitFinding.NOT_SHOWN, error - doubted > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
         finding = LimitFinding.WITHIN
-    elif leaves and not limit.saturated and (shown or error - doubted / _FLAT > tolerance):
+    elif leaves and not limit.saturated and (limit.shown or error - drifted > tolerance):
         finding = LimitFinding.ANOTHER
+    shown = limit.shown or limit.error_bar <= round_off
     wrong = shown and finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + limit.beside + round_off
     told = "no order" if order is None else f"order {order:.3g}"
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"

@@ -110,6 +110,14 @@ def test_equal_curves() -> None:
     assert not growing.shown
 
 
+@pytest.mark.parametrize("last_digits", [-1e-13, 0.0, 1e-13])
+def test_changes_of_whole_steps_have_one_bar(last_digits: float) -> None:
+    """A time told in steps that changes by two of them, then by nine, has a bar that no last digit changes."""
+    off = 1e-3 * np.array([0.0, 2.0, 11.0 + last_digits])
+    found = richardson([LIMIT + one for one in off], (4, 2, 1))
+    assert found.error_bar == pytest.approx(9e-3 * (4.5 + 4.5**2 + 4.5**3) / 3)
+
+
 def test_a_time_told_in_whole_steps() -> None:
     """Where the last refinement changes nothing, the limit is as uncertain as the one before changed it."""
     assert richardson([LIMIT + 0.2, LIMIT, LIMIT], (4, 2, 1)).error_bar == pytest.approx(0.2)

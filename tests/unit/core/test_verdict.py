@@ -245,6 +245,19 @@ def test_a_flat_ladder_far_away_shows_another_limit() -> None:
         assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
 
 
+@pytest.mark.parametrize("scatter", [0.0, 1e-16, 1e-14, 2e-13, 3e-13, 1e-11, 1e-8])
+@pytest.mark.parametrize(
+    ("off", "verdict", "limit"),
+    [(0.8e-3, Verdict.AGREES, LimitFinding.WITHIN), (1.5e-3, Verdict.DIFFERS, LimitFinding.ANOTHER)],
+)
+def test_scatter_far_below_the_tolerance_decides_nothing(
+    scatter: float, off: float, verdict: Verdict, limit: LimitFinding
+) -> None:
+    """A ladder is flat against the tolerance, however little it scatters and however well its truth is known."""
+    found = verdict_of(off, errors(off, off + scatter, off - scatter), bar=1e-4)
+    assert (found.verdict, found.limit) == (verdict, limit)
+
+
 def test_differs_without_a_ladder() -> None:
     """Without a limit nothing speaks for convergence."""
     found = verdict_of(0.01)

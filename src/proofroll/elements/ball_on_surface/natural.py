@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.element import FirstMotion, StepNumber
 from proofroll.core.time_grid import EVERY
 from proofroll.core.turns import PART as PART_OF_TURNS
@@ -21,7 +22,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 if TYPE_CHECKING:
     import xarray as xr
 
-# An engine without a step is looked at after this part of the time in which its ball rolls by one radius.
+# An engine without a step is looked at after this part of the time in which its ball rolls by one radius, or stops.
 _PART = 1e-2
 
 
@@ -82,10 +83,20 @@ def first_motion(body: RollingBall) -> FirstMotion | None:
     if stands(body, body.v0):
         return None
     speed = float(np.linalg.norm(body.v0)) or float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
+    acceleration, turning = initial_response(body)[0], initial_angular_acceleration(body)
+    at_contact = acceleration + np.cross(turning, body.ball.radius * body.surface.normal(body.p0))
+    lasts = min(_stops(body.v0, acceleration), _stops(body.slip0, at_contact))
     return FirstMotion(
-        initial_response(body)[0][None, :],
-        initial_angular_acceleration(body)[None, :],
+        acceleration[None, :],
+        turning[None, :],
         natural_acceleration(body),
-        _PART * body.ball.radius / (speed or 1.0),
+        _PART * min(body.ball.radius / (speed or 1.0), lasts),
         float(np.linalg.norm(body.gravity)) or None,
+        lasts,
     )
+
+
+def _stops(velocity: FloatArray, rate: FloatArray) -> float:
+    """When a velocity vanishes at its first rate [s]; infinite where it does not shrink."""
+    shrinks = -float(velocity @ rate)
+    return float(velocity @ velocity) / shrinks if shrinks > 0 else math.inf
