@@ -233,7 +233,7 @@ def test_scenes(proofroll: Proofroll) -> None:
     ("words", "index", "found"),
     [
         ("proofroll sce", 1, "scenes"),
-        ("proofroll run pendu", 2, "pendulum"),
+        ("proofroll run bric", 2, "bricard"),
         ("proofroll compare x --engine exu", 4, "exudyn"),
     ],
 )
@@ -365,7 +365,7 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
     )
     assert (code, err) == (0, "")
     events = json.loads(out)["events"]
-    assert [set(event) for event in events] == [{"kind", "time", "time_low", "time_high"}] * 2
+    assert [set(event) for event in events] == [{"kind", "time", "time_low", "time_high", "name"}] * 2
     assert [event["kind"] for event in events] == ["slip", "stick"]
     for event, expected in zip(events, (1.720183172, 2.00812799), strict=True):
         assert event["time"] == pytest.approx(expected, abs=1e-8)
@@ -397,7 +397,7 @@ def test_onset(proofroll: Proofroll, tmp_path: Path, engine: str, code: int, ver
     assert (row["engine"], row["verdict"], row["status"]) == (engine, verdict, status)
     assert (row["onset"] is not None) == (status == "done")
     if code == 0:
-        assert set(row["onset"]) == {"kind", "time", "time_low", "time_high"}
+        assert set(row["onset"]) == {"kind", "time", "time_low", "time_high", "name"}
         assert abs(row["difference"]) < 1e-9
 
 

@@ -119,7 +119,7 @@ def test_data_holds_events_onsets_and_their_verdicts(content: ReportContent) -> 
     """Each run its events with brackets, each truth its conditioning; where friction has no bound, neither."""
     runs = runs_at(content, WELL)
     assert [event.kind for event in runs["alpha"].own.events] == ["slip", "stick"]
-    assert set(plain(runs["alpha"])["events"][0]) == {"kind", "time", "time_low", "time_high"}
+    assert set(plain(runs["alpha"])["events"][0]) == {"kind", "time", "time_low", "time_high", "name"}
     assert runs["gamma"].own.events == runs["delta"].own.events == []
     verdicts = {name: run.own.onset_verdict for name, run in runs.items()}
     assert verdicts == {"alpha": "agree", "beta": "disagree", "gamma": "disagree", "delta": "refused"}
