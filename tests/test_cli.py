@@ -376,7 +376,7 @@ def test_run_lists_events(proofroll: Proofroll) -> None:
     ("engine", "code", "verdict", "status"),
     [
         (LOCATING, 0, "agree", "done"),
-        ("broken[formulation=hidden_inertia]", 1, "disagree", "done"),
+        ("broken[formulation=hidden_limit]", 1, "disagree", "done"),
         ("refuses", 3, "refused", "refused"),
         ("absent", 3, "failed", "missing"),
     ],

@@ -7,6 +7,7 @@ from numbers import Real
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError
 
 # How far apart samples are where nobody says it [s].
@@ -48,6 +49,17 @@ def time_grid(until: float, every: float) -> FloatArray:
     else:
         times[-1] = until
     return np.asarray(times, dtype=np.float64)
+
+
+def require_whole_steps(times: FloatArray, step: float | None) -> None:
+    """Refuses a fixed ``step`` [s] that does not divide the intervals of a grid [s]; None: there is none.
+
+    Raises:
+        InputError: an interval is no whole number of steps.
+    """
+    if step is not None and len(times) > 1:
+        for start, end in (times[:2].tolist(), times[-2:].tolist()):  # all others are as the first
+            whole_steps(start, end, step)
 
 
 def off_grid(times: FloatArray, step: float | None) -> FloatArray:

@@ -51,7 +51,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
     from proofroll.core.first_steps import certificate
     from proofroll.core.several import build, step_of
-    from proofroll.core.time_grid import off_grid, time_grid
+    from proofroll.core.time_grid import off_grid, require_whole_steps, time_grid
     from proofroll.core.turns import samples_between
     from proofroll.files.trajectory_file import write
     from proofroll.running.loading import loaded, scene_of
@@ -71,13 +71,14 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         engine = build(kind, scene, settings)
         spent.on("building")
         building = spent.seconds["building"]
+        step = step_of(engine, settings)
+        require_whole_steps(times, step)
         found = certificate(kind, engine, scene, settings)
         difference = first_difference(found)
         spent.on("certificate")
         lines = [line.as_dict() for line in found]
         if difference is not None:
             return Result(Status.WRONG_MODEL, difference, certificate=lines, versions=versions)
-        step = step_of(engine, settings)
         counting = samples_between(scene, times, step) if case.turns else times[:0]
         recording = record(engine, scene, times, off_grid(times, step), counting)
         spent.on("trajectory", advance=recording.advancing, sampling=recording.sampling)

@@ -12,7 +12,7 @@ from proofroll.core.errors import InputError, Refused
 from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import EVERY, off_grid, sampling_interval, time_grid
+from proofroll.core.time_grid import EVERY, off_grid, require_whole_steps, sampling_interval, time_grid
 from proofroll.core.turns import samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.identity import truth_version
@@ -104,11 +104,12 @@ def simulate(
     kind, resolved = _resolved(scene, engine, settings)
     times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)
     built = several.build(kind, scene, resolved)
+    step = several.step_of(built, resolved)
+    require_whole_steps(times, step)
     lines = certificate(kind, built, scene, resolved)
     difference = first_difference(lines)
     if difference is not None:
         raise Refused(difference)
-    step = several.step_of(built, resolved)
     recording = record(built, scene, times, off_grid(times, step), samples_between(scene, times, step))
     return recording.dataset.assign_attrs(
         status="done" if recording.failure is None else "diverged",

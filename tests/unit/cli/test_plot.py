@@ -84,7 +84,7 @@ def test_no_other_file_is_written_over(proofroll: Proofroll, tmp_path: Path) -> 
     (scene := tmp_path / "scene.toml").write_text("mine")
     code, out, err = proofroll("run", "pendulum", "--engine", "truth", *RUN, "--out", str(scene))
     assert (code, out, scene.read_text()) == (2, "", "mine")
-    assert "end the name of the file in .nc or .npz" in err
+    assert "end the name of the file in .nc, .csv or .npz" in err
 
 
 @pytest.mark.parametrize(
