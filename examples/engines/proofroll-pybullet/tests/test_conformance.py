@@ -5,15 +5,19 @@ from proofroll_pybullet.engine import Pybullet
 
 from proofroll.conformance import checks
 
+DAMPED = "by default the spin of PyBullet's links is damped"
 KNOWN = {
     "first_steps_fit_the_scene[plane-default-plane]": "contactSlop lets the ball sink by 1e-5 m before it is pressed",
     "moves_as_the_truth[plane-default-plane]": "by default a body loses 4 % of its speed in a second",
     "moves_as_the_truth[plane-default-slow]": "damped as on the plane, and 1/240 s is long for a path that bends",
     "moves_as_the_truth[plane-default-fast]": "unless maxJointVelocity says more, PyBullet cuts spin to 100 rad/s",
-    "first_steps_fit_the_scene[urdf-default-heavy_top]": "by default the spin of PyBullet's links is damped",
-    "first_steps_fit_the_scene[urdf-default-oscillators]": "by default the spin of PyBullet's links is damped",
-    "moves_as_the_truth[urdf-default-heavy_top]": "by default the spin of PyBullet's links is damped",
-    "moves_as_the_truth[urdf-default-oscillators]": "by default the spin of PyBullet's links is damped",
+    "first_steps_fit_the_scene[urdf-default-heavy_top]": DAMPED,
+    "first_steps_fit_the_scene[urdf-default-double_pendulum-torque]": DAMPED,
+    "first_steps_fit_the_scene[urdf-default-double_pendulum-damping]": DAMPED,
+    "moves_as_the_truth[urdf-default-heavy_top]": DAMPED,
+    "moves_as_the_truth[urdf-default-oscillators]": DAMPED,
+    "moves_as_the_truth[urdf-default-double_pendulum-torque]": DAMPED,
+    "moves_as_the_truth[urdf-default-double_pendulum-damping]": DAMPED,
 }
 
 
