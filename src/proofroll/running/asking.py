@@ -112,12 +112,13 @@ def prepare(engine: str, workers: Workers) -> None:
 
     What is wrong with the engine is left to whoever asks it next.
     """
-    name = parse_engine(engine).name
-    with contextlib.suppress(ProofrollError), _waiting_for(name), workers.lend(name) as worker:
-        worker.request({"do": "resolve", "engine": name, "options": {}}, _START_UP_SECONDS)
-        if name == "truth":
-            importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
-            worker.request({"do": "call", **importing}, _START_UP_SECONDS)
+    with contextlib.suppress(ProofrollError):
+        name = parse_engine(engine).name
+        with _waiting_for(name), workers.lend(name) as worker:
+            worker.request({"do": "resolve", "engine": name, "options": {}}, _START_UP_SECONDS)
+            if name == "truth":
+                importing = {"function": "proofroll.files.trajectory_file:import_xarray", "arguments": {}}
+                worker.request({"do": "call", **importing}, _START_UP_SECONDS)
 
 
 def programs(cases: Sequence[Case], workers: Workers | None = None) -> list[tuple[str | None, str]]:

@@ -24,7 +24,7 @@ def stored(tmp_path: Path, make_case: MakeCase) -> tuple[Store, Case, Result]:
     """A store with one finished case."""
     store, case = Store(tmp_path / "cases"), make_case("oracle")
     store.trajectory(case).write_bytes(b"a trajectory")
-    result = Result(Status.DONE, "reached 2 s", 0.5, 0.25, [0.5], [{"quantity": "mass"}], {"oracle": "1"}, "x.npz")
+    result = Result(Status.DONE, "reached 2 s", 0.5, 0.1, 0.25, [0.5], [{"quantity": "mass"}], {"oracle": "1"}, "x.npz")
     return store, case, store.put(case, result)
 
 
