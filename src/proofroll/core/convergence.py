@@ -18,6 +18,8 @@ _ASYMPTOTIC = 0.1
 _ORDERS = (1e-3, 20.0)
 # A tightening that changes less than this part of what another one does changes round-off alone.
 _SAME = 1e-6
+# Epsilons of a value that round-off scatters over a run.
+_SCATTER = 1e3
 # Two changes of a power law of the step have one shape but for this part; those of round-off have not.
 _ONE_SHAPE = 0.3
 # Changes that grow by more are no law's: halving the step makes four of h^-2. Times that are told in whole steps change
@@ -152,11 +154,14 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
     """Limit of an adaptive method: its tightest curve.
 
     It is as uncertain as what the last tightening changed, or as all further ones would if each shrank as that one did;
-    where one changed nothing, as what all did.
+    where one changed nothing, or all changed round-off, as what all did: two such changes that are nearly alike would
+    otherwise be extrapolated as a slow convergence.
     """
     changes = [size(after - before) for before, after in itertools.pairwise(curves)]
     if min(changes) <= _SAME * max(changes):
         return Limit(curves[-1], max(changes), float("nan"), shown=False, saturated=True)
+    if max(changes) <= _SCATTER * np.finfo(np.float64).eps * size(curves[-1]):
+        return Limit(curves[-1], max(changes), float("nan"), shown=True)
     shown, last = len(changes) == 1 or changes[-1] < changes[-2], changes[-1]
     rest = last / (changes[-2] / last - 1) if shown and len(changes) > 1 and last > 0 else 0.0
     return Limit(curves[-1], max(last, rest), float("nan"), shown)

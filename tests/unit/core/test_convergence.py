@@ -140,3 +140,12 @@ def test_tightest() -> None:
     assert math.isnan(found.order)
     assert found.shown
     assert not tightest([LIMIT, LIMIT + 1e-5, LIMIT - 1e-5]).shown
+
+
+@pytest.mark.parametrize("ratio", [0.3, 0.998, 1.0, 1.002, 3.0])
+def test_changes_of_round_off_are_no_slow_convergence(ratio: float) -> None:
+    """Two tightenings that change some hundred last digits leave that uncertainty, whatever their ratio."""
+    values, digits = 31.7 * np.ones(5), 8e-13
+    found = tightest([values, values + digits, values + digits + ratio * digits])
+    assert found.shown
+    assert found.error_bar == pytest.approx(digits * max(1.0, ratio), rel=0.01)
