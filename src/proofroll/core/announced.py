@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import warnings
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, EntryPoints, distributions
 from typing import Any
 
 # Entry points that could not be loaded -> a sentence that names the package; the command line tells them.
@@ -37,14 +37,16 @@ def leave_out(point: EntryPoint, why: str) -> None:
 
 
 # Entry points by the ``sys.path`` that they were looked up for: a file of every installed package is read for them.
-_known: dict[tuple[str, ...], Any] = {}
+_known: dict[tuple[str, ...], EntryPoints] = {}
 
 
-def _everything() -> Any:  # until Python 3.11 SelectableGroups, since then EntryPoints
-    path = tuple(sys.path)
+def _everything() -> EntryPoints:
+    path = tuple(sys.path)  # a copy: another thread may change it meanwhile, and change it back
     if path not in _known:
-        found = entry_points()
-        if tuple(sys.path) != path:  # another thread changed it meanwhile: what was found is of neither
-            return found
-        _known[path] = found
+        found: dict[str, list[EntryPoint]] = {}
+        for package in distributions(path=list(path)):
+            ours = [point for point in package.entry_points if point.group.startswith("proofroll.")]
+            if ours:
+                found.setdefault(package.name, ours)  # the first of two of one name is that which is imported
+        _known[path] = EntryPoints(point for points in found.values() for point in points)
     return _known[path]
