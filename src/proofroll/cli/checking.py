@@ -66,7 +66,7 @@ def _draw(found: SoundFile, plot: Path) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class SoundFile:
-    """What a scene or file holds: counts of its parts, and what a scene requires, and how it starts."""
+    """Counts of the parts of a scene or file, requirements of a scene, and its start."""
 
     kind: str
     name: str

@@ -90,7 +90,7 @@ def samples_cost_the_same(subject: Subject) -> None:
 
 
 def _seconds(subject: Subject, short: float, long: float) -> tuple[float, float, float]:
-    """Of a long advance, of a sample after a short one, and after the long one [s]."""
+    """Seconds of a long advance, of a sample after a short one, and of one after the long one [s]."""
     engine = subject.build()
     engine.sample()
     engine.advance(short)

@@ -167,7 +167,7 @@ def not_reported(lines: Iterable[Mapping[str, Any]]) -> list[str]:
 
 
 def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """What was found and expected; of more numbers than ``most`` only those that are furthest from each other."""
+    """Found and expected numbers; of more than ``most`` only those that are furthest from each other."""
     if len(line.found) <= most or len(line.found) != len(line.expected):
         return line.found, line.expected
     apart = np.abs(np.array(line.found) - np.array(line.expected))

@@ -104,7 +104,7 @@ def richardson(
 
 
 def _one_law(order: float, declared: int | None, before: FloatArray, after: FloatArray) -> bool:
-    """Whether two changes, over their sizes, are of one power law of the step, with the declared or a whole order."""
+    """True if two changes, over their sizes, follow one power law of the step, with the declared or a whole order."""
     whole = declared or (round(order) if np.isfinite(order) else 0)
     return abs(order - whole) <= _ASYMPTOTIC and whole > 0 and size(after - before) <= _ONE_SHAPE
 
@@ -168,7 +168,7 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
 
 
 def floor_text(step: float, error: float, unit: str, worse: bool) -> str:
-    """What single precision leaves of a refinement, as a clause.
+    """Clause about the floor that single precision sets to a refinement.
 
     Args:
         step: with the least error [s].

@@ -31,7 +31,7 @@ class SeenInRun:
 
 @runtime_checkable
 class TellsStart(Protocol):
-    """What an element has besides, if it can say in words how it starts: for a person who wrote a scene."""
+    """Optional ability of an element: tells in words how it starts, for a person who wrote a scene."""
 
     @property
     def start_facts(self) -> Sequence[str]:

@@ -110,7 +110,7 @@ def softness(engine: Any, scene: Scene) -> float:
 
 
 def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Line]:
-    """What a freshly built engine says of itself, and what its own first steps say of its acceleration.
+    """Certificate of a freshly built engine: its own account, and the acceleration of its first steps.
 
     Numbers that only repeat the scene's are believed of nobody. An acceleration that an engine says is held to the
     scene exactly; its steps may differ by :data:`_STIFF`, and by what is granted to a softened one.

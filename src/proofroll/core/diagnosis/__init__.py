@@ -88,7 +88,7 @@ class Cause:
 
     @property
     def proven(self) -> bool:
-        """Whether it closes the difference, of more independent numbers than it has free ones."""
+        """True if it closes the difference, of more independent numbers than it has free ones."""
         enough = self.explains is None or self.explains > self.fitted
         return bool(enough and self.before > 0 and np.isfinite(self.after) and self.after <= self.closes * self.before)
 
@@ -160,7 +160,7 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
 
 
 def _share(one: Cause, other: Cause) -> bool:
-    """Whether they explain the same quantity."""
+    """True if they explain the same quantity."""
     return bool({one.quantity, *one.covers} & {other.quantity, *other.covers})
 
 
@@ -172,7 +172,7 @@ def _rivals(cause: Cause, first: Cause) -> bool:
 
 
 def _unsure(cause: Cause, other: Cause) -> bool:
-    """Whether a fitted cause is one of several that explain the same as well."""
+    """True if a fitted cause is one of several that explain the same as well."""
     return cause.fitted > 0 and _rivals(other, cause)
 
 

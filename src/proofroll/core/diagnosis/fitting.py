@@ -114,14 +114,14 @@ class Residuals(Generic[M]):
 
     @cached_property
     def _changes(self) -> FloatArray:
-        """What the other models change of what is left, each by its size, shape (numbers, models)."""
+        """Changes that the other models make of the remainder, each by its size, shape (numbers, models)."""
         at = self.left(self.plain)
         changed = np.stack([self.left(model) - at for model in self.others()], axis=-1)
         return np.asarray(changed / (np.linalg.norm(changed, axis=0) + _TINY))
 
     @property
     def alone(self) -> bool:
-        """Whether there is but one equation, which any one number closes."""
+        """True if there is but one equation, which any one number closes."""
         return len(self.left(self.plain)) < 2
 
     def explained(self, model: M | None) -> int:
@@ -143,7 +143,7 @@ class Residuals(Generic[M]):
         return fitted(lambda x: self.left(model(x)), start, 1.0)
 
     def cause(self, name: str, says: str, model: M | None, remedy: str, number: int) -> Cause:
-        """That the engine moves by this model, in which so many numbers were fitted."""
+        """Cause: the engine moves by this model, in which so many numbers were fitted."""
         after = self.largest(model)
         closes = after <= self.closes * self.before
         if closes and (model is None or self.contradicted(model)):

@@ -55,7 +55,7 @@ def left(
 
 
 def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothesis:
-    """That a model was built of other numbers than the scene's, as its certificate says.
+    """Hypothesis: a model was built of other numbers than the scene's, as its certificate says.
 
     Args:
         given: quantities that an engine is given.
@@ -93,7 +93,7 @@ def _otherwise(line: Mapping[str, Any]) -> str:
 
 
 def _is_single(line: Mapping[str, Any]) -> bool:
-    """Whether what was found is the float32 of what is expected, and not only by being equal to it."""
+    """True if the found numbers are the float32 of the expected ones, and not only by being equal to them."""
     return np.array_equal(np.float32(line["expected"]), np.asarray(line["found"])) and any(line["expected"])
 
 

@@ -71,7 +71,7 @@ class Reported:
 
     @property
     def differs(self) -> bool:
-        """Whether there is a difference beyond round-off and what is not known of the truth."""
+        """True if there is a difference beyond round-off and the error bar of the truth."""
         known = self.said.shape == self.true.shape and above_round_off(self.before, self.size)
         return known and self.before > _BARS * self.bar
 
