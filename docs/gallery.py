@@ -16,14 +16,14 @@ from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.files.toml import study_of
 from proofroll.files.trajectory_file import read
-from proofroll.report.comparison_records import ReportedComparison
-from proofroll.report.comparison_summary import outcome_content
-from proofroll.report.html import templates
-from proofroll.report.scene_sheet import scene_sheet
+from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.summary import outcome_content
+from proofroll.report.page.html import templates
+from proofroll.report.page.scene_sheet import scene_sheet
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import compare
-from proofroll.studies.outcome import Outcome
+from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.outcome import Outcome
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "gallery"

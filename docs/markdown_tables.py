@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.core.number_text import number
-from proofroll.report.comparison_records import ReportedComparison
+from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.tables import remarks
 from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, step, verdict_text
-from proofroll.report.tables import remarks
-from proofroll.report.terminal import columns
-from proofroll.studies.recommend import recommend
-from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.wish import Wish
+from proofroll.report.terminal.tables import columns
+from proofroll.studies.tradeoff.recommend import recommend
+from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
+from proofroll.studies.tradeoff.requirements import Wish
 
 
 def verdict_table(content: ReportedComparison) -> str:

@@ -14,22 +14,22 @@ from made_from import facts, restamped, stamp
 from markdown_tables import caveat_list, cheapest_table, remark_list, verdict_table
 from screenshot import screenshot
 
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
-from proofroll.elements.ball_on_surface.report.regime_map import draw as draw_regimes
+from proofroll.ball_studies.regimes import load_regimes, regime_maps
+from proofroll.ball_studies.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
-from proofroll.report.comparison_summary import outcome_content
-from proofroll.report.growing_report import write_report
-from proofroll.report.work_precision import svg
+from proofroll.report.comparison.summary import outcome_content
+from proofroll.report.comparison.work_precision import svg
+from proofroll.report.page.growing import write_report
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
-from proofroll.studies.claims import claims_for
-from proofroll.studies.compare import compare
-from proofroll.studies.outcome import Outcome
-from proofroll.studies.planning import point_name
-from proofroll.studies.tradeoff import tradeoff
-from proofroll.studies.tradeoff_records import TradeoffStudy
-from proofroll.studies.tradeoff_study import tradeoff_study
+from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.comparison.planning import point_name
+from proofroll.studies.tradeoff.claims import claims_for
+from proofroll.studies.tradeoff.records import TradeoffStudy
+from proofroll.studies.tradeoff.study import tradeoff_study
+from proofroll.studies.tradeoff.tradeoff import tradeoff
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)

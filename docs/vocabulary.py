@@ -11,15 +11,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from proofroll.ball_studies import regimes as regimes_study
 from proofroll.core import comparison
 from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
-from proofroll.elements.ball_on_surface import regimes_study
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
-from proofroll.studies import axes, claimed, claims, stability_claims
+from proofroll.studies.stability import axes
+from proofroll.studies.stability import claims as stability_claims
+from proofroll.studies.tradeoff import claims
+from proofroll.studies.tradeoff import cost_claims as claimed
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE = ROOT / "docs" / "vocabulary.md"

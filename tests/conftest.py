@@ -27,7 +27,7 @@ from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running import stopwatch, worker_pool
 from proofroll.running.case import Case, EngineFacts
-from proofroll.studies import tradeoff
+from proofroll.studies.tradeoff import tradeoff
 
 PLUGINS = Path(__file__).parent / "plugins"
 _METADATA = "Metadata-Version: 2.1\nName: throwaway\nVersion: 1.0\nRequires-Dist: no-such-library>=2\n"

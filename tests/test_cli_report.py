@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.report.growing_report import Report
+from proofroll.report.page.growing import Report
 from proofroll.running.store import alone_in
 
 Proofroll = Callable[..., tuple[int, str, str]]
@@ -118,7 +118,7 @@ def test_a_part_that_fails_does_not_take_the_report_away(
     def fail(*_: object, **__: object) -> None:
         raise MemoryError("no memory left")
 
-    monkeypatch.setattr("proofroll.report.tradeoff_part.make_tradeoff", fail)
+    monkeypatch.setattr("proofroll.report.tradeoff.part.make_tradeoff", fail)
     code, said, err = proofroll("report", *names, "--out", str(out))
     assert code == 3
     assert "no memory left; proofroll tradeoff sphere_in_cylinder makes it." in err

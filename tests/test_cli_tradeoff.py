@@ -14,13 +14,13 @@ from rich.console import Console
 
 from proofroll.core.errors import ProofrollError
 from proofroll.report import labels
-from proofroll.report.tradeoff_tables import corner_table
-from proofroll.report.work_precision import svg
+from proofroll.report.comparison.work_precision import svg
+from proofroll.report.tradeoff.tables import corner_table
 from proofroll.studies import study_store
-from proofroll.studies.curve import Question
 from proofroll.studies.study_store import keep
-from proofroll.studies.tradeoff import stored
-from proofroll.studies.tradeoff_records import MeasuredPoint, TradeoffStudy
+from proofroll.studies.tradeoff.curve import Question
+from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
+from proofroll.studies.tradeoff.tradeoff import stored
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ENGINE = "exudyn[formulation=generic,preset=matched]"
@@ -31,8 +31,8 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> TradeoffStudy:
     """A real trade-off of two curves over half a second, and of a range of two speeds."""
     from proofroll.running.runner import Runner
     from proofroll.running.store import Store
-    from proofroll.studies.tradeoff import tradeoff
-    from proofroll.studies.tradeoff_study import tradeoff_study
+    from proofroll.studies.tradeoff.study import tradeoff_study
+    from proofroll.studies.tradeoff.tradeoff import tradeoff
 
     question = Question("sphere_in_cylinder", {"rolling_resistance": 5e-4}, 0.5, "z")
     engines = [ENGINE, "mujoco[formulation=free,preset=default]"]
@@ -239,7 +239,7 @@ def test_an_answer_over_a_range(proofroll: Proofroll, folder: Path, monkeypatch:
         given.append(over)
         raise ProofrollError("enough")
 
-    monkeypatch.setattr("proofroll.studies.tradeoff_study.tradeoff", measuring)
+    monkeypatch.setattr("proofroll.studies.tradeoff.study.tradeoff", measuring)
     assert "enough" in proofroll(*asked(folder), "--over", "speed=3:4.5", "--measure")[2]
     assert given == [{"speed": [3.0, 4.5]}]
 

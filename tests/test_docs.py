@@ -70,7 +70,7 @@ def test_a_page_can_be_followed(
 ) -> None:
     """Every file and command of a page works, one after the other; scripts for other systems parse."""
     monkeypatch.chdir(folder)
-    monkeypatch.setattr("proofroll.studies.first_look._UNTIL", 0.2)
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.2)
     for language, text in blocks(page):
         if language in {"toml", "xml"}:
             named = NAMED.match(text)

@@ -13,13 +13,13 @@ import pytest
 import typer
 from robot_templates import urdf
 
+from proofroll.ball_studies.onset import EngineOnset, OnsetStudy
 from proofroll.cli import app
 from proofroll.core.certificate import Line
 from proofroll.core.comparison import ExceptAt
 from proofroll.core.diagnosis import Cause
-from proofroll.elements.ball_on_surface.onset_study import EngineOnset, OnsetStudy
 from proofroll.files.json_data import MERGED
-from proofroll.report.comparison_records import (
+from proofroll.report.comparison.records import (
     CauseAt,
     Claims,
     Cost,
@@ -30,7 +30,7 @@ from proofroll.report.comparison_records import (
     ShownObservable,
     WorstJudgement,
 )
-from proofroll.report.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
+from proofroll.report.ladder.ladder import Absence, KnownTruth, LadderContent, RungFound, SideFound, TermFound
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.records import (
     DrawnBody,
@@ -45,10 +45,9 @@ from proofroll.robots.records import (
     UsedTruth,
 )
 from proofroll.robots.robot_file import LintFinding
-from proofroll.studies.axes import Axis, Effort
-from proofroll.studies.ladder_models import Ran
-from proofroll.studies.recommend import Answer, CheckedOver, Recommendation
-from proofroll.studies.stability_records import (
+from proofroll.studies.ladder.models import Ran
+from proofroll.studies.stability.axes import Axis, Effort
+from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
@@ -57,7 +56,8 @@ from proofroll.studies.stability_records import (
     StabilityStudy,
 )
 from proofroll.studies.study_store import Measured
-from proofroll.studies.tradeoff_records import (
+from proofroll.studies.tradeoff.recommend import Answer, CheckedOver, Recommendation
+from proofroll.studies.tradeoff.records import (
     Corner,
     CurveBudget,
     DroppedStep,
@@ -68,7 +68,7 @@ from proofroll.studies.tradeoff_records import (
     TradeoffStudy,
     TruthCost,
 )
-from proofroll.truth.onset import Onset
+from proofroll.truth.ball_on_surface.onset import Onset
 from proofroll_drill.mutants.drilling import Mutated
 from proofroll_drill.row import Drilled
 

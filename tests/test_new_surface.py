@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from proofroll.ball_studies.report.drawings import overview
+from proofroll.ball_studies.report.wall import wall
 from proofroll.core import plugins
 from proofroll.elements.ball_on_surface import kind
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.report.drawings import overview
-from proofroll.elements.ball_on_surface.report.wall import wall
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene

@@ -21,7 +21,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
 from proofroll.report.labels import step
 from proofroll.running.case import EngineFacts
-from proofroll.studies.claims import claims_for
+from proofroll.studies.tradeoff.claims import claims_for
 
 ROOT = Path(__file__).resolve().parents[1]
 _SPEC = importlib.util.spec_from_file_location("made_from", ROOT / "docs" / "made_from.py")

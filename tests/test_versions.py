@@ -17,7 +17,7 @@ from other_pythons import seeing
 from proofroll.core.plugins import load_engine, release
 from proofroll.files.json_data import record
 from proofroll.report.versions import answer, lines, page, table
-from proofroll.studies.versions import VersionsStudy
+from proofroll.studies.versions.versions import VersionsStudy
 
 Proofroll = Callable[..., tuple[int, str, str]]
 ROOT = Path(__file__).resolve().parents[1]

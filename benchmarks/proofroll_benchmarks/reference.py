@@ -23,8 +23,8 @@ from proofroll.running.simulation import simulate
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.store import Store
 from proofroll.running.timing import Interval, Timing, interleaved, machine, ratio
-from proofroll.truth.onset import first_slip as true_first_slip
-from proofroll.truth.rolling import unreduced
+from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip
+from proofroll.truth.ball_on_surface.rolling import unreduced
 from proofroll_benchmarks.compiled import Onsets, Timed, compiled, numeric
 from proofroll_benchmarks.first_slip import first_slip
 from proofroll_benchmarks.search import SAMPLES, Configuration, search

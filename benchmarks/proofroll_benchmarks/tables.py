@@ -9,7 +9,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_text import number
-from proofroll.report.screen import numeric, plain_table, unbroken
+from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 
 _MEANING = {
     "reduced_over_engine": "reduced, against the fastest engine",

@@ -13,13 +13,13 @@ from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError,
 if TYPE_CHECKING:
     from proofroll.files.scene_file import load_scene
     from proofroll.running.simulation import simulate
-    from proofroll.studies.judging import judge
+    from proofroll.studies.judging.judge import judge
 
 __all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "judge", "load_scene", "simulate"]
 __version__ = "0.1.0"
 
 _HOMES = {
-    "judge": "proofroll.studies.judging",
+    "judge": "proofroll.studies.judging.judge",
     "load_scene": "proofroll.files.scene_file",
     "simulate": "proofroll.running.simulation",
 }

@@ -14,7 +14,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import recorded, simulate
-from proofroll.studies.judging import Judged, judge
+from proofroll.studies.judging.judge import Judged, judge
 
 __all__ = ["Judged", "assert_agrees"]
 

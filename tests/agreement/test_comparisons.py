@@ -15,8 +15,8 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.comparison_file import comparison_names, load_comparison
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import compare
-from proofroll.studies.outcome import Outcome
+from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.outcome import Outcome
 
 # Of those that cost most [s]: past the last event, and as long as every row needs for its verdict; `make report` runs
 # them to their ends.

@@ -12,8 +12,8 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import compare
-from proofroll.studies.outcome import Outcome, Run
+from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.outcome import Outcome, Run
 
 # Defect that shows in what was built -> the quantity that the certificate must name.
 OPEN = {

@@ -25,8 +25,8 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, LimitFinding, Verdict, judge
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.studies.judging import judge as judge_run
-from proofroll.studies.reference import Reference
+from proofroll.studies.judging.judge import judge as judge_run
+from proofroll.studies.judging.reference import Reference
 
 LIES = [(about, lie) for lie in table() for about in lie.scenes]
 # What is judged: all that an honest run gives, and its state.

@@ -9,20 +9,20 @@ from typing import Any
 from blajer_2006.part import FiguresPart
 from blajer_2006.reading import load_figures
 from blajer_2006.study import run_figures
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
-from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
+from proofroll.ball_studies.regimes import load_regimes, regime_map
+from proofroll.ball_studies.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
-from proofroll.report.stability_part import StabilityPart
-from proofroll.report.tradeoff_part import TradeoffPart
+from proofroll.report.stability.part import StabilityPart
+from proofroll.report.tradeoff.part import TradeoffPart
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies import study_store
-from proofroll.studies.axes import QUICK, Axis
-from proofroll.studies.claims import claims_for
-from proofroll.studies.stability_claims import file_for
-from proofroll.studies.stability_records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
-from proofroll.studies.tradeoff_records import CurveBudget, MeasuredPoint, MeasuredQuantity, TradeoffStudy, TruthCost
+from proofroll.studies.stability.axes import QUICK, Axis
+from proofroll.studies.stability.claims import file_for
+from proofroll.studies.stability.records import Boundary, BoundaryPoint, ExplainedBoundary, StabilityStudy
+from proofroll.studies.tradeoff.claims import claims_for
+from proofroll.studies.tradeoff.records import CurveBudget, MeasuredPoint, MeasuredQuantity, TradeoffStudy, TruthCost
 
 
 def measured_point(**more: Any) -> MeasuredPoint:

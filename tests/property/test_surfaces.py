@@ -20,7 +20,7 @@ from proofroll.elements.ball_on_surface.model import Ball, Contact, InitialMotio
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, reduced_rates, start
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Plane, Torus
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.ball_on_surface import truth
+from proofroll.truth.ball_on_surface.plug_in import truth
 
 G = 9.81
 

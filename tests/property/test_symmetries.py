@@ -19,7 +19,7 @@ from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.observables import energy_balance
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
-from proofroll.truth.rolling import reduced, unreduced
+from proofroll.truth.ball_on_surface.rolling import reduced, unreduced
 
 Changes = Mapping[str, float]
 

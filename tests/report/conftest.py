@@ -18,24 +18,24 @@ import pytest
 from browsing import Drawn, Visit, launched, visiting
 from invented import figures_part, further, regimes_part
 
+from proofroll.ball_studies.report.onsets import RunSlips, TrueSlips
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
 from proofroll.core.events import Event
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict, judge
-from proofroll.elements.ball_on_surface.report.onsets import RunSlips, TrueSlips
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
-from proofroll.report.growing_report import begun, write_report
-from proofroll.report.html import page
-from proofroll.report.plots import PointCurves
-from proofroll.report.replay_records import Replay
-from proofroll.report.report_records import ReportContent, report_content
+from proofroll.report.comparison.plots import PointCurves
+from proofroll.report.page.growing import begun, write_report
+from proofroll.report.page.html import page
+from proofroll.report.page.records import ReportContent, report_content
+from proofroll.report.replay.records import Replay
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.outcome import Outcome, Run
-from proofroll.studies.planning import point_name
-from proofroll.truth.onset import Onset
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import point_name
+from proofroll.truth.ball_on_surface.onset import Onset
 
 UNTIL, EVERY = 1.0, 0.02
 

@@ -13,12 +13,12 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.plugins import engine_names, load_engine
 from proofroll.report.labels import caveat_lines, with_caveat
-from proofroll.report.stability_tables import silent_lines
-from proofroll.report.tradeoff_tables import answer_lines
+from proofroll.report.stability.tables import silent_lines
+from proofroll.report.tradeoff.tables import answer_lines
 from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
-from proofroll.studies.recommend import recommend
-from proofroll.studies.wish import Wish
+from proofroll.studies.tradeoff.recommend import recommend
+from proofroll.studies.tradeoff.requirements import Wish
 
 OURS = "proofroll's own integrator"
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.report.comparison_summary import _worst
+from proofroll.report.comparison.summary import _worst
 
 
 def _run(speed: float, error: float, tolerance: float) -> Any:

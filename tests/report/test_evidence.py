@@ -19,14 +19,14 @@ from proofroll.core.verdict import Verdict, judge
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read, write
-from proofroll.report.comparison_records import Claims, Cost
-from proofroll.report.html import page
-from proofroll.report.plots import MOST_POINTS, kept, point_curves
-from proofroll.report.report_records import report_content
+from proofroll.report.comparison.plots import MOST_POINTS, kept, point_curves
+from proofroll.report.comparison.records import Claims, Cost
+from proofroll.report.comparison.tables import cost_title, costs, expectations
+from proofroll.report.page.html import page
+from proofroll.report.page.records import report_content
 from proofroll.report.styles import OUTLINES, styles
-from proofroll.report.tables import cost_title, costs, expectations
 from proofroll.running.store import Store
-from proofroll.studies.outcome import Outcome
+from proofroll.studies.comparison.outcome import Outcome
 
 
 def test_rough_curves_keep_extrema_ends_and_gaps() -> None:

@@ -12,18 +12,18 @@ import plotly.offline
 import pytest
 from poison import Poison
 
-import proofroll.report.html
+import proofroll.report.page.html
 from proofroll.core.number_text import number
 from proofroll.files.json_data import plain
-from proofroll.report.growing_report import write_report
-from proofroll.report.html import page
+from proofroll.report.comparison.plots import EngineCurve, point_curves
+from proofroll.report.comparison.scores import Score, recommendation
 from proofroll.report.labels import symbol
+from proofroll.report.page.growing import write_report
+from proofroll.report.page.html import page
+from proofroll.report.page.records import report_content
 from proofroll.report.pages import packed
-from proofroll.report.plots import EngineCurve, point_curves
-from proofroll.report.report_records import report_content
-from proofroll.report.scores import Score, recommendation
 from proofroll.running.store import Store
-from proofroll.studies.outcome import Outcome
+from proofroll.studies.comparison.outcome import Outcome
 
 COMMAND = "proofroll report invented"
 
@@ -229,7 +229,7 @@ def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Out
 
 def test_no_engine_and_no_scene_is_named_in_the_code_of_the_report() -> None:
     """What is drawn and said comes from the data."""
-    folder = Path(proofroll.report.html.__file__).parent
+    folder = Path(proofroll.report.page.html.__file__).parent
     text = "\n".join(file.read_text(encoding="utf-8") for file in folder.rglob("*.*") if file.suffix != ".pyc").lower()
     for name in ("mujoco", "exudyn", "pinocchio", "sphere_in_cylinder", "inclined_plane", "cylinder"):
         assert name not in text

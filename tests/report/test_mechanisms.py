@@ -16,12 +16,12 @@ from scipy.spatial.transform import Rotation
 from proofroll.elements.mechanism.report.replay import _turned
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
-from proofroll.report.growing_report import write_report
-from proofroll.report.plots import point_curves
+from proofroll.report.comparison.plots import point_curves
+from proofroll.report.page.growing import write_report
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import compare
-from proofroll.studies.outcome import Outcome
+from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.outcome import Outcome
 
 
 @pytest.fixture(scope="module")

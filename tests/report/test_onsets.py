@@ -11,28 +11,28 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.ball_studies.report.onset_tables import bracket, clock, conditioning, slip_table
+from proofroll.ball_studies.report.onsets import CURVE, mark
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.elements.ball_on_surface.report.onset_tables import bracket, clock, conditioning, slip_table
-from proofroll.elements.ball_on_surface.report.onsets import CURVE, mark
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
-from proofroll.report.comparison_records import ReportedRun
-from proofroll.report.growing_report import write_report
-from proofroll.report.html import page
+from proofroll.report.comparison.plots import Bound, point_curves
+from proofroll.report.comparison.records import ReportedRun
+from proofroll.report.comparison.scores import scores
 from proofroll.report.labels import MEANINGS, SYMBOLS
-from proofroll.report.plots import Bound, point_curves
-from proofroll.report.report_records import ReportContent, ReportedTruth, report_content
-from proofroll.report.scores import scores
-from proofroll.report.terminal import closing_lines, console, verdict_table
+from proofroll.report.page.growing import write_report
+from proofroll.report.page.html import page
+from proofroll.report.page.records import ReportContent, ReportedTruth, report_content
+from proofroll.report.terminal.tables import closing_lines, console, verdict_table
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.outcome import Outcome, Run
-from proofroll.studies.planning import point_name
-from proofroll.truth.onset import Onset, onset
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import point_name
+from proofroll.truth.ball_on_surface.onset import Onset, onset
 
 UNTIL, EVERY = 2.1, 0.05
 WELL = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.35}

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 import xarray as xr
 
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_map
-from proofroll.elements.ball_on_surface.report.regime_map import boundaries, counts, draw, inline
-from proofroll.elements.ball_on_surface.report.regimes_part import RegimesPart
+from proofroll.ball_studies.regimes import load_regimes, regime_map
+from proofroll.ball_studies.report.regime_map import boundaries, counts, draw, inline
+from proofroll.ball_studies.report.regimes_part import RegimesPart
 from proofroll.files.scene_file import load_scene
-from proofroll.report.growing_report import begun
-from proofroll.report.terminal import part_lines
+from proofroll.report.page.growing import begun
+from proofroll.report.terminal.tables import part_lines
 from proofroll.running.store import Store
-from proofroll.studies.outcome import Outcome
+from proofroll.studies.comparison.outcome import Outcome
 
 
 @pytest.fixture(scope="module")

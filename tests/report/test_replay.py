@@ -18,21 +18,21 @@ from browsing import Visit
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from proofroll.ball_studies.report.kind import BallReport
+from proofroll.ball_studies.report.poses import AWAY, SLIPS, STICKS, poses
+from proofroll.ball_studies.report.replay import LENGTH
+from proofroll.ball_studies.report.wall import middle, wall
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.report.kind import BallReport
-from proofroll.elements.ball_on_surface.report.poses import AWAY, SLIPS, STICKS, poses
-from proofroll.elements.ball_on_surface.report.replay import LENGTH
-from proofroll.elements.ball_on_surface.report.wall import middle, wall
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read, write
-from proofroll.report import replay_library
-from proofroll.report.html import page
-from proofroll.report.plots import point_curves
-from proofroll.report.replay import WIDEST_TURN, frame_times, replay_content
-from proofroll.report.replay_library import thinned, three
-from proofroll.report.report_records import ReportContent, report_content
+from proofroll.report.comparison.plots import point_curves
+from proofroll.report.page.html import page
+from proofroll.report.page.records import ReportContent, report_content
+from proofroll.report.replay import library as replay_library
+from proofroll.report.replay.library import thinned, three
+from proofroll.report.replay.replay import WIDEST_TURN, frame_times, replay_content
 
 SPEED, UNTIL, EVERY = 4.0, 1.0, 0.02
 

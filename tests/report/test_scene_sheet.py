@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from proofroll.elements.ball_on_surface.report import drawings
+from proofroll.ball_studies.report import drawings
 from proofroll.files.scene_file import read_scene_file
+from proofroll.report.page.scene_sheet import SceneSheet, ShownParameter, scene_sheet
 from proofroll.report.pen import Lettering, Letters
-from proofroll.report.scene_sheet import SceneSheet, ShownParameter, scene_sheet
 
 POINTS = [{"speed": v, "rolling_resistance": f} for v in (2.0, 4.0, 6.0) for f in (0.0, 5e-4)]
 

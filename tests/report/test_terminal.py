@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from proofroll.report.report_records import ReportContent
-from proofroll.report.study_parts import PartEntry
-from proofroll.report.terminal import WIDTH, console, first_lines, part_lines, verdict_table
+from proofroll.report.page.records import ReportContent
+from proofroll.report.parts import PartEntry
+from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines, verdict_table
 
 
 def test_the_table_of_verdicts_is_plain_where_nobody_watches(content: ReportContent) -> None:

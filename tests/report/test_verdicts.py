@@ -14,19 +14,19 @@ from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import Verdict, judge
-from proofroll.report.comparison_records import ReportedComparison
-from proofroll.report.comparison_summary import outcome_content
-from proofroll.report.findings import findings
-from proofroll.report.html import page
+from proofroll.report.comparison.plots import point_curves
+from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.sentences import findings
+from proofroll.report.comparison.summary import outcome_content
+from proofroll.report.comparison.verdict_matrix import counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
-from proofroll.report.plots import point_curves
-from proofroll.report.report_records import report_content
-from proofroll.report.summary import three_sentences
-from proofroll.report.terminal import closing_lines, verdict_table
-from proofroll.report.verdict_matrix import counted, overview
+from proofroll.report.page.html import page
+from proofroll.report.page.records import report_content
+from proofroll.report.page.summary import three_sentences
+from proofroll.report.terminal.tables import closing_lines, verdict_table
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.outcome import Outcome, Run
+from proofroll.studies.comparison.outcome import Outcome, Run
 
 TRUE = np.sin(np.linspace(0, 2, 21))
 OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)

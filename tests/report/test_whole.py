@@ -11,17 +11,17 @@ import pytest
 from invented import further, stability_study, tradeoff_study
 
 from proofroll.core.errors import ProofrollError
-from proofroll.report.growing_report import Report, begun
-from proofroll.report.html import page
-from proofroll.report.stability_part import StabilityPart
-from proofroll.report.study_parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
-from proofroll.report.summary import three_sentences
+from proofroll.report.page.growing import Report, begun
+from proofroll.report.page.html import page
+from proofroll.report.page.summary import three_sentences
+from proofroll.report.parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
+from proofroll.report.stability.part import StabilityPart
 from proofroll.running.store import Store
-from proofroll.studies.axes import QUICK, Effort
-from proofroll.studies.outcome import Outcome
-from proofroll.studies.stability import stability_path
+from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.stability.axes import QUICK, Effort
+from proofroll.studies.stability.map import stability_path
 from proofroll.studies.study_store import keep
-from proofroll.studies.tradeoff import stored
+from proofroll.studies.tradeoff.tradeoff import stored
 
 POISON = "</script><script>alert('poison')</script><img src=x onerror=alert(1)>\"'"
 COMMAND = "proofroll report"

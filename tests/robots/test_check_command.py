@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from robot_templates import inertial, mjcf, urdf
 
-from proofroll.report.terminal import console
+from proofroll.report.terminal.tables import console
 from proofroll.robots import check
 from proofroll.robots.layers import LAYERS
 from proofroll.robots.records import DrawnRobot, HeldLayer, ImporterRow, RobotCheck, UsedTruth

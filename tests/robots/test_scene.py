@@ -170,7 +170,7 @@ def test_stops_are_there_when_asked_for(robot):
 
 def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):
     """Run, compare, report and stability start from the file alone; engines that are asked are held to the truth."""
-    monkeypatch.setattr("proofroll.studies.first_look._UNTIL", 0.2)
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.2)
     path = robot("arm.urdf", urdf(kinds=("revolute", "fixed", "fixed")))
     out = ["--out", str(tmp_path / "out"), "--json"]
     run = CliRunner().invoke(app, ["run", path, "--engine", "mujoco", "--until", "0.1", "--json"])
@@ -181,7 +181,7 @@ def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):
     assert {row["verdict"] for row in json.loads(compared.stdout)["rows"]} == {"agrees"}
     reported = CliRunner().invoke(app, ["report", path, "--engine", "mujoco", *out])
     assert [len(case["bodies"]) for case in json.loads(reported.stdout)["replay"]] == [2], reported.output
-    from proofroll.studies.stability_claims import file_for
+    from proofroll.studies.stability.claims import file_for
 
     assert {"speed", "gravity", "horizon"} <= {axis.name for axis in file_for(path).axes}
 

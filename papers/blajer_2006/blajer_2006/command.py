@@ -64,7 +64,7 @@ def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
     """The regime maps of a study, with a progress bar of their own."""
     import os
 
-    from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
+    from proofroll.ball_studies.regimes import load_regimes, regime_maps
 
     wanted = load_regimes(name)
     with options.progress_bar("runs of the truth", total=wanted.runs) as advance:

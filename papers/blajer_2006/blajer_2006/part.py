@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from blajer_2006 import statement_tables
 from blajer_2006.reading import STUDY, load_figures
-from proofroll.report.study_parts import Part, PartEntry
+from proofroll.report.parts import Part, PartEntry
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from blajer_2006.definition import Figures
     from blajer_2006.study import FigureRuns
-    from proofroll.report.study_parts import Tell
+    from proofroll.report.parts import Tell
     from proofroll.running.runner import Runner
 
 
@@ -49,7 +49,7 @@ class FiguresPart(Part):
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
         """Makes the runs and the maps."""
         from blajer_2006.study import run_figures
-        from proofroll.elements.ball_on_surface.regimes_study import load_regimes, regime_maps
+        from proofroll.ball_studies.regimes import load_regimes, regime_maps
 
         self.study = run_figures(self.asked, runner, None, lambda case, _: tell(case.engine.name, 1))
         for name in dict.fromkeys(figure.regimes for figure in self.asked.figures if figure.regimes):
@@ -70,7 +70,7 @@ class FiguresPart(Part):
     def pictures(self, prefix: str) -> dict[str, str]:
         """One for each figure."""
         from blajer_2006.drawing import inline
-        from proofroll.elements.ball_on_surface.report.regime_map import inline as inline_map
+        from proofroll.ball_studies.report.regime_map import inline as inline_map
 
         assert self.study is not None  # it was made
         return {

@@ -8,11 +8,11 @@ from decimal import Decimal, InvalidOperation
 from blajer_2006.definition import CRITERIA, Figure, Figures, Statement
 from blajer_2006.measures import MEASURES
 from blajer_2006.quantities import known
+from proofroll.ball_studies.regimes import load_regimes
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.time_grid import time_grid
 from proofroll.core.validation import validated
 from proofroll.elements.ball_on_surface.element import rolling_ball
-from proofroll.elements.ball_on_surface.regimes_study import load_regimes
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_file
 

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from proofroll.core.number_text import number
 from proofroll.report.labels import unit
-from proofroll.report.screen import numeric, plain_table, unbroken
+from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 
 _SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}
 

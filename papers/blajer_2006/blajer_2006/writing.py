@@ -12,8 +12,8 @@ from blajer_2006.drawing import picture
 from blajer_2006.judging import judged
 from blajer_2006.statement_tables import count
 from blajer_2006.study import FigureRuns, study_content
-from proofroll.elements.ball_on_surface.report.regime_map import counts
-from proofroll.elements.ball_on_surface.report.regime_map import picture as map_picture
+from proofroll.ball_studies.report.regime_map import counts
+from proofroll.ball_studies.report.regime_map import picture as map_picture
 from proofroll.files.atomic import replacing
 from proofroll.files.json_data import plain
 from proofroll.running.store import write_text

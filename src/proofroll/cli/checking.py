@@ -58,7 +58,7 @@ def _draw(found: SoundFile, plot: Path) -> None:
         raise InputError("--plot", plot, "a drawn scene is a page: end the name of the file in .html")
     options.require_pages()
     options.require_writable(plot, "--plot")
-    from proofroll.report.scene_page import scene_page
+    from proofroll.report.page.scene_page import scene_page
     from proofroll.running.store import write_text
 
     write_text(plot, scene_page(found.path, found.start))
@@ -119,7 +119,7 @@ def _comparison(path: Path) -> SoundFile:
     from proofroll.files.comparison_file import load_comparison
     from proofroll.files.scene_file import load_scene
     from proofroll.running.asking import lent_workers
-    from proofroll.studies.planning import require_fit, row_facts
+    from proofroll.studies.comparison.planning import require_fit, row_facts
 
     found = load_comparison(str(path))
     with lent_workers(None) as workers:

@@ -19,7 +19,7 @@ def cite(
     as_json: options.Json = False,
 ) -> None:
     """Print the references behind a result: engines with their versions, the scene, the truth, and proofroll itself."""
-    from proofroll.report.screen import printable
+    from proofroll.report.terminal.screen import printable
     from proofroll.studies.citing import cited, content, sentence
 
     told = cited(subject or [])

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
     from proofroll.running.runner import Runner
     from proofroll.running.worker_pool import Workers
-    from proofroll.studies.outcome import Outcome
+    from proofroll.studies.comparison.outcome import Outcome
 
 
 def compare(
@@ -36,8 +36,8 @@ def compare(
     Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set is for
     these.
     """
-    from proofroll.report.comparison_summary import outcome_content
-    from proofroll.report.terminal import verdict_parts
+    from proofroll.report.comparison.summary import outcome_content
+    from proofroll.report.terminal.tables import verdict_parts
     from proofroll.running.worker_pool import Workers
 
     workers = Workers()
@@ -61,7 +61,7 @@ def asked(name: str, parameters: Mapping[str, str], workers: Workers) -> Compari
     from proofroll.files.scene_file import means_scene
 
     if means_scene(name):
-        from proofroll.studies.first_look import compared
+        from proofroll.studies.comparison.default_comparison import compared
 
         return compared(name, parameters, workers)
     if parameters:
@@ -84,8 +84,8 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
 
 def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stage: str = "") -> list[Outcome]:
     """Runs all comparisons with one progress bar; ``stage`` is put before what it says."""
-    from proofroll.studies.compare import evaluate
-    from proofroll.studies.planning import plan
+    from proofroll.studies.comparison.compare import evaluate
+    from proofroll.studies.comparison.planning import plan
 
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]

@@ -34,7 +34,7 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
         return
     from rich.table import Table
 
-    from proofroll.report.terminal import console
+    from proofroll.report.terminal.tables import console
 
     installed, provided = Table(box=None, pad_edge=False), Table(box=None, pad_edge=False)
     for table, columns in ((installed, ("engine", "version", "formulations (presets)")), (provided, ("", "provides"))):

@@ -20,7 +20,7 @@ def findings(
     """Run what was found out about engines against what is installed: what still shows, and what is gone."""
     import dataclasses
 
-    from proofroll.report.findings_table import findings_list, findings_table
+    from proofroll.report.terminal.findings import findings_list, findings_table
     from proofroll.studies.findings import FindingState, load_findings, shown
 
     wanted = load_findings(engine or [])

@@ -25,7 +25,7 @@ def judge(
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
     from proofroll.files.scene_file import load_scene
-    from proofroll.studies import judging
+    from proofroll.studies.judging import judge as judging
 
     loaded = load_scene(scene, **options.assignments(settings))  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None

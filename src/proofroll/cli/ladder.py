@@ -25,9 +25,9 @@ def ladder(
     as_json: options.Json = False,
 ) -> None:
     """Run one quantity up the ladder of models, and switch each optional term on and off."""
-    from proofroll.report.ladder import ladder_content
-    from proofroll.report.ladder_tables import ladder_parts
-    from proofroll.studies.ladder import Ladder
+    from proofroll.report.ladder.ladder import ladder_content
+    from proofroll.report.ladder.tables import ladder_parts
+    from proofroll.studies.ladder.ladder import Ladder
 
     study = Ladder(
         scene,

@@ -134,7 +134,7 @@ def _say(path: Path, *commands: str) -> None:
 
 def _comparison(name: str, where: str, loaded: Scene) -> str:
     """The text of a comparison file: one percent of what moves, for each engine that can."""
-    from proofroll.studies.first_look import able, bounds
+    from proofroll.studies.comparison.default_comparison import able, bounds
 
     lines = (
         f'{_quoted(key)} = "{100 * item.value:g} %"\n'

@@ -134,7 +134,7 @@ def _waited_for() -> str:
 
 def _standard_error() -> tuple[Console, bool]:
     """The console on standard error, and whether signs may move on it: not in a pipe, nor under NO_COLOR."""
-    from proofroll.report.screen import Screen
+    from proofroll.report.terminal.screen import Screen
 
     console = Screen(stderr=True)
     return console, console.is_terminal and not console.is_dumb_terminal and not os.environ.get("NO_COLOR")
@@ -177,7 +177,7 @@ def spinner(text: str) -> Iterator[Callable[[str], None]]:
 def json_text(content: object) -> str:
     """A JSON document."""
     from proofroll.files.json_data import plain
-    from proofroll.report.screen import escaped
+    from proofroll.report.terminal.screen import escaped
 
     return escaped(json.dumps(plain(content), indent=1, ensure_ascii=False)) + "\n"
 
@@ -196,12 +196,12 @@ def show(
         content: records, or plain data.
         as_json: which of the two.
         parts: makes the tables and lines.
-        widest: columns; None: as many as :func:`proofroll.report.terminal.console` has.
+        widest: columns; None: as many as :func:`proofroll.report.terminal.tables.console` has.
     """
     if as_json:
         write_json(content)
         return
-    from proofroll.report.terminal import console
+    from proofroll.report.terminal.tables import console
 
     out = console()
     out.width = min(out.width, widest or out.width)
@@ -224,6 +224,6 @@ def require_pages() -> None:
 
 def complain(text: str) -> None:
     """One line on standard error."""
-    from proofroll.report.screen import printable
+    from proofroll.report.terminal.screen import printable
 
     sys.stderr.write(f"proofroll: {printable(' '.join(text.split()))}\n")

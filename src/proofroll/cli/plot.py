@@ -19,7 +19,7 @@ def plot(
     ] = None,
 ) -> None:
     """Draw all variables of a run over time, with their units."""
-    from proofroll.report.run_plot import draw_run, read_run, require_ending
+    from proofroll.report.run.plot import draw_run, read_run, require_ending
 
     target = trajectory.parent / f"{trajectory.stem}.html" if out is None else out
     if out is not None:
@@ -38,8 +38,8 @@ def replay(
     ] = None,
 ) -> None:
     """Show a run in motion beside the truth, as a page for a browser."""
-    from proofroll.report.run_plot import read_run
-    from proofroll.report.run_replay import replay_page
+    from proofroll.report.run.plot import read_run
+    from proofroll.report.run.replay import replay_page
     from proofroll.running.store import write_text
 
     target = trajectory.parent / f"{trajectory.stem}-replay.html" if out is None else out

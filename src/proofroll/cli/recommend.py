@@ -15,9 +15,9 @@ from proofroll.cli.tradeoff import Over, SceneOrFile, Until, measure, question_o
 from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
-    from proofroll.studies.claims import TradeoffClaims
-    from proofroll.studies.curve import Question
-    from proofroll.studies.tradeoff_records import TradeoffStudy
+    from proofroll.studies.tradeoff.claims import TradeoffClaims
+    from proofroll.studies.tradeoff.curve import Question
+    from proofroll.studies.tradeoff.records import TradeoffStudy
 
 # Of SI, before the unit of a tolerance; the second µ is the Greek letter.
 _PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e-9}
@@ -47,9 +47,9 @@ def recommend(
     told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
     """
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
-    from proofroll.report.tradeoff_tables import answer_lines
-    from proofroll.studies.recommend import recommend as answered
-    from proofroll.studies.wish import Wish
+    from proofroll.report.tradeoff.tables import answer_lines
+    from proofroll.studies.tradeoff.recommend import recommend as answered
+    from proofroll.studies.tradeoff.requirements import Wish
 
     claims, question = question_of(scene, settings, [quantity] if quantity else None, until)
     require_observables(question, [question.quantity])  # before minutes are spent on measuring
@@ -110,10 +110,10 @@ def _stored_study(
     Raises:
         InputError: there are none that hold here, and nobody agreed to measure them.
     """
-    from proofroll.studies.recommend import covers
     from proofroll.studies.study_store import kept
-    from proofroll.studies.tradeoff import restricted, stored
-    from proofroll.studies.tradeoff_records import TradeoffStudy
+    from proofroll.studies.tradeoff.recommend import covers
+    from proofroll.studies.tradeoff.records import TradeoffStudy
+    from proofroll.studies.tradeoff.tradeoff import restricted, stored
 
     reasons: list[str] = []
     for path in (stored(out, question), *restricted(out, question)):

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
     from rich.table import Table
 
-    from proofroll.report.growing_report import Report
-    from proofroll.report.report_records import ReportContent
-    from proofroll.report.study_parts import Part
+    from proofroll.report.page.growing import Report
+    from proofroll.report.page.records import ReportContent
+    from proofroll.report.parts import Part
     from proofroll.running.runner import Runner
-    from proofroll.studies.outcome import Outcome
+    from proofroll.studies.comparison.outcome import Outcome
 
 
 def report(
@@ -46,8 +46,8 @@ def report(
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
-    from proofroll.report.growing_report import begun
-    from proofroll.report.study_parts import all_parts, parts_of
+    from proofroll.report.page.growing import begun
+    from proofroll.report.parts import all_parts, parts_of
     from proofroll.running.store import alone_in
     from proofroll.running.worker_pool import Workers
 
@@ -128,7 +128,7 @@ def _exit_code(content: ReportContent, compared: int) -> int:
 
 def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     """The verdicts, what came of the further studies, what to look at first, and where the report is."""
-    from proofroll.report.terminal import first_lines, part_lines, verdict_parts
+    from proofroll.report.terminal.tables import first_lines, part_lines, verdict_parts
 
     for item in content.comparisons:
         yield from verdict_parts(item)

@@ -57,8 +57,8 @@ def run(
     from proofroll.core.time_grid import EVERY, time_grid
     from proofroll.files.scene_file import scene_names
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED, import_xarray, read, write
-    from proofroll.report.run import run_content, run_lines
-    from proofroll.report.run_plot import require_ending
+    from proofroll.report.run.plot import require_ending
+    from proofroll.report.run.run import run_content, run_lines
     from proofroll.running.runner import run_one
     from proofroll.studies.cases import single_case
 
@@ -91,7 +91,7 @@ def run(
         if (plot or out) is not None and result.trajectory is not None:
             import_xarray()
         if plot is not None and result.trajectory is not None:
-            from proofroll.report.run_plot import draw_run
+            from proofroll.report.run.plot import draw_run
 
             draw_run(read(target), plot)
             content = replace(content, plot=str(plot))

@@ -24,12 +24,12 @@ def stability(
     as_json: options.Json = False,
 ) -> None:
     """Map up to which step or tolerance each engine is stable, and right, along axes of extremes."""
-    from proofroll.report.stability_map import svg
-    from proofroll.report.stability_tables import stability_parts
+    from proofroll.report.stability.map import svg
+    from proofroll.report.stability.tables import stability_parts
     from proofroll.running.store import write_text
-    from proofroll.studies.axes import QUICK, Effort, chosen
-    from proofroll.studies.stability_claims import file_for
-    from proofroll.studies.stability_study import make_stability
+    from proofroll.studies.stability.axes import QUICK, Effort, chosen
+    from proofroll.studies.stability.claims import file_for
+    from proofroll.studies.stability.study import make_stability
 
     asked = file_for(scene)
     axes = chosen(asked.axes, axis or [])

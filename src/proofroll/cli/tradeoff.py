@@ -12,9 +12,9 @@ from proofroll.core.errors import InputError
 
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
-    from proofroll.studies.claims import TradeoffClaims
-    from proofroll.studies.curve import Question
-    from proofroll.studies.tradeoff_records import TradeoffStudy
+    from proofroll.studies.tradeoff.claims import TradeoffClaims
+    from proofroll.studies.tradeoff.curve import Question
+    from proofroll.studies.tradeoff.records import TradeoffStudy
 
 SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
@@ -45,8 +45,8 @@ def tradeoff(
     as_json: options.Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
-    from proofroll.report.tradeoff_tables import default_quantities, tradeoff_parts
-    from proofroll.report.work_precision import svg
+    from proofroll.report.comparison.work_precision import svg
+    from proofroll.report.tradeoff.tables import default_quantities, tradeoff_parts
     from proofroll.running.store import write_text
 
     claims, question = question_of(scene, settings, quantity, until)
@@ -66,8 +66,8 @@ def question_of(
     """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
     from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import is_scene, load_scene
-    from proofroll.studies.claims import claims_for, load_claims
-    from proofroll.studies.curve import Question
+    from proofroll.studies.tradeoff.claims import claims_for, load_claims
+    from proofroll.studies.tradeoff.curve import Question
 
     path = Path(scene)
     claims = load_claims(path) if path.suffix == ".toml" and not is_scene(scene) else claims_for(scene)
@@ -119,7 +119,7 @@ def measure(
     out: Path,
 ) -> tuple[TradeoffStudy, Path]:
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
-    from proofroll.studies.tradeoff_study import make_tradeoff
+    from proofroll.studies.tradeoff.study import make_tradeoff
 
     with options.progress_bar("runs and timings") as advance:
         return make_tradeoff(question, runner, out, engines=engines, over=over, claims=claims, progress=advance)

@@ -15,7 +15,7 @@ from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, ProofrollError
 
 if TYPE_CHECKING:
-    from proofroll.studies.versions import VersionsStudy
+    from proofroll.studies.versions.versions import VersionsStudy
 
 # What else than a scene or a comparison can be held against two versions, by the ending of its file.
 SUBJECTS = "proofroll.version_subjects"
@@ -48,7 +48,7 @@ def versions(
     if robot is not None and scheduler is not None:
         raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")
     if robot is None:
-        from proofroll.studies.version_subjects import comparisons_about
+        from proofroll.studies.versions.subjects import comparisons_about
 
         comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
     options.require_pages()
@@ -59,7 +59,7 @@ def versions(
         with options.spinner(f"{engine} {old} and {new}"):
             content: VersionsStudy = robot.load()(subject, *sides)
     else:
-        from proofroll.studies.versions import compared
+        from proofroll.studies.versions.versions import compared
 
         runner = options.new_runner(out, fresh, jobs, scheduler)
         with options.progress_bar("cases") as advance:

@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
     from proofroll.core.observable import Observable
     from proofroll.core.scene import Scene
-    from proofroll.report.comparison_records import ReportedComparison
+    from proofroll.report.comparison.plots import PointCurves
+    from proofroll.report.comparison.records import ReportedComparison
+    from proofroll.report.page.records import ReportedTruth
     from proofroll.report.pen import Picture
-    from proofroll.report.plots import PointCurves
-    from proofroll.report.replay_records import ReplayKind
-    from proofroll.report.report_records import ReportedTruth
+    from proofroll.report.replay.records import ReplayKind
     from proofroll.running.store import Store
-    from proofroll.studies.outcome import Run
+    from proofroll.studies.comparison.outcome import Run
 
 GROUP = "proofroll.report_kinds"
 

@@ -10,9 +10,9 @@ from proofroll.core.number_text import number
 
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement
-    from proofroll.report.comparison_records import ReportedComparison, ReportedRow, ReportedRun, Setting
-    from proofroll.studies.stability_records import BoundaryPoint
-    from proofroll.studies.tradeoff_records import MeasuredPoint
+    from proofroll.report.comparison.records import ReportedComparison, ReportedRow, ReportedRun, Setting
+    from proofroll.studies.stability.records import BoundaryPoint
+    from proofroll.studies.tradeoff.records import MeasuredPoint
 
 SYMBOLS = {
     "agrees": "✓",
@@ -47,7 +47,7 @@ def precision_words(precision: str) -> tuple[str, ...]:
 
 def unjudged(content: ReportedComparison) -> int:
     """How many runs could not be judged, though their rows expect a verdict."""
-    from proofroll.studies.expectations import NOBODY
+    from proofroll.studies.comparison.expectations import NOBODY
 
     return sum(run.verdict in NOBODY and run.verdict not in content.rows[run.row].expected for run in content.runs)
 

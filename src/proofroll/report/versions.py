@@ -10,10 +10,10 @@ from rich.text import Text
 from proofroll.core.number_text import counted, number
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import environment, rendered
-from proofroll.report.screen import plain_table, unbroken
+from proofroll.report.terminal.screen import plain_table, unbroken
 from proofroll.running.case import told_hosts
-from proofroll.studies.version_difference import NumberKind
-from proofroll.studies.versions import SettingDifference, VersionsStudy
+from proofroll.studies.versions.difference import NumberKind
+from proofroll.studies.versions.versions import SettingDifference, VersionsStudy
 
 _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
 

@@ -11,8 +11,8 @@ from rich.text import Text
 
 from proofroll.core.number_text import counted, error
 from proofroll.report.labels import SYMBOLS
-from proofroll.report.screen import numeric, plain_table, unbroken
-from proofroll.report.terminal import STYLES
+from proofroll.report.terminal.screen import numeric, plain_table, unbroken
+from proofroll.report.terminal.tables import STYLES
 from proofroll.robots.records import AgainstCheck, GalleryContent, HeldLayer, ImporterRow, RobotCheck
 from proofroll.robots.robot_file import LintFinding
 

@@ -10,7 +10,7 @@ from proofroll.robots.check import check
 from proofroll.robots.records import ImporterRow
 from proofroll.robots.terminal import amount
 from proofroll.running.asking import describe
-from proofroll.studies.versions import EngineVersion, VersionsStudy
+from proofroll.studies.versions.versions import EngineVersion, VersionsStudy
 
 
 @dataclass(frozen=True)

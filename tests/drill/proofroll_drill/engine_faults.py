@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from proofroll.report.screen import Screen
+from proofroll.report.terminal.screen import Screen
 from proofroll.running.case import LASTING, Status
 from proofroll.running.store import Store
 from proofroll_drill.row import Drilled, drilled

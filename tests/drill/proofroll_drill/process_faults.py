@@ -20,7 +20,7 @@ _MAP = """
 import sys
 from pathlib import Path
 from proofroll.files.scene_file import load_scene
-from proofroll.elements.ball_on_surface.regimes_study import regime_map
+from proofroll.ball_studies.regimes import regime_map
 
 def tell(_):
     Path(sys.argv[1]).touch()

@@ -22,7 +22,7 @@ from proofroll.running.case import Case, EngineFacts
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.worker_pool import Workers
-from proofroll.studies.compare import compare
+from proofroll.studies.comparison.compare import compare
 from proofroll_drill.engines import DEEDS, FOLDER
 
 SCENE = "sphere_in_cylinder"

@@ -15,9 +15,9 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.files.scene_file import load_scene
-from proofroll.truth import taylor
-from proofroll.truth.friction_curve import friction_curve
-from proofroll.truth.onset import first_slip as true_first_slip
+from proofroll.truth.ball_on_surface import taylor
+from proofroll.truth.ball_on_surface.friction_curve import friction_curve
+from proofroll.truth.ball_on_surface.onset import first_slip as true_first_slip
 from proofroll_benchmarks.first_slip import FirstSlip, first_slip
 from proofroll_benchmarks.first_slips import first_slips
 

@@ -20,7 +20,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.running.timing import Timing
-from proofroll.truth.rolling import unreduced
+from proofroll.truth.ball_on_surface.rolling import unreduced
 from proofroll_benchmarks import reference as bench
 from proofroll_benchmarks import search as searching
 from proofroll_benchmarks.compiled import Onsets, compiled, numeric

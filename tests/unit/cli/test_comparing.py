@@ -20,8 +20,8 @@ def test_each_engine_is_started_once(
     started_workers: list[str],
 ) -> None:
     """An engine that was asked whether it can represent the scene runs it in the same process."""
-    monkeypatch.setattr("proofroll.studies.first_look.engine_names", lambda: ["reduced"])
-    monkeypatch.setattr("proofroll.studies.first_look._UNTIL", 0.1)
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["reduced"])
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.1)
     assert command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path))[0] == 0
     assert sorted(started_workers) == ["reduced", "truth"]
 
@@ -39,7 +39,9 @@ def test_a_scene_of_two_kinds_is_compared(
     tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each formulation that is for one of the elements has a row, the other element in one that is for that."""
-    monkeypatch.setattr("proofroll.studies.first_look.engine_names", lambda: ["projection", "reduced"])
+    monkeypatch.setattr(
+        "proofroll.studies.comparison.default_comparison.engine_names", lambda: ["projection", "reduced"]
+    )
     code, out, err = command_line("compare", str(mixed), "--out", str(tmp_path / "out"), "--json")
     assert code == 0, err
     found = {row["engine"]: row["verdict"] for row in json.loads(out)["rows"]}
@@ -55,13 +57,13 @@ def test_why_nobody_can_is_said_engine_by_engine(
     mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What nobody provides is named; where each is provided by somebody, each engine's elements without a model."""
-    monkeypatch.setattr("proofroll.studies.first_look.engine_names", lambda: ["reduced"])
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["reduced"])
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
     assert "no installed engine has revolute joints" in err
     rods_alone = {"rods": ["revolute joints"]}
     monkeypatch.setattr(
-        "proofroll.studies.first_look._provided",
+        "proofroll.studies.comparison.default_comparison._provided",
         lambda _: [("jointed", rods_alone), ("rolling", {"ball": ["rolling without slip"]})],
     )
     code, _, err = command_line("compare", str(mixed))

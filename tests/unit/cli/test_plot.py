@@ -12,7 +12,7 @@ import xarray as xr
 from mixed_scene import BALL_AND_PENDULUM
 
 from proofroll.files.trajectory_file import read, write
-from proofroll.report.run_plot import curves
+from proofroll.report.run.plot import curves
 
 Proofroll = Callable[..., tuple[int, str, str]]
 RUN = ["--until", "0.1", "--every", "0.05"]

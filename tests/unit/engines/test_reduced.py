@@ -17,7 +17,7 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
-from proofroll.truth.rolling import unreduced
+from proofroll.truth.ball_on_surface.rolling import unreduced
 
 TAYLOR = "reduced[preset=tuned]"
 needs_heyoka = pytest.mark.skipif(not library.available(), reason="heyoka is not installed")

@@ -26,8 +26,8 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import LimitFinding, Verdict, judge
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.studies.curve import Curve, CurvePoint
-from proofroll.studies.judging import judge as judge_run
+from proofroll.studies.judging.judge import judge as judge_run
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 
 SCENES = ("pendulum", "double_pendulum", "free_body")
 TIMES = np.linspace(0, 1, 21)

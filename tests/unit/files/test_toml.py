@@ -9,8 +9,8 @@ import pytest
 from proofroll.core.errors import InputError
 from proofroll.files import toml as toml_file
 from proofroll.files.toml import read_toml, study_files, study_of
-from proofroll.studies.claims import claims_for
-from proofroll.studies.stability_claims import file_for
+from proofroll.studies.stability.claims import file_for
+from proofroll.studies.tradeoff.claims import claims_for
 
 
 @pytest.mark.parametrize("content", [b"a = = 1", b"\xff\xfe"])

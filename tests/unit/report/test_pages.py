@@ -8,7 +8,7 @@ from typing import Any
 import jinja2
 import pytest
 
-from proofroll.report import html
+from proofroll.report.page import html
 from proofroll.report.pages import environment, rendered
 
 

@@ -21,8 +21,8 @@ import pytest
 from hostile import ENTRY_POINTS
 from robot_templates import urdf
 
+from proofroll.ball_studies.regimes import regime_map
 from proofroll.core.errors import InputError, ProofrollError
-from proofroll.elements.ball_on_surface.regimes_study import regime_map
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read

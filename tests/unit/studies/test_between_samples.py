@@ -14,8 +14,8 @@ from proofroll.core.plugins import load_engine
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll.studies import first_look
-from proofroll.studies.judging import Judged, judge
+from proofroll.studies.comparison import default_comparison as first_look
+from proofroll.studies.judging.judge import Judged, judge
 
 EVERY, UNTIL = 0.02, 0.4
 Change = Callable[[Any], Any]

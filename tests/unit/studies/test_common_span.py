@@ -16,7 +16,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
-from proofroll.studies.reference import Reference
+from proofroll.studies.judging.reference import Reference
 
 TIMES = time_grid(0.4, 5e-3)
 

@@ -9,7 +9,7 @@ import pytest
 from proofroll.core.comparison import Comparison, Edge
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
-from proofroll.studies.planning import settled
+from proofroll.studies.comparison.planning import settled
 
 SPEED_AND_RESISTANCE = {"speed": 4.0, "rolling_resistance": 5e-4}
 

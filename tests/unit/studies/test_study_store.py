@@ -13,12 +13,12 @@ from invented import boundary_point, invented_study, measured_point, stability_s
 from proofroll.running.environments import STAMP, VARIABLE, Environment
 from proofroll.running.timing import machine
 from proofroll.studies import study_store
-from proofroll.studies.axes import QUICK, Axis, Effort
-from proofroll.studies.stability import stability_path
-from proofroll.studies.stability_claims import file_for
-from proofroll.studies.stability_records import MappedPlace, StabilityStudy
+from proofroll.studies.stability.axes import QUICK, Axis, Effort
+from proofroll.studies.stability.claims import file_for
+from proofroll.studies.stability.map import stability_path
+from proofroll.studies.stability.records import MappedPlace, StabilityStudy
 from proofroll.studies.study_store import keep, kept
-from proofroll.studies.tradeoff_records import Corner, TradeoffStudy
+from proofroll.studies.tradeoff.records import Corner, TradeoffStudy
 
 
 @dataclasses.dataclass

@@ -11,9 +11,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.events import events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.ball_on_surface import truth
+from proofroll.truth.ball_on_surface.plug_in import truth
+from proofroll.truth.ball_on_surface.stick_slip import moved
 from proofroll.truth.conditioning import Events, Story, in_common, unmoved
-from proofroll.truth.stick_slip import moved
 
 PACE, UNTIL = 1.0, 10.0
 OWN: Events = [("slip", 2.0), ("stick", 4.0), ("slip", 6.0)]

@@ -22,9 +22,9 @@ from proofroll.running import process
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.compare import compare
-from proofroll.studies.outcome import Outcome, Run
-from proofroll.studies.planning import point_name
+from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import point_name
 
 
 def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:

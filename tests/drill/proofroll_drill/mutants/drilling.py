@@ -22,7 +22,7 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict, judge
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
-from proofroll.studies.reference import Reference
+from proofroll.studies.judging.reference import Reference
 from proofroll_drill.mutants import (
     ball_models,
     ball_samples,

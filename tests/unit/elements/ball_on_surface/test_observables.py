@@ -20,8 +20,8 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.observables import energy_balance, force_audit, rate_audit
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
-from proofroll.truth.orientation import QUATERNIONS, orientation
-from proofroll.truth.rolling import reduced
+from proofroll.truth.ball_on_surface.orientation import QUATERNIONS, orientation
+from proofroll.truth.ball_on_surface.rolling import reduced
 
 TIMES = np.linspace(0, 0.6, 61)
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.report.pen import Picture
-    from proofroll.report.replay_records import ReplayKind
+    from proofroll.report.replay.records import ReplayKind
 
 # Curves of forces, and of torques, of one case.
 _MOST = 8
@@ -55,7 +55,7 @@ class MechanismReport(ReportKind):
     def replay() -> ReplayKind:
         """Bodies and joints in motion."""
         from proofroll.elements.mechanism.report.replay import drawn, seen
-        from proofroll.report.replay_records import ReplayKind
+        from proofroll.report.replay.records import ReplayKind
 
         return ReplayKind("mechanism", seen, drawn)
 

@@ -21,8 +21,8 @@ from proofroll.elements.mechanism.report.kind import covered
 from proofroll.files.json_data import plain
 from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay import frame_times, in_sight
-from proofroll.report.replay_records import SPEEDS, PackedNumbers, Replayed
+from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed
+from proofroll.report.replay.replay import frame_times, in_sight
 
 # Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
 _SCALE, _SEEN = 0.035, 1e-3
@@ -44,7 +44,7 @@ def seen(scene: Scene) -> float:
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
-    """What the replay draws of a mechanism: see :data:`proofroll.report.replay_records.Drawer`."""
+    """What the replay draws of a mechanism: see :data:`proofroll.report.replay.records.Drawer`."""
     element = covered(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened

@@ -1,0 +1,210 @@
+"""When the first slip comes: in the truth with its conditioning, and in every engine with its bracket."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.events import Event, events_of
+from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read_columns
+from proofroll.running.asking import described, resolve
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.cases import case_of
+
+if TYPE_CHECKING:
+    from proofroll.truth.ball_on_surface.onset import Onset
+
+_EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
+_SMALLEST = float(np.finfo(float).tiny)  # what is less is round-off of zero
+_LATER = 0.05  # an engine that slips later than the truth by more than this part is run once more, to the end [1]
+
+
+@dataclass(frozen=True)
+class EngineOnset:
+    """The first slip in one engine.
+
+    Attributes:
+        engine: with the settings that were asked for.
+        name: of the engine alone.
+        settings: complete; empty if it could not be asked.
+        status, message: how its run ended.
+        onset: the first slip with its bracket, or None.
+        difference: from the truth's first slip [s]; None where one of them is none.
+        verdict: ``agree``, ``disagree``, ``ill-posed``, ``refused`` or ``failed``.
+    """
+
+    engine: str
+    name: str
+    settings: Mapping[str, Any]
+    status: Status
+    message: str
+    onset: Event | None
+    difference: float | None
+    verdict: str
+
+
+@dataclass(frozen=True)
+class OnsetStudy:
+    """The truth's onset with its conditioning, and every engine's, in a scene with these parameters."""
+
+    scene: str
+    parameters: Mapping[str, Any]
+    until: float
+    truth: Onset
+    engines: list[EngineOnset]
+
+
+def default_engines(workers: Workers | None = None) -> list[str]:
+    """Every formulation of every installed engine that provides bounded friction, with its matched settings."""
+    found: list[str] = []
+    for name, told in described(engine_names(), workers).items():
+        if isinstance(told, ProofrollError):
+            found.append(name)  # the row says why it cannot run
+            continue
+        provided = told.provides.items()
+        found += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
+    return found
+
+
+def onset_study(
+    scene: str,
+    parameters: dict[str, Any],
+    runner: Runner,
+    *,
+    engines: Sequence[str] = (),
+    until: float = 4.0,
+    uncertainty: float = 1e-3,
+    progress: Callable[[Case, Result], None] | None = None,
+) -> OnsetStudy:
+    """Runs the truth and the engines until ``until`` [s] and compares their first slips.
+
+    Args:
+        scene: name of the scene.
+        parameters: its parameters; friction must be bounded.
+        runner: where the cases are run.
+        engines: engines with settings; all that can slip if empty.
+        until: how long to look [s].
+        uncertainty: relative uncertainty of μ and f for which the verdicts hold [1].
+        progress: called with each case that is finished.
+
+    Raises:
+        InputError: the scene is not one ball that begins on its wall, its friction is unbounded, or something does not
+            exist.
+    """
+    from proofroll.truth.ball_on_surface.onset import onset
+
+    loaded = load_scene(scene, **parameters)
+    if len(loaded.elements) > 1 or not isinstance(loaded.elements[0], BallOnSurface):
+        raise InputError("scene", scene, "a first slip is that of one ball on one surface; name a scene of such a one")
+    if loaded.elements[0].rolling.gap0:
+        raise InputError("scene", scene, "its ball begins in the air; name a scene whose ball begins on its wall")
+    if BallCapability.BOUNDED_FRICTION not in loaded.requires:
+        raise InputError("mu_static", "inf", "without bounded friction the ball never slips; give --set mu_static=…")
+    with ThreadPoolExecutor(1) as pool:  # engines start while the truth is worked out
+        able = None if engines else pool.submit(default_engines, runner.workers)
+        truth = onset(loaded, until, uncertainty)
+        names = list(engines) if able is None else able.result()
+    specs = [parse_engine(name) for name in names]
+    facts = resolve([(spec.name, spec.options) for spec in specs], runner.workers)
+    for found in facts:
+        if isinstance(found, InputError):
+            raise found
+    asked = [found for found in facts if isinstance(found, EngineFacts)]
+
+    def run(engines: Sequence[EngineFacts], end: float) -> list[tuple[Result, Event | None]]:
+        cases = [case_of(scene, loaded, parameters, found, end, _EVERY) for found in engines]
+        results = runner.run(cases, progress)
+        return [(results[case.key], _first_slip(runner, case, results[case.key])) for case in cases]
+
+    # What follows the first slip decides nothing and costs most; who slips later than that runs to the end.
+    soon = _soon(truth, until)
+    answers = run(asked, soon)
+    late = [index for index, (result, first) in enumerate(answers) if first is None and result.status == Status.DONE]
+    if late and soon < until:
+        for index, answer in zip(late, run([asked[index] for index in late], until), strict=True):
+            answers[index] = answer
+    rows, answered = [], iter(answers)
+    for name, spec, found in zip(names, specs, facts, strict=True):
+        if not isinstance(found, EngineFacts):
+            status = found.status if isinstance(found, WorkerDied) else Status.MISSING
+            rows.append(EngineOnset(name, spec.name, {}, status, str(found), None, None, "failed"))
+            continue
+        result, first = next(answered)
+        apart = None if first is None or truth.time is None else first.time - truth.time
+        ended = (result.status, result.message, first, apart, onset_verdict(truth, result, first))
+        rows.append(EngineOnset(name, spec.name, found.settings, *ended))
+    return OnsetStudy(loaded.name, loaded.parameters, until, truth, rows)
+
+
+def _soon(truth: Onset, until: float) -> float:
+    """A time a little after the truth's first slip, as a whole number of samples; ``until`` if there is none [s]."""
+    if truth.time is None:
+        return until
+    latest = max(truth.time, truth.latest or 0.0)
+    return min(until, _EVERY * (math.ceil(latest * (1 + _LATER) / _EVERY) + 1))
+
+
+def _first_slip(runner: Runner, case: Case, result: Result) -> Event | None:
+    if result.trajectory is None:
+        return None
+    events = events_of(read_columns(runner.store.trajectory(case)))
+    return next((event for event in events if event.kind == "slip"), None)
+
+
+def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
+    """Agreement: the engine's bracket meets the times that the uncertainty of μ and f leaves to the truth."""
+    if result.status == Status.REFUSED:
+        return "refused"
+    if result.status != Status.DONE:
+        return "failed"
+    if truth.verdict == "ill-posed":
+        return "ill-posed"
+    if truth.time is None or first is None:
+        return "agree" if truth.time is None and first is None else "disagree"
+    times = [time for time in (truth.time, truth.earliest, truth.latest) if time is not None]
+    return "agree" if first.time_low <= max(times) and first.time_high >= min(times) else "disagree"
+
+
+def summary(study: OnsetStudy) -> str:
+    """The conditioning of the truth in one paragraph."""
+    truth = study.truth
+    if truth.time is None:
+        return f"In the truth the ball does not slip within {study.until:g} s."
+    said = "In the truth the ball slips from the start. "
+    if truth.time > 0:
+        said = f"In the truth the ball first slips at {truth.time:.9g} s; "
+        said += f"d ln t / d ln mu = {_number(truth.by_mu)}, d ln t / d ln f = {_number(truth.by_f)}. "
+    edges = [f"{edge:.6g}" for edge in (truth.edge_below, truth.edge_above) if edge is not None]
+    if edges:
+        said += f"The time jumps at mu = {' and '.join(edges)}, the nearest {100 * truth.distance:.3g} % away; "
+    said += (
+        f"{'for' if edges else 'For'} mu and f known to {100 * truth.uncertainty:g} % the question is {truth.verdict}."
+    )
+    return said
+
+
+def first_slip_told(first: Event | None) -> tuple[str, str]:
+    """When a ball first slips, and between which times that is known to be, for a person."""
+    if first is None:
+        return "no slip", ""
+    between = f"{first.time_low:.9g} … {first.time_high:.9g}"
+    if first.time > 0:
+        return f"{first.time:.9g}", between
+    return "from the start", between if first.time_high > _SMALLEST else ""
+
+
+def _number(value: float | None) -> str:
+    return "none" if value is None else f"{value:.4g}"

@@ -1,0 +1,200 @@
+"""Regime maps: what becomes of a ball over its initial speed and static friction, as a file of a study asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.bounds import bounded
+from proofroll.core.errors import InputError, told_of
+from proofroll.core.scene import Scene
+from proofroll.core.validation import strict, validated
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.files.scene_file import load_scene
+from proofroll.files.toml import study_file
+from proofroll.running.in_processes import in_processes
+from proofroll.truth.ball_on_surface.regimes import Regime, analytic_boundaries, classify
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.running.cluster import Cluster
+
+STUDY = "regimes"
+# Maps of this process by what they are made from: a report and its figures show the same ones.
+_MADE: dict[tuple[RegimesStudy, str], list[xr.Dataset]] = {}
+
+_MOST = 1000  # values of an axis: a map has the product of two such numbers of runs
+
+
+@dataclass(frozen=True)
+class EvenValues:
+    """Equally spaced values.
+
+    Attributes:
+        low, high: first and last.
+        count: how many.
+    """
+
+    low: float
+    high: float
+    count: int
+
+    @property
+    def values(self) -> FloatArray:
+        """All of them."""
+        return np.linspace(self.low, self.high, self.count)
+
+    @property
+    def halved(self) -> EvenValues:
+        """With half as many intervals between them; two values stay two."""
+        return replace(self, count=self.count // 2 + 1) if self.count > 1 else self
+
+
+@dataclass(frozen=True)
+class RegimesStudy:
+    """Maps of what becomes of the ball, one for each rolling resistance.
+
+    Attributes:
+        name: of the file, without ending.
+        title, question: for a person.
+        scene: name of the scene.
+        until: length of each run [s].
+        speed, mu_static: the axes: initial speed [m/s] and static friction [1].
+        rolling_resistance: f [m]; one map for each.
+    """
+
+    name: str
+    title: str
+    question: str
+    scene: str
+    until: float
+    speed: EvenValues
+    mu_static: EvenValues
+    rolling_resistance: tuple[float, ...]
+
+    @property
+    def runs(self) -> int:
+        """Number of runs of all maps."""
+        return self.speed.count * self.mu_static.count * len(self.rolling_resistance)
+
+    def briefly(self) -> RegimesStudy:
+        """As a report has it: a fourth of the runs, every second value of both axes."""
+        return replace(self, speed=self.speed.halved, mu_static=self.mu_static.halved)
+
+
+def load_regimes(name: str) -> RegimesStudy:
+    """Reads a file by its path, its name, or the scene that it is about.
+
+    Raises:
+        InputError: there is none, it is broken, or its numbers make no sense.
+    """
+    path, content = study_file(name, STUDY)
+    found = validated(RegimesStudy, content, path.name, name=path.stem)
+    if not found.rolling_resistance:
+        raise InputError(f"{path.name}: rolling_resistance", [], "give at least one value in m")
+    for axis, given in (("speed", found.speed), ("mu_static", found.mu_static)):
+        if not 1 <= given.count <= _MOST or not 0 < given.low <= given.high < math.inf:
+            shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
+            raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
+    with told_of(path.name):
+        bounded("until", found.until, above=0)
+        for resistance in found.rolling_resistance:
+            load_scene(found.scene, rolling_resistance=resistance, speed=found.speed.low, mu_static=found.mu_static.low)
+    return found
+
+
+def regime_maps(
+    study: RegimesStudy,
+    workers: int,
+    progress: Callable[[int], None] | None = None,
+    cluster: Cluster | None = None,
+) -> list[xr.Dataset]:
+    """One map per value of the rolling resistance, see :func:`regime_map`."""
+    scenes = [load_scene(study.scene, rolling_resistance=f) for f in study.rolling_resistance]
+    key = study, "".join(scene.digest for scene in scenes)
+    if key not in _MADE:
+        axes = study.speed.values, study.mu_static.values
+        _MADE[key] = [
+            regime_map(scene, *axes, until=study.until, workers=workers, progress=progress, cluster=cluster)
+            for scene in scenes
+        ]
+    return _MADE[key]
+
+
+def regime_map(
+    scene: Scene,
+    speeds: Sequence[float] | FloatArray,
+    frictions: Sequence[float] | FloatArray,
+    *,
+    until: float = 4.0,
+    workers: int = 1,
+    progress: Callable[[int], None] | None = None,
+    cluster: Cluster | None = None,
+) -> xr.Dataset:
+    """The map over initial speed × static friction; the ratio μk/μs is the scene's (1 where it has no bound).
+
+    Args:
+        scene: one ball on one surface; its other parameters are kept.
+        speeds: of the centre [m/s], shape (n,).
+        frictions: μs [1], shape (m,).
+        until: length of each run [s].
+        workers: number of processes; 1 runs in this one.
+        progress: called with the number of runs just finished.
+        cluster: where the runs are made; None: here.
+
+    Returns:
+        Dataset with dims ``speed``, ``mu_static``: ``regime`` (:class:`Regime`), ``slips`` (count), ``first_slip``
+        [s, nan: never]; and per speed, where :func:`analytic_boundaries` knows them, ``mu_falls`` and ``mu_slips``.
+    """
+    import xarray as xr
+
+    body = rolling_ball(scene)
+    mus = np.asarray(frictions, dtype=np.float64)
+    rows = []
+    hosts = set()
+    row, places = partial(_row, body, mus, until), [float(speed) for speed in speeds]
+    for host, values in (
+        cluster.map(row, places) if cluster else (("", row) for row in in_processes(row, places, workers))
+    ):
+        rows.append(values)
+        hosts.add(host)
+        if progress is not None:
+            progress(len(mus))
+    regime, slips, first = np.moveaxis(np.array(rows).reshape(len(rows), len(mus), 3), -1, 0)
+    dims = ("speed", "mu_static")
+    meaning = ", ".join(f"{item.value}: {item.name.lower().replace('_', ' ')}" for item in Regime)
+    result = xr.Dataset(
+        {
+            "regime": (dims, regime.astype(np.int8), {"units": "1", "long_name": meaning}),
+            "slips": (dims, slips.astype(np.int64), {"units": "1", "long_name": "how often a slip began"}),
+            "first_slip": (dims, first, {"units": "s", "long_name": "time of the first slip"}),
+        },
+        coords={
+            "speed": ("speed", np.asarray(speeds, dtype=np.float64), {"units": "m/s"}),
+            "mu_static": ("mu_static", mus, {"units": "1"}),
+        },
+        attrs={"scene": scene.name, "until": until, "rolling_resistance": body.contact.rolling_resistance}
+        | {"ran_on": ", ".join(sorted(hosts))},
+    )
+    bounds = analytic_boundaries(body, result["speed"].to_numpy())
+    if bounds is not None:
+        falls, slipping = bounds
+        result["mu_falls"] = ("speed", falls, {"units": "1", "long_name": "below: falls, without rolling resistance"})
+        result["mu_slips"] = ("speed", slipping, {"units": "1", "long_name": "above: never slips, without resistance"})
+    return result
+
+
+def _row(body: RollingBall, mus: FloatArray, until: float, speed: float) -> list[tuple[float, float, float]]:
+    here = body.at_speed(speed)
+    return [classify(here.with_contact(mu_static=float(mu)), until) for mu in mus]
+
+
+strict(RegimesStudy, EvenValues)

@@ -1,0 +1,196 @@
+"""A scene as a whole, drawn by the kind of its wall; one without a drawing of its own as a net of coordinate lines."""
+
+from __future__ import annotations
+
+import itertools
+from functools import singledispatch
+
+import numpy as np
+
+from proofroll.ball_studies.report.drawings.contact import contact
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plane, Surface
+from proofroll.report.labels import symbol
+from proofroll.report.pen import Drawing, View, turn
+
+_SIZE = 128.0  # half the width of what is drawn of a wall [px]
+_LEVEL = 0.02  # angles below this have no arc [rad]
+_LINES, _FINE = 13, 61  # lines of a net along each coordinate, and points of each
+
+
+@singledispatch
+def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001 -- the kinds below use it
+    """The scene as a whole, and its contact enlarged; empty for a surface that nobody has drawn yet.
+
+    Args:
+        wall: the scene's wall, by whose type the drawing is chosen.
+        body: the ball on it.
+    """
+    return []
+
+
+@overview.register
+def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
+    """A cylinder cut open: axis, radii, the circle of the centre, the ball at its start and somewhere below."""
+    b, surface = wall.radius, body.surface
+    drawn, at = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
+    top, bottom, here = 0.62 * b, -1.3 * b, (2.55, -0.72 * b)
+    _tube(drawn, at, wall, top, bottom)
+    drawn.path(at(surface.position(_ring(turn(0, 2 * np.pi), 0.0))), "hidden", closed=True)
+    centre, start, level = (surface.position(u) for u in (here, (0.0, 0.0), (here[0], 0.0)))
+    axis = wall.position((0.0, 1.0)) - wall.position((0.0, 0.0))
+    drawn.path(at([bottom * axis, top * axis]), "axis")
+    drawn.vector(at([top * axis, (top + 0.42 * b) * axis]), "thin", "z", beside=(10.0, 8.0))
+    _radius(drawn, at, top * axis, wall.position((-0.9, top)), "b", (12.0, 2.0))
+    _radius(drawn, at, np.zeros(3), start, "c = b − a", (0.0, 17.0))
+    drawn.path(at([np.zeros(3), level]), "thin")
+    arc = at(0.4 * surface.position(_ring(turn(0.0, here[0]), 0.0)))
+    drawn.arrow(arc, "thin")
+    drawn.text(arc[len(arc) // 2], "γ", beside=(9.0, 8.0))
+    drawn.arrow(at([level, centre]), "thin")
+    drawn.text(at((level + centre) / 2), "z", beside=(10.0, 4.0))
+    radius = body.ball.radius * at.scale
+    drawn.disc(at(start).tolist(), radius, "ghost")
+    drawn.disc(at(centre).tolist(), radius, "ball")
+    ahead = surface.frame((0.0, 0.0))[:, 1]
+    drawn.vector(at([start, start + 0.62 * b * ahead]), "motion", "V_0", beside=(2.0, 0.0))
+    leader = at(centre) + np.outer([0.0, radius, radius + 20.0], [0.9, 0.44])
+    drawn.path(leader, "thin")
+    drawn.text(leader[-1], "a", beside=(8.0, 5.0))
+    _gravity(drawn, at, body, at(-1.35 * b * _right(at)))
+    return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1))]
+
+
+@overview.register
+def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
+    """A slope with its angle, the ball on it or above, and its speeds down and across."""
+    a, surface = body.ball.radius, body.surface
+    size = max(6.0 * a, body.gap0)
+    drawn, at = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
+    corners = [(-0.8, -0.7), (1.3, -0.7), (1.3, 0.7), (-0.8, 0.7)]
+    low, high = (wall.position(size * np.array(u)) for u in (corners[2], corners[3]))
+    drawn.path(at([wall.position(size * np.array(u)) for u in corners]), "wall", closed=True)
+    _slope(drawn, at, low, high)
+    start, touching, frame = body.p0, surface.position(body.u0), surface.frame(body.u0)
+    foot = touching + a * frame[:, 0]
+    if body.gap0:
+        drawn.path(at([start, touching]), "hidden")
+        drawn.disc(at(touching).tolist(), a * at.scale, "ghost")
+    for index, letter in ((1, "V_0"), (2, "V_3")):
+        along = size * frame[:, index]
+        drawn.vector(at([foot, foot + 0.95 * along]), "thin", surface.coordinates[index - 1], by=14.0)
+        drawn.vector(at([start, start + 0.62 * along]), "motion", letter, by=13.0)
+    drawn.disc(at(start).tolist(), a * at.scale, "ball")
+    rim = at(start) + np.outer([0.0, a * at.scale, a * at.scale + 14.0], [-0.7, -0.7])
+    drawn.path(rim, "thin")
+    drawn.text(rim[-1], "a", beside=(-6.0, -2.0))
+    _gravity(drawn, at, body, at(-1.15 * size * _right(at)))
+    return [drawn, contact(body, (-0.42, 0.4, 0.8), (-1, 0, 0))]
+
+
+@overview.register
+def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
+    """The net over the whole domain, the ball at its start, its velocity and the directions of the coordinates."""
+    (low, high), (lowest, highest) = wall.domain
+    middle = wall.position(wall.places())
+    size = 0.5 * float(np.max(np.ptp(middle, axis=0)))
+    centre = (middle.min(axis=0) + middle.max(axis=0)) / 2
+    drawn, at = Drawing(), View(_direction(-62, 32), (0, 0, 1), _SIZE / size)
+
+    def line(u1: FloatArray, u2: FloatArray) -> None:
+        points = wall.position(np.stack(np.broadcast_arrays(u1, u2), axis=-1))
+        looks = np.where(at.towards(wall.normal(points)) > 0, "hidden", "line")  # seen from behind
+        cuts = [0, *(1 + np.flatnonzero(looks[1:] != looks[:-1])).tolist(), len(looks) - 1]
+        for start, end in itertools.pairwise(cuts):
+            if end > start:
+                drawn.path(at(points[start : end + 1] - centre), str(looks[start]))
+
+    for value in np.linspace(low, high, _LINES):
+        line(np.full(1, value), np.linspace(lowest, highest, _FINE))
+    for value in np.linspace(lowest, highest, _LINES):
+        line(np.linspace(low, high, _FINE), np.full(1, value))
+    start, frame = body.p0 - centre, body.surface.frame(body.u0)
+    foot = start + body.ball.radius * frame[:, 0]
+    for name, along in zip(body.surface.coordinates, frame[:, 1:].T, strict=True):
+        drawn.vector(at([foot, foot + 0.45 * size * along]), "thin", symbol(name), by=14.0)
+    speed = float(np.linalg.norm(body.v0))
+    if speed:
+        drawn.vector(at([start, start + 0.4 * size * body.v0 / speed]), "motion", "v")
+    drawn.disc(at(start).tolist(), body.ball.radius * at.scale, "ball")
+    _gravity(drawn, at, body, at(-1.25 * size * _right(at)))
+    return [drawn, contact(body, (-0.6, -0.72, 0.36), (0, 0, 1) if abs(frame[2, 0]) < 0.9 else (-1, 0, 0))]
+
+
+def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
+    """The angle of a line from the horizontal, at its lower end; nothing where it is level."""
+    if low[2] > high[2]:
+        low, high = high, low
+    flat = np.array([high[0], high[1], low[2]])
+    angle = float(np.arctan2(high[2] - low[2], np.hypot(*(high - low)[:2])))
+    if angle < _LEVEL:
+        return
+    along = (flat - low) / (np.linalg.norm(flat - low) or 1.0)
+    reach = 0.4 * float(np.linalg.norm(high - low))
+    arc = at([low + reach * (np.cos(s) * along + np.sin(s) * np.array([0, 0, 1])) for s in turn(0.0, angle)])
+    drawn.path(at([low, flat]), "hidden")
+    drawn.path(arc, "thin")
+    drawn.text(arc[len(arc) // 2], "α", beside=(-10.0, 5.0))
+
+
+def _right(at: View) -> FloatArray:
+    """The level direction that is to the right in the picture."""
+    across = np.cross(np.array([0.0, 0.0, 1.0]), np.asarray(at.viewer, dtype=np.float64))
+    return np.asarray(across / np.linalg.norm(across))
+
+
+def _tube(drawn: Drawing, at: View, wall: Cylinder, top: float, bottom: float) -> None:
+    """Rims and outline of a cylinder; what lies behind it is dashed."""
+    round_ = turn(0, 2 * np.pi)
+    facing = at.towards(wall.frame(_ring(round_, 0.0))[..., :, 0])
+    edges = np.flatnonzero(np.diff(np.sign(facing)))
+    rims = [at(wall.position(_ring(round_, z))) for z in (top, bottom)]
+    drawn.path(rims[0], "wall", closed=True)
+    for edge in edges.tolist():
+        angle = float(np.interp(0.0, *_rising(facing[edge : edge + 2], round_[edge : edge + 2])))
+        drawn.path(at(wall.position(_ring(np.array([angle, angle]), np.array([top, bottom])))), "line")
+    for front, look in ((True, "line"), (False, "hidden")):
+        runs = np.flatnonzero((facing >= 0) == front)
+        for piece in np.split(runs, np.flatnonzero(np.diff(runs) > 1) + 1):
+            if piece.size > 1:
+                drawn.path(rims[1][piece], look)
+
+
+def _rising(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    order = np.argsort(x)
+    return x[order], y[order]
+
+
+def _ring(angles: FloatArray, height: float | FloatArray) -> FloatArray:
+    """Coordinates of points around an axis, shape (n, 2)."""
+    return np.stack([angles, np.broadcast_to(height, angles.shape)], axis=-1)
+
+
+def _radius(
+    drawn: Drawing, at: View, centre: FloatArray, rim: FloatArray, letter: str, beside: tuple[float, float]
+) -> None:
+    """An arrow along a radius, and its letter beside the middle of it [px]."""
+    ends = at([centre, rim])
+    drawn.arrow(ends, "thin")
+    drawn.text(ends.mean(axis=0) + beside, letter)
+
+
+def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
+    """The direction of gravity at a place of the picture; nothing where there is none."""
+    size = float(np.linalg.norm(body.gravity))
+    if not size:
+        return
+    a, b = at([np.zeros(3), body.gravity / size])
+    along = (b - a) / (np.linalg.norm(b - a) or 1.0)
+    drawn.vector(np.stack([place, place + 44.0 * along]), "force", "g")
+
+
+def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
+    """Towards a viewer at these angles [deg]."""
+    az, el = np.radians([azimuth, elevation])
+    return float(np.cos(el) * np.cos(az)), float(np.cos(el) * np.sin(az)), float(np.sin(el))

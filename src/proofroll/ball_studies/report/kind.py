@@ -1,0 +1,55 @@
+"""Balls on surfaces in the report of a comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from proofroll.ball_studies.report import onset_tables, onsets
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
+from proofroll.report.kinds import ReportKind
+
+if TYPE_CHECKING:
+    from proofroll.report.pen import Picture
+    from proofroll.report.replay.records import ReplayKind
+
+
+class BallReport(ReportKind):
+    """See :class:`proofroll.report.kinds.ReportKind`."""
+
+    template: ClassVar[str] = "slips.html"
+    names: ClassVar[Mapping[str, Any]] = {"onsets": onset_tables}
+    replay_script: ClassVar[str] = "replay_ball.js"
+    caption: ClassVar[str] = (
+        "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "
+        "and e₃ along its coordinates. N, F₂, F₃ are drawn as forces on the ball, in their positive sense."
+    )
+
+    @staticmethod
+    def covers(scene: Scene) -> bool:
+        """One ball on one surface."""
+        return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
+
+    @staticmethod
+    def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
+        """One for all cases: with rolling resistance where any has it."""
+        from proofroll.ball_studies.report.drawings import overview
+
+        shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
+        labels = ("as a whole", "where the ball touches the wall")
+        found = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
+        return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
+
+    truth_facts = staticmethod(onsets.truth_facts)
+    run_facts = staticmethod(onsets.run_facts)
+    sentences = staticmethod(onsets.ill_posed)
+    mark = staticmethod(onsets.mark)
+
+    @staticmethod
+    def replay() -> ReplayKind:
+        """Balls rolling on their wall."""
+        from proofroll.ball_studies.report.replay import drawn, seen
+        from proofroll.report.replay.records import ReplayKind
+
+        return ReplayKind("ball", seen, drawn)

@@ -1,0 +1,1 @@
+"""Comparison in a report: records, tables, curves and sentences."""

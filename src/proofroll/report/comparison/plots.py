@@ -1,0 +1,192 @@
+"""The curves that the page draws: the truth, what each engine adds to it, and both error bars; rounded and thinned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.dataset import scales
+from proofroll.core.observable import Observable, Role
+from proofroll.files.json_data import OPTIONAL
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read, read_some
+from proofroll.report.comparison.summary import runs_at
+from proofroll.report.kinds import kind_of
+from proofroll.report.labels import symbol, unit
+from proofroll.studies.comparison.outcome import Outcome, Run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.running.store import Store
+
+Curves = dict[str, FloatArray]
+
+# More points than this are not seen in a figure 500 pixels wide.
+MOST_POINTS = 400
+# Digits of a curve, and of its difference from the truth: enough for a figure, and small in the file.
+CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
+
+# A reaction at time 0 belongs to the certificate, not to the curve.
+_DRAWN = (Role.MOTION, Role.REACTION)
+
+
+@dataclass(frozen=True)
+class EngineCurve:
+    """The difference of one engine from the truth.
+
+    Attributes:
+        row: number of its row.
+        difference: from the truth, None where it is not finite.
+        tolerance: where it was judged.
+        limit: of small steps, where the judgement has one: its distance from the truth, the uncertainty of that, and
+            the observed order or None.
+        at: numbers of the samples, where not all are drawn.
+    """
+
+    row: int
+    difference: list[float | None]
+    tolerance: float | None = field(metadata=OPTIONAL)
+    limit: list[float | None] | None = field(metadata=OPTIONAL)
+    at: list[int] | None = field(metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An event of a row (-1: of the truth) on a curve, as a person calls it; its time is None where it has none."""
+
+    row: int
+    time: float | None
+    name: str
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A value that a curve must not pass."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True)
+class ObservableCurves:
+    """The truth of an observable with its error bar, and what each engine adds to it."""
+
+    name: str
+    symbol: str
+    meaning: str
+    unit: str
+    scale: float
+    error_bar: float
+    truth: list[float | None]
+    engines: list[EngineCurve]
+    marks: list[Mark] | None = field(default=None, metadata=OPTIONAL)
+    bounds: list[Bound] | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class PointCurves:
+    """The curves at one point of the parameters; ``time`` [s]."""
+
+    point: str
+    time: list[float | None]
+    observables: list[ObservableCurves]
+
+
+def point_curves(outcome: Outcome, store: Store) -> list[PointCurves]:
+    """The curves of a comparison, one entry for each point of the parameters."""
+    entries = []
+    for name, case in outcome.truths.items():
+        path = store.trajectory(case)
+        if not path.is_file():
+            continue
+        truth = read(path)
+        scene = load_scene(outcome.comparison.scene, **case.parameters)
+        sizes = scales(scene, truth)
+        kind = kind_of(scene)
+        further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
+        known = scene.observables | further
+        drawn = {key: item for key, item in known.items() if item.role in _DRAWN and _curve(truth, key)}
+        engines = [(row, run, read_some(file, list(drawn))) for row, run, file in runs_at(outcome, name, store)]
+        entries.append(
+            PointCurves(
+                name,
+                rounded(truth["time"].to_numpy(), CURVE_DIGITS),
+                [_observable(item, key, truth, engines, sizes.get(key, 1.0)) for key, item in drawn.items()],
+            )
+        )
+    return entries
+
+
+def rounded(values: FloatArray, digits: int) -> list[float | None]:
+    """Numbers with so many significant digits; None where one is not finite."""
+    return [float(f"{value:.{digits - 1}e}") if math.isfinite(value) else None for value in values.tolist()]
+
+
+def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray[np.intp]:
+    """Indices of the samples that are drawn: of each stretch the first, the last, the lowest and the highest.
+
+    These four draw the same pixels as all samples do (M4: Jugel et al. 2014). MinMaxLTTB, which chooses among the
+    lowest and the highest by the area they span, loses the largest error of one rough curve in four.
+
+    Args:
+        curves: of equal length; one that is not finite somewhere has there neither a lowest nor a highest sample.
+        most: samples of each curve, a multiple of 4.
+    """
+    from tsdownsample import M4Downsampler
+
+    length = curves[0].size
+    if length <= most:
+        return np.arange(length)
+    return np.unique(np.concatenate([M4Downsampler().downsample(np.ascontiguousarray(c), n_out=most) for c in curves]))
+
+
+def _curve(truth: xr.Dataset, name: str) -> bool:
+    """Whether a variable is one curve over time; those of several, such as all reactions, are judged and not drawn."""
+    return name in truth and truth[name].dims == ("time",)
+
+
+def _observable(
+    item: Observable, name: str, truth: xr.Dataset, engines: list[tuple[int, Run, Curves]], scale: float
+) -> ObservableCurves:
+    first = 1 if item.role == Role.REACTION else 0
+    true = truth[name].to_numpy()
+    curves = []
+    for row, run, said in engines:
+        if name not in said:
+            continue
+        values = np.full(true.shape, np.nan)  # a run that ended early has fewer samples
+        ended = min(values.size, said[name].size)
+        values[first:ended] = said[name][first:ended]
+        with np.errstate(invalid="ignore", over="ignore"):
+            difference = values - true
+        at = kept([values, np.abs(difference)])
+        shown = at.tolist() if at.size < true.size else None
+        curves.append(EngineCurve(row, rounded(difference[at], DIFFERENCE_DIGITS), *_bars(run, name), shown))
+    return ObservableCurves(
+        name=name,
+        symbol=symbol(name),
+        meaning=truth[name].attrs.get("long_name", name),
+        unit=unit(truth[name].attrs["units"]),
+        scale=float(f"{scale:.3g}"),
+        error_bar=float(f"{truth[name].attrs.get('error_bar', 0.0):.3g}"),
+        truth=rounded(true, CURVE_DIGITS),
+        engines=curves,
+    )
+
+
+def _bars(run: Run, name: str) -> tuple[float | None, list[float | None] | None]:
+    """Tolerance and limit of the judgement of a curve, in the observable's unit."""
+    judged = next((judgement for judgement in run.judgements if judgement.observable == name), None)
+    if judged is None:
+        return None, None
+    tolerance = float(f"{judged.tolerance:.4g}")
+    if judged.limit_error is None or judged.limit_error_bar is None:
+        return tolerance, None
+    limit = np.array([judged.limit_error, judged.limit_error_bar, judged.order or np.nan])
+    return tolerance, rounded(limit, DIFFERENCE_DIGITS)

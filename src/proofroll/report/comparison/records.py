@@ -1,0 +1,206 @@
+"""What a report says of a comparison, as records; the HTML page and the terminal show nothing that is not in them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from proofroll.core.comparison import ExceptAt, Row, Tolerance
+from proofroll.core.diagnosis.of_scene import Diagnosis
+from proofroll.core.number_text import number
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files.json_data import MERGED
+from proofroll.report.labels import names, unit
+from proofroll.running.case import Status
+from proofroll.running.timing import Timing
+
+if TYPE_CHECKING:
+    from proofroll.report.page.records import ComparisonEvidence
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Wall seconds per simulated second over so many ``runs``; one run has no interval."""
+
+    median: float
+    low: float | None
+    high: float | None
+    confidence: float | None
+    runs: int
+
+    @classmethod
+    def of(cls, timings: Sequence[float]) -> Cost | None:
+        """The cost of runs, or None of none."""
+        if not timings:
+            return None
+        found = Timing(tuple(timings)).interval
+        if not found.confidence:
+            return cls(found.value, None, None, None, len(timings))
+        return cls(found.value, found.low, found.high, found.confidence, len(timings))
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What is expected of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
+
+    bound: dict[str, str]
+    order: dict[str, tuple[float, float]]
+    limit: dict[str, str]
+    except_at: list[ExceptAt]
+    only: dict[str, list[float]]
+
+    @classmethod
+    def of(cls, row: Row) -> Claims:
+        """Those of a row of a comparison file."""
+        bound, limit = ({name: in_words(item) for name, item in found.items()} for found in (row.bound, row.limit))
+        return cls(bound, row.order, limit, row.except_at, row.only)
+
+
+def in_words(bound: Tolerance) -> str:
+    """A tolerance with its unit: ``1e-3 m``, ``0.1 % of its scale``."""
+    if bound.relative:
+        return f"{100 * bound.value:g} % of its scale"
+    return f"{number(bound.value, 6)} {unit(bound.unit)}".strip()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """An engine with settings: ``engine`` as the file writes it, and in the words of a person."""
+
+    engine: str
+    name: str
+    formulation: str | None
+    preset: str | None
+    setting: str
+    resolution: str | None
+    resolution_value: float | None
+    declared_order: int | None
+    caveat: str
+    precision: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorstJudgement(Judgement):
+    """The worst verdict over all points, among equals the one furthest beyond its tolerance, and its point.
+
+    Its error need not be the largest of all points, for tolerances may differ: that is ``largest``.
+    """
+
+    point: str
+    largest: float
+
+
+@dataclass(frozen=True)
+class CauseAt:
+    """A proven cause and the points at which it was found."""
+
+    cause: Diagnosis = field(metadata=MERGED)
+    points: list[str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportedRow(Setting):
+    """Summary of a row over the points of the parameters: the worst of everything."""
+
+    verdict: Verdict
+    verdicts: dict[str, int]
+    reason: str
+    limit: str
+    shared: str
+    missing: list[str]
+    remarks: list[str]
+    diagnosis: list[CauseAt]
+    expected: list[Verdict]
+    expected_for: dict[str, list[Verdict]]
+    because: str
+    tolerance: str
+    claims: Claims
+    as_expected: bool
+    observables: dict[str, WorstJudgement]
+    seconds_per_second: float | None
+    message: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportedRun(Setting):
+    """Everything about one run; ``row`` is the number of its row, ``own`` what its kind of scene tells of it."""
+
+    row: int
+    settings: dict[str, Any]
+    point: str
+    parameters: dict[str, float]
+    status: Status
+    message: str
+    verdict: Verdict
+    reason: str
+    limit: str
+    contradictions: list[str]
+    missing: list[str]
+    shared: str
+    diagnosis: list[Diagnosis]
+    judgements: list[Judgement]
+    certificate: list[dict[str, Any]]
+    seconds_per_second: float | None
+    build_seconds: float | None
+    timings: list[float]
+    cost: Cost | None
+    versions: dict[str, str]
+    trajectory: str | None
+    host: str
+    own: Any = field(default=None, metadata=MERGED)
+
+
+@dataclass(frozen=True)
+class ShownObservable:
+    """An observable of the scene, as a person reads it."""
+
+    unit: str
+    symbol: str
+    role: str
+    headline: bool
+    audit: bool
+
+
+@dataclass(frozen=True)
+class ShownBand:
+    """Tolerances in words, by observable."""
+
+    because: str
+    bounds: dict[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportedComparison:
+    """A comparison's findings: ``rows`` summarise each engine with settings, ``runs`` say everything of each run."""
+
+    name: str
+    title: str
+    question: str
+    scene: str
+    observables: dict[str, ShownObservable]
+    until: float
+    every: float
+    vary: dict[str, list[float]]
+    points: list[Any]
+    left_out: int
+    as_expected: bool
+    contradictions: list[str]
+    tolerances: dict[str, ShownBand]
+    rows: list[ReportedRow]
+    runs: list[ReportedRun]
+    hosts: dict[str, int]
+    evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
+
+    def runs_of(self, row: int) -> list[ReportedRun]:
+        """Those of one row."""
+        return [run for run in self.runs if run.row == row]
+
+    def lines(self) -> Iterator[tuple[str, ReportedRow, list[ReportedRun]]]:
+        """Each row with a short name, unlike that of any other, and its runs."""
+        for place, (name, row) in enumerate(zip(names(self.rows), self.rows, strict=True)):
+            yield name, row, self.runs_of(place)
+
+    def headlines(self, role: str) -> list[str]:
+        """Names of the observables that summaries show, of a role (:class:`proofroll.core.observable.Role`)."""
+        return [name for name, item in self.observables.items() if item.role == role and item.headline]

@@ -1,0 +1,168 @@
+"""What the numbers of a comparison say, in sentences. Written from the data alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from proofroll.core.events import EVENT_ORDER
+from proofroll.core.number_text import counted, number
+from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.scores import (
+    EVERYDAY,
+    RowAdvice,
+    Score,
+    cheapest,
+    closest,
+    furthest_off,
+    recommendation,
+    scores,
+)
+from proofroll.report.kinds import ReportKind
+from proofroll.report.labels import names, off_by, unjudged, with_caveat
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The answer in one paragraph, sentences, and what to use at each accuracy."""
+
+    answer: str
+    sentences: list[str]
+    recommendation: list[RowAdvice]
+
+
+def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Findings:
+    """What a comparison says; its kind of scene adds a sentence about its truths."""
+    found = scores(content)
+    return Findings(
+        _answer(content, found),
+        [
+            _closest(content),
+            _obvious(content, found),
+            *_order(content),
+            *(kind.sentences(truths) if kind is not None else ()),
+            _surprises(content),
+        ],
+        recommendation(found),
+    )
+
+
+def _answer(content: ReportedComparison, found: list[Score]) -> str:
+    """What agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
+    rows = content.rows
+    said = {
+        "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
+        "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
+        "incomplete": ("agrees", "agree", "without reporting all that is judged"),
+        "converges": ("needs", "need", "a finer step"),
+        "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
+        "another-scene": ("is", "are", "of another kind than the scene, so not judged"),
+        "not-judged": ("is", "are", "not judged, for there is no truth, or none exact enough for the tolerance"),
+        "refused": ("refuses", "refuse", "the scene, or some case of it, with the reason"),
+        "differs": ("differs", "differ", "somewhere, with no limit of small steps shown to be the truth"),
+        "failed": ("gives", "give", "no result somewhere"),
+    }
+    parts = []
+    for verdict, (one, many, rest) in said.items():
+        count = sum(row.verdict == verdict for row in rows)
+        if count:
+            parts.append(f"{count} {one if count == 1 else many} {rest}")
+    unexpected = len(content.contradictions)
+    expected = f"Not expected: {counted(unexpected, 'findings')}."
+    if content.as_expected:
+        expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
+    text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
+    best = cheapest(found, "worst", EVERYDAY)
+    if best:
+        cost = number(best.seconds_per_second)
+        text += f" For motion and forces to {100 * EVERYDAY:g} %, the cheapest is {best.name}: {cost} s of computing "
+        text += "per simulated second."
+    return text
+
+
+def _joined(parts: list[str]) -> str:
+    return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
+
+
+def _closest(content: ReportedComparison) -> str:
+    """What agrees best."""
+    best = closest(content)
+    if best is None:
+        return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
+    cost = "" if best.seconds is None else f", for {number(best.seconds)} s of computing per simulated second"
+    return (
+        f"Closest to the truth is {best.name}: its motion stays within {number(best.motion)} of each coordinate's "
+        f"range and its forces within {number(best.forces)} of the largest normal force{cost}; the truth's "
+        "own error bar is in these numbers."
+    )
+
+
+def _obvious(content: ReportedComparison, found: list[Score]) -> str:
+    """What a user pays for the obvious model: the default preset against the best of the same engine."""
+    rows = content.rows
+    worst: tuple[float, Score, Score] | None = None
+    lost: list[str] = []
+    for score in found:
+        row = rows[score.index]
+        others = [
+            other
+            for other in found
+            if rows[other.index].name == row.name and rows[other.index].preset != "default" and other.motion is not None
+        ]
+        if row.preset != "default" or not others:
+            continue
+        best = min(others, key=lambda other: other.motion or 0.0)
+        if score.motion is None:
+            if row.verdict != "refused":
+                lost.append(score.name)
+        elif best.motion and (worst is None or score.motion / best.motion > worst[0]):
+            worst = (score.motion / best.motion, score, best)
+    failed = f" {_joined(lost)} did not even finish everywhere." if lost else ""
+    if worst is None:
+        return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
+    factor, score, best = worst
+    blamed = with_caveat(score.name, rows[score.index].caveat)
+    off = furthest_off(content, content.runs_of(score.index))
+    assert off is not None  # its motion was scored
+    return (
+        f"The obvious model costs most with {blamed}: {off_by(off)}, which relative to the range is "
+        f"{number(factor, 1)} times the error of {best.name}.{failed}"
+    )
+
+
+def _order(content: ReportedComparison) -> list[str]:
+    """Who has other events than the truth, or in another order; nothing where no order was judged."""
+    judged = [
+        (run, judgement)
+        for run in content.runs
+        for judgement in run.judgements
+        if judgement.observable.partition(".")[0] == EVENT_ORDER and judgement.verdict != "ill-posed"
+    ]
+    if not judged:
+        return []
+    wrong: dict[int, int] = {}
+    for run, judgement in judged:
+        if judgement.verdict not in {"agrees", "unconfirmed"}:
+            wrong[run.row] = wrong.get(run.row, 0) + 1
+    if not wrong:
+        return ["Every setting has the truth's events in the truth's order, wherever that is well posed."]
+    shown = names(content.rows)
+    cases = {row: sum(run.row == row for run, _ in judged) for row in wrong}
+    said = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])
+    return [f"Events missing, added or of another kind than the truth's: {said}."]
+
+
+def _surprises(content: ReportedComparison) -> str:
+    """What contradicts the comparison's expectation."""
+    found = content.contradictions
+    if found:
+        more = f" (and {len(found) - 1} more, listed below)" if len(found) > 1 else ""
+        return f"Not expected: {found[0]}{more}."
+    known = [row for row in content.rows if row.verdict != "agrees"]
+    if not known:
+        return "Nothing contradicts what the comparison expects, and nothing disagrees with the truth."
+    return (
+        f"Nothing contradicts what the comparison expects; {len(known)} of {counted(len(content.rows), 'settings')} do "
+        "not agree, each for the reason that its row tells."
+    )

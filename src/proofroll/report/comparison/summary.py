@@ -1,0 +1,223 @@
+"""The records of a comparison (:mod:`proofroll.report.comparison.records`), made from what it found."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any
+
+from proofroll.core.plugins import parse_engine
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison.records import (
+    CauseAt,
+    Claims,
+    Cost,
+    ReportedComparison,
+    ReportedRow,
+    ReportedRun,
+    ShownBand,
+    ShownObservable,
+    WorstJudgement,
+    in_words,
+)
+from proofroll.report.labels import precision_words
+from proofroll.running.case import EngineFacts, Status, hosts
+from proofroll.running.environments import shown_name
+from proofroll.running.store import Store
+from proofroll.studies.comparison.outcome import SEVERITY, Outcome, Run
+from proofroll.studies.comparison.planning import at_point, point_name
+
+
+def outcome_content(outcome: Outcome) -> ReportedComparison:
+    """A comparison's findings."""
+    comparison = outcome.comparison
+    rows = by_row(outcome)
+    numbers = {key: number for number, key in enumerate(rows)}
+    return ReportedComparison(
+        name=comparison.name,
+        title=comparison.title,
+        question=comparison.question,
+        scene=comparison.scene,
+        observables={
+            name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
+            for name, item in load_scene(comparison.scene, **outcome.runs[0].parameters).observables.items()
+        },
+        until=comparison.until,
+        every=comparison.every,
+        vary=comparison.vary,
+        points=comparison.points,
+        left_out=comparison.left_out,
+        as_expected=not outcome.contradictions,
+        contradictions=outcome.contradictions,
+        tolerances={
+            name: ShownBand(band.because, {key: in_words(bound) for key, bound in band.bounds.items()})
+            for name, band in comparison.bands.items()
+        },
+        rows=[_row(runs) for runs in rows.values()],
+        runs=[_run(run, numbers[id(run.row)]) for run in outcome.runs],
+        hosts=hosts(run.result for run in outcome.runs),
+    )
+
+
+def runs_at(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run, Path]]:
+    """Number of the row, run and trajectory of every run at a point that has one."""
+    return [
+        (number, run, path)
+        for number, runs in enumerate(by_row(outcome).values())
+        for run in runs
+        if point_name(run.parameters) == point and run.case is not None and run.result.trajectory is not None
+        if (path := store.trajectory(run.case)).is_file()
+    ]
+
+
+def by_row(outcome: Outcome) -> dict[int, list[Run]]:
+    """The runs of each row of the comparison file, in the file's order."""
+    rows: dict[int, list[Run]] = {}
+    for run in outcome.runs:
+        rows.setdefault(id(run.row), []).append(run)
+    return rows
+
+
+def _row(runs: list[Run]) -> ReportedRow:
+    """Summary over the points of the parameters: the worst of everything."""
+    first = runs[0]
+    # A point at which the question is ill-posed, or has no answer, says nothing about an engine.
+    judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
+    names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
+    timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
+    reason, limit = _why(judged)
+    return ReportedRow(
+        **_settings(first),
+        verdict=max((run.verdict for run in judged), key=SEVERITY.index),
+        verdicts={verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
+        reason=reason,
+        limit=limit,
+        shared=next((run.shared for run in runs if run.shared), ""),
+        missing=sorted({name for run in runs for name in run.missing}),
+        remarks=_remarks(runs),
+        diagnosis=_diagnosis(runs),
+        expected=first.row.expect,
+        expected_for=first.row.expect_for,
+        because=first.row.because,
+        tolerance=first.row.tolerance,
+        claims=Claims.of(first.row),
+        as_expected=not any(run.contradictions for run in runs),
+        observables={name: _worst(judged, name) for name in names},
+        seconds_per_second=max(timings, default=None),
+        message=next((run.result.message for run in runs if run.result.status != Status.DONE), ""),
+    )
+
+
+def _why(runs: list[Run]) -> tuple[str, str]:
+    """Why the worst verdict: ``reason``, empty where everything agrees, and what the ladder says, ``limit``."""
+    worst = max((run.verdict for run in runs), key=SEVERITY.index)
+    guilty: list[tuple[Run, Judgement | None]] = []
+    for run in runs:
+        if run.verdict == worst:
+            guilty += [(run, item) for item in run.judgements] or [(run, None)]
+    run, judgement = _furthest(guilty)
+    where = at_point(run.parameters)
+    limit = judgement.limit.value if judgement else ""
+    if worst == Verdict.AGREES:
+        return "", limit
+    if worst == Verdict.INCOMPLETE:
+        return f"agrees, but does not report {', '.join(run.missing)}", limit
+    if worst == Verdict.REFUSED:  # the verdict says the rest
+        return f"{where.strip()}: {run.result.message}" if where else run.result.message, ""
+    if judgement is None or worst == Verdict.FAILED:
+        return f"{run.result.status}{where}: {run.result.message}", ""
+    return f"{judgement.observable}{where}: {judgement.reason}", limit
+
+
+def _remarks(runs: list[Run]) -> list[str]:
+    """What was remarked of the runs, and of the observable whose wrong limit is the largest part of its tolerance."""
+    found = list(dict.fromkeys(run.shared for run in runs if run.shared))
+    shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
+    if shown:
+        run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
+        where = at_point(run.parameters)
+        found += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
+    return found
+
+
+def _diagnosis(runs: list[Run]) -> list[CauseAt]:
+    """The causes that were proven at some point of the parameters, each told once, with the points."""
+    found: dict[str, CauseAt] = {}
+    for run in runs:
+        for item in run.diagnosis:
+            found.setdefault(item.cause.id, CauseAt(item, [])).points.append(point_name(run.parameters))
+    return list(found.values())
+
+
+def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:
+    """The worst verdict, among equals the one furthest beyond its tolerance."""
+
+    def badness(pair: tuple[Run, Judgement | None]) -> tuple[int, float]:
+        item = pair[1]
+        return (SEVERITY.index(item.verdict), item.error / item.tolerance) if item else (-1, 0.0)
+
+    return max(judged, key=badness)
+
+
+def _worst(runs: list[Run], name: str) -> WorstJudgement:
+    judged = [(run, next((item for item in run.judgements if item.observable == name), None)) for run in runs]
+    where, worst = _furthest(judged)
+    assert worst is not None  # some run has it, or the name would not be asked for
+    largest = max(judgement.error for _, judgement in judged if judgement is not None)
+    known = {item.name: getattr(worst, item.name) for item in dataclasses.fields(worst)}
+    return WorstJudgement(**known, point=point_name(where.parameters), largest=largest)
+
+
+def _setting(engine: str, facts: EngineFacts) -> str:
+    """The preset, whatever else the comparison file chose besides the step (``cone=pyramidal``), and f32."""
+    usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
+    chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
+    shown = [] if preset is None or (chosen and preset == "matched") else [preset]
+    return " ".join([*shown, *chosen, *precision_words(facts.precision)])
+
+
+def _settings(run: Run) -> dict[str, Any]:
+    """The fields of :class:`Setting`."""
+    facts = run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
+    return {
+        "engine": run.row.engine,
+        "name": shown_name(facts.name),
+        "formulation": facts.settings.get("formulation"),
+        "preset": facts.settings.get("preset"),
+        "setting": _setting(run.row.engine, facts),
+        "resolution": facts.resolution,
+        "resolution_value": facts.settings.get(facts.resolution or ""),
+        "declared_order": facts.order,
+        "caveat": facts.caveat,
+        "precision": facts.precision,
+    }
+
+
+def _run(run: Run, row: int) -> ReportedRun:
+    reason, limit = _why([run])
+    return ReportedRun(
+        row=row,
+        **_settings(run),
+        settings=run.facts.settings if run.facts else {},
+        point=point_name(run.parameters),
+        parameters=run.parameters,
+        status=run.result.status,
+        message=run.result.message,
+        verdict=run.verdict,
+        reason=reason,
+        limit=limit,
+        contradictions=run.contradictions,
+        missing=run.missing,
+        shared=run.shared,
+        diagnosis=run.diagnosis,
+        judgements=run.judgements,
+        certificate=run.result.certificate,
+        seconds_per_second=run.result.seconds_per_second,
+        build_seconds=run.result.build_seconds,
+        timings=run.result.timings,
+        cost=Cost.of(run.result.timings),
+        versions=run.result.versions,
+        trajectory=run.result.trajectory,
+        host=run.result.host,
+    )

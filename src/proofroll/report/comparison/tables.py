@@ -1,0 +1,142 @@
+"""The report's tables as rows: what is judged and expected, costs, tolerances, and why to believe a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from proofroll.core.certificate import Standing, not_reported
+from proofroll.core.number_text import number
+from proofroll.core.verdict import Judgement
+from proofroll.report.comparison.records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
+from proofroll.report.labels import names, symbol
+
+
+def observables(content: ReportedComparison) -> dict[str, str]:
+    """The judged observables with their units, in the order of the first row that has them all."""
+    units: dict[str, str] = {}
+    for row in sorted(content.rows, key=lambda row: -len(row.observables)):
+        for name, judgement in row.observables.items():
+            units.setdefault(name, judgement.unit)
+    return units
+
+
+@dataclass(frozen=True)
+class Expectation:
+    """Settings of which the same is expected; ``further``: claims besides the verdict."""
+
+    names: list[str]
+    tolerance: str
+    expected: str
+    because: str
+    further: tuple[str, ...]
+
+
+def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
+    """What is expected, settings with the same expectation together."""
+    groups: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
+    for name, row in zip(names(rows), rows, strict=True):
+        text = " or ".join(row.expected)
+        for observable, verdicts in row.expected_for.items():
+            text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
+        groups.setdefault((row.tolerance, text, row.because, tuple(_further(row.claims))), []).append(name)
+    return [Expectation(found, *said) for said, found in groups.items()]
+
+
+def _further(claims: Claims) -> list[str]:
+    """A row's claims besides its verdict, as sentences without a full stop."""
+    said = [f"{symbol(name)} within {bound}" for name, bound in claims.bound.items()]
+    said += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.order.items()]
+    said += [f"limit of {symbol(name)} within {bound}" for name, bound in claims.limit.items()]
+    said += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claims.except_at]
+    return [*said, f"run only at {_where(claims.only)}"] if claims.only else said
+
+
+def _where(values: Mapping[str, Sequence[float]]) -> str:
+    """Values of parameters: ``speed=2, mu_static=0.35 or 0.4``."""
+    return ", ".join(f"{name}={' or '.join(number(v, 6) for v in found)}" for name, found in values.items())
+
+
+def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedRun]]:
+    """For each timed row its name, its slowest and its fastest case."""
+    lines = []
+    for name, _, runs in content.lines():
+        timed = sorted((run.cost.median, at, run) for at, run in enumerate(runs) if run.cost)
+        if timed:
+            lines.append((name, timed[-1][-1], timed[0][-1]))
+    return lines
+
+
+def cost_interval(cost: Cost | None) -> str:
+    """The interval of a cost: ``0.011 to 0.013``; a dash where it was measured once or never."""
+    return "–" if not cost or cost.low is None else f"{number(cost.low)} to {number(cost.high)}"
+
+
+def cost_title(cost: Cost | None) -> str:
+    """What a cost is, in a sentence."""
+    if not cost:
+        return "not timed"
+    if cost.confidence is None:
+        return "one clean run, so no interval is known"
+    known = f"{100 * cost.confidence:.3g} %"
+    return f"median of {cost.runs} clean runs; {cost_interval(cost)} s/s holds it with {known}"
+
+
+def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Why some quantities of a certificate may differ by more than round-off: reason -> quantities."""
+    found: dict[str, list[str]] = {}
+    for line in certificate:
+        if line["because"]:
+            found.setdefault(line["because"], []).append(line["quantity"])
+    return found
+
+
+@dataclass(frozen=True)
+class Belief:
+    """Of the certificates of a row: how many lines hold, of how many, and the largest difference of round-off.
+
+    ``soft`` and ``silent`` are quantities that may differ, with a reason, and that are not reported.
+    """
+
+    name: str
+    held: int
+    total: int
+    difference: float | None
+    soft: list[str]
+    silent: list[str]
+    audit: Judgement | None
+
+
+def belief(content: ReportedComparison) -> list[Belief]:
+    """Why to believe it: for each row its certificates and its audit of reactions, the worst over all points."""
+    lines = []
+    audits = [name for name, item in content.observables.items() if item.audit]
+    for name, row, runs in content.lines():
+        lines_of_all = [line for run in runs for line in run.certificate]
+        certificate = [line for line in lines_of_all if line["standing"] != Standing.NOT_REPORTED]
+        exact = [line["difference"] for line in certificate if not line["because"] and line["difference"] is not None]
+        lines.append(
+            Belief(
+                name,
+                sum(bool(line["holds"]) for line in certificate),
+                len(certificate),
+                max(filter(math.isfinite, exact), default=None),
+                list(dict.fromkeys(line["quantity"] for line in certificate if line["because"])),
+                list(dict.fromkeys(not_reported(lines_of_all))),
+                next((row.observables[item] for item in audits if item in row.observables), None),
+            )
+        )
+    return lines
+
+
+def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
+    """Name of each row with a proven cause of its difference, the cause, and what to do."""
+    found = ((name, told.cause) for name, row, _ in content.lines() for told in row.diagnosis)
+    return [(name, cause.sentence, cause.cause.remedy) for name, cause in found]
+
+
+def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
+    """What was remarked of each row, with its name."""
+    return [(name, text) for name, row, _ in content.lines() for text in row.remarks]

@@ -1,0 +1,104 @@
+"""The matrix of verdicts: for each setting and observable a cell with verdict, error and a link to its evidence."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from proofroll.core.number_text import counted as told
+from proofroll.core.number_text import error, number
+from proofroll.core.verdict import Judgement
+from proofroll.report.comparison.records import Cost, ReportedComparison, ReportedRow, ReportedRun
+from proofroll.report.comparison.tables import observables
+from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_text
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A judgement with a link to its evidence; ``point``: where it was judged, if the matrix is of several points."""
+
+    judgement: Judgement
+    href: str
+    point: str = ""
+
+    @property
+    def title(self) -> str:
+        """All about it: with error bar, tolerance, and what the ladder of steps says, where there is one."""
+        found = self.judgement
+        said = (
+            f"{symbol(found.observable)} {found.verdict}: error {error(found.error)} ± "
+            f"{number(found.truth_error_bar, 1)} {unit(found.unit)}, tolerance {number(found.tolerance)}"
+        )
+        if self.point:
+            said += f" at {self.point}"
+        if found.limit_error_bar is None:
+            return said
+        off = f"{error(found.limit_error)} ± {error(found.limit_error_bar, 1)}"
+        return f"{said}; {found.limit}: off by {off}, order {number(found.order)}"
+
+
+@dataclass(frozen=True)
+class MatrixLine:
+    """A row or a run with its cells by observable, a link to its evidence, and what happened where it failed."""
+
+    of: ReportedRow | ReportedRun
+    cells: dict[str, Cell]
+    verdict_text: str
+    href: str
+    message: str
+    as_expected: bool
+    cost: Cost | None
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """The unit of each column by its observable, and the lines by engine."""
+
+    columns: dict[str, str]
+    groups: dict[str, list[MatrixLine]]
+
+
+def anchor(comparison: int, row: int, point: int) -> str:
+    """Id of the evidence of one row at one point."""
+    return f"c{comparison}-r{row}-p{point}"
+
+
+def overview(content: ReportedComparison, comparison: int) -> Matrix:
+    """The verdict matrix: the worst of every row over all points."""
+    points = list(dict.fromkeys(run.point for run in content.runs))
+    lines = []
+    for index, row in enumerate(content.rows):
+        runs = content.runs_of(index)
+        worst = next((run for run in runs if run.verdict == row.verdict), runs[0])
+        slowest = (run.cost for run in runs if run.cost and run.seconds_per_second == row.seconds_per_second)
+        hrefs = {point: anchor(comparison, index, number) for number, point in enumerate(points)}
+        cells = {name: Cell(item, hrefs[item.point], item.point) for name, item in row.observables.items()}
+        shown = (verdict_text(row), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
+        lines.append(MatrixLine(row, cells, *shown))
+    return _matrix(content, lines)
+
+
+def counted(content: ReportedComparison) -> str:
+    """How many settings have which verdict, in one line."""
+    verdicts = [row.verdict.value for row in content.rows]
+    said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
+    found = "nothing is contradicted" if unjudged(content) else "as expected"
+    return f"{told(len(verdicts), 'settings')}: {said}; {found if content.as_expected else 'not as expected'}"
+
+
+def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:
+    """The verdict matrix of one point of the parameters."""
+    lines = []
+    for run in content.runs:
+        if run.point == name:
+            href = anchor(comparison, run.row, point)
+            cells = {judgement.observable: Cell(judgement, href) for judgement in run.judgements}
+            message = run.message if run.status != "done" else ""
+            lines.append(MatrixLine(run, cells, run.verdict, href, message, not run.contradictions, run.cost))
+    return _matrix(content, lines)
+
+
+def _matrix(content: ReportedComparison, lines: list[MatrixLine]) -> Matrix:
+    groups: dict[str, list[MatrixLine]] = {}
+    for line in lines:
+        groups.setdefault(line.of.name, []).append(line)
+    return Matrix(observables(content), groups)

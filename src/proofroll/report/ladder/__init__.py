@@ -1,0 +1,1 @@
+"""Ladder of models as records, sentences and tables."""

@@ -1,0 +1,253 @@
+"""What ``proofroll ladder`` says: as records and in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from proofroll.core.arrays import largest_difference
+from proofroll.core.errors import ProofrollError
+from proofroll.core.number_text import number
+from proofroll.files.json_data import MERGED
+from proofroll.running.case import EngineDescription, Status
+from proofroll.running.timing import Interval, machine, ratio
+from proofroll.studies.ladder.ladder import Ladder, absence, key_of
+from proofroll.studies.ladder.models import LadderModel, Need, Ran, Rung, Switch, need_of_term
+from proofroll.studies.tradeoff.pareto import front
+
+
+@dataclass(frozen=True)
+class RungFound:
+    """A rung of the ladder; ``status`` is ``empty`` where no engine has a model of the level."""
+
+    level: str
+    variant: str
+    engine: str | None
+    formulation: str | None
+    preset: str | None
+    ran: Ran = field(metadata=MERGED)
+    resolution: str | None = None
+    resolution_value: float | None = None
+
+
+@dataclass(frozen=True)
+class SideFound:
+    """A model with a term, or without it."""
+
+    parameters: dict[str, float]
+    asks: list[str]
+    ran: Ran = field(metadata=MERGED)
+
+
+@dataclass(frozen=True)
+class TermFound:
+    """A term of a model, held against the truth of the scene with it.
+
+    Attributes:
+        term, kind, engine, formulation, because: see :class:`Switch`.
+        verdict: what it is worth.
+        reason: why.
+        on, off: with it and without.
+        cost: how many times longer it takes with it.
+        change: of the quantity when it is left out.
+        error_change: error without it less error with it.
+    """
+
+    term: str
+    kind: str
+    engine: str
+    formulation: str
+    because: str
+    verdict: Need
+    reason: str
+    on: SideFound | None = None
+    off: SideFound | None = None
+    cost: Interval | None = None
+    change: float | None = None
+    error_change: float | None = None
+
+
+@dataclass(frozen=True)
+class KnownTruth:
+    """Where the truth comes from, and its error bar."""
+
+    route: str | None
+    error_bar: float
+
+
+@dataclass(frozen=True)
+class Absence:
+    """How an engine is not there, and why."""
+
+    status: str
+    message: str
+
+
+@dataclass(frozen=True)
+class LadderContent:
+    """The question, what was found, and ``findings`` in sentences; ``unplaced``: engines that tell no levels."""
+
+    scene: str
+    parameters: dict[str, float]
+    quantity: str
+    unit: str
+    scale: float | None
+    tolerance: float | None
+    until: float
+    truth: KnownTruth
+    rungs: list[RungFound]
+    terms: list[TermFound]
+    absent: dict[str, Absence]
+    unplaced: list[str]
+    machine: dict[str, str]
+    findings: list[str]
+
+
+def ladder_content(study: Ladder) -> LadderContent:
+    """The study as records."""
+    truth = study.truths[str({})]
+    content = LadderContent(
+        scene=study.scene.name,
+        parameters=dict(study.scene.parameters),
+        quantity=study.quantity,
+        unit=study.unit,
+        scale=truth.sizes.get(study.quantity),
+        tolerance=study.tolerance,
+        until=study.until,
+        truth=KnownTruth(truth.dataset.attrs.get("route"), study.true({})[1]),
+        rungs=[_rung(study, rung) for rung in study.ladder],
+        terms=[_term(study, switch) for switch in study.switches],
+        absent={
+            name: Absence(absence(told).status.value, str(told))
+            for name, told in study.engines.items()
+            if isinstance(told, ProofrollError)
+        },
+        unplaced=[
+            name for name, told in study.engines.items() if isinstance(told, EngineDescription) and not told.levels
+        ],
+        machine=machine(),
+        findings=[],
+    )
+    return replace(content, findings=list(_findings(content)))
+
+
+def _rung(study: Ladder, rung: Rung) -> RungFound:
+    model = rung.model
+    if model is None:
+        return RungFound(rung.level.value, rung.variant, None, None, None, Ran(None, "empty", rung.message, None, None))
+    case = study.answers[key_of(model)].case
+    resolution = case.engine.resolution if case else None
+    value = case.engine.settings.get(resolution) if case and resolution else None
+    preset, ran = model.options["preset"], _ran(study, model, {})
+    return RungFound(rung.level.value, rung.variant, model.engine, model.formulation, preset, ran, resolution, value)
+
+
+def _ran(study: Ladder, model: LadderModel, point: dict[str, float]) -> Ran:
+    answer = study.answers[key_of(model)]
+    message = answer.result.message
+    if answer.result.status == Status.DONE and answer.values is None:
+        message = f"the engine does not give {study.quantity}"
+    return Ran(
+        answer.case.engine.settings if answer.case else None,
+        answer.result.status.value,
+        message,
+        study.error(model, point),
+        answer.timing.interval if answer.timing else None,
+    )
+
+
+def _term(study: Ladder, switch: Switch) -> TermFound:
+    said = (switch.term, switch.kind, switch.model.engine, switch.model.formulation, switch.because)
+    if switch.on is None or switch.off is None:
+        return TermFound(*said, Need.INHERENT, f"cannot be left out: {switch.because}")
+    point = dict(switch.on.parameters)
+    on, off = (
+        SideFound(dict(model.parameters), list(model.asks), _ran(study, model, point))
+        for model in (switch.on, switch.off)
+    )
+    with_it, without = study.answers[key_of(switch.on)], study.answers[key_of(switch.off)]
+    cost = ratio(with_it.timing, without.timing) if with_it.timing and without.timing else None
+    change = error_change = None
+    if with_it.values is not None and without.values is not None:
+        change = largest_difference(with_it.values, without.values)
+    if on.ran.error is not None and off.ran.error is not None:
+        error_change = off.ran.error - on.ran.error
+    verdict, reason = need_of_term(
+        on.ran,
+        off.ran,
+        change,
+        cost,
+        tolerance=study.tolerance,
+        bar=study.true(point)[1],
+        scale=study.truths[str({})].sizes.get(study.quantity, 1.0),
+    )
+    return TermFound(*said, verdict, reason, on, off, cost, change, error_change)
+
+
+def label(row: RungFound | TermFound) -> str:
+    """The engine, its formulation, and what distinguishes a variant of it."""
+    variant = row.variant if isinstance(row, RungFound) else ""
+    return " ".join(filter(None, (row.engine, row.formulation, variant)))
+
+
+def _findings(content: LadderContent) -> Iterator[str]:
+    """What to take home, in sentences."""
+    name, unit = content.quantity, content.unit
+    empty = [rung.level for rung in content.rungs if rung.ran.status == "empty"]
+    if empty:
+        yield f"No engine that was asked has a model of the level {', '.join(empty)}."
+    # A rung that is off by the whole size of the quantity has no answer, however cheap.
+    useful = [
+        (rung, rung.ran.seconds_per_second.value, rung.ran.error)
+        for rung in content.rungs
+        if rung.ran.error is not None and rung.ran.seconds_per_second and rung.ran.error < (content.scale or math.inf)
+    ]
+    if useful:
+        said = "; ".join(f"{label(rung)} ({number(rung.ran.error)} {unit})" for rung in front(useful))
+        yield f"Nothing is both cheaper and nearer to the true {name} than, from the cheapest on: {said}."
+    if content.tolerance is not None:
+        yield _cheapest(useful, content.tolerance, f"{content.tolerance:g} {unit}")
+    yield from _of_terms(content)
+    for rung in content.rungs:
+        if rung.ran.status not in {"done", "empty"} and not rung.variant:  # those are among the terms
+            yield f"{label(rung)} {rung.ran.status}: {rung.ran.message}."
+    for engine, told in content.absent.items():
+        yield f"{engine} is {told.status}: {told.message}."
+    if content.unplaced:
+        yield f"Not on the ladder, for they tell no levels: {', '.join(content.unplaced)}."
+
+
+def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, said: str) -> str:
+    """The cheapest rung within a tolerance."""
+    within = [entry for entry in useful if entry[2] <= tolerance]
+    if not within:
+        return f"No rung is within {said} at its own step."
+    best, _, error = min(within, key=lambda entry: entry[1])
+    return f"The cheapest within {said} is {label(best)} ({best.level}), off by {number(error)}."
+
+
+def _of_terms(content: LadderContent) -> Iterator[str]:
+    """One sentence per term and verdict, over all models."""
+    name, unit = content.quantity, content.unit
+    groups: dict[tuple[str, Need], list[TermFound]] = {}
+    for found in content.terms:
+        groups.setdefault((found.term, found.verdict), []).append(found)
+    for (term, verdict), rows in groups.items():
+        where = ", ".join(label(row) for row in rows)
+        largest = max((row.change for row in rows if row.change is not None), default=None)
+        match verdict:
+            case Need.NEEDED if largest is not None:
+                yield f"{term} is needed in {where}: leaving it out moves {name} by up to {number(largest)} {unit}."
+            case Need.NEEDED:
+                yield f"{term} is needed in {where}: {rows[0].reason}."
+            case Need.HARMFUL:
+                yield f"{term} moves {name} away from the truth in {where}, by up to {number(largest)} {unit}."
+            case Need.NOT_NEEDED:
+                times = ", ".join(f"{label(row)} ({row.cost.value:.2f}×)" for row in rows if row.cost)
+                most = f"{name} moves by {number(largest, 1)} {unit} at most"
+                yield f"{term} is paid for but not needed in {times}: {most}."
+            case Need.INHERENT:
+                yield f"{term}: it cannot be left out of {where}."
+            case Need.NO_ANSWER:
+                yield f"{term}: {label(rows[0])} {rows[0].reason.removeprefix('with it: ')}."

@@ -1,0 +1,141 @@
+"""A report while it grows: written after the comparisons, and again after each further study."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+from proofroll.core.errors import ProofrollError
+from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
+from proofroll.report.comparison.plots import PointCurves, point_curves
+from proofroll.report.kinds import kind_of
+from proofroll.report.page.html import page
+from proofroll.report.page.records import ReportContent, Sentences, report_content
+from proofroll.report.page.summary import three_sentences
+from proofroll.report.parts import Part, PartEntry, absent, attempt
+from proofroll.report.replay.records import Replay
+from proofroll.report.replay.replay import joined, replay_content
+from proofroll.running.store import Store, write_text
+from proofroll.studies.comparison.outcome import Outcome
+
+
+@dataclass
+class Report:
+    """What the files are written from.
+
+    Attributes:
+        compared: what it says of the comparisons.
+        curves: of each comparison, for the figures.
+        replay: of the comparisons, as their kind of element gives it.
+        parts: the further studies, in the order of the content's lists.
+        pictures: markup by name.
+    """
+
+    compared: ReportContent
+    curves: list[list[PointCurves]]
+    replay: Replay | None
+    parts: list[Part] = field(default_factory=list)
+    pictures: dict[str, str] = field(default_factory=dict)
+    _said: dict[int, PartEntry] = field(default_factory=dict)
+
+    @property
+    def content(self) -> ReportContent:
+        """What it says, with the further studies that there are so far."""
+        said = [(part.key, self._said[id(part)]) for part in self.parts if id(part) in self._said]
+        entries = {key: [entry for other, entry in said if other == key] for key in self.compared.entries}
+        environment = self.compared.environment
+        for _, entry in said:
+            if isinstance(entry.study, dict):  # of a kept study the versions are those of now
+                environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
+        findings = Sentences(three_sentences(self.compared.comparisons, entries))
+        return replace(self.compared, entries=entries, findings=findings, environment=environment)
+
+    def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
+        """Lists further studies with what is kept of them in the folder of all results, unless it is made ``fresh``.
+
+        Returns:
+            those that have to be made.
+        """
+        self.parts = sorted(parts, key=lambda part: part.order)
+        missing = []
+        for part in self.parts:
+            said = attempt(part, partial(part.keeps, out)) if not fresh else None
+            if said is None:
+                missing.append(part)
+                said = absent(part, "It has not been made yet")
+            self._put(part, said)
+        return missing
+
+    def make(self, part: Part, how: Callable[[], None]) -> PartEntry:
+        """Makes a further study; whatever happens to it, its entry says."""
+        said = attempt(part, how)
+        assert said is not None  # it was made, or the entry says why not
+        self._put(part, said)
+        return said
+
+    def write(self, out: Path) -> None:
+        """Writes ``report.html`` and ``report.json``.
+
+        Raises:
+            ProofrollError: the folder cannot be written.
+        """
+        content = self.content
+        write_text(out / "report.json", json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+        write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
+
+    def _put(self, part: Part, said: PartEntry) -> None:
+        self._said[id(part)] = said
+        if said.study is not None:
+            alike = [id(other) for other in self.parts if other.key == part.key]
+            prefix = f"{part.key}{alike.index(id(part))}-"
+            self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
+
+
+def begun(
+    outcomes: list[Outcome], store: Store, command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()
+) -> Report:
+    """A report of comparisons, to which further studies can be added.
+
+    Args:
+        outcomes: what was compared.
+        store: where the trajectories are: a folder in that of the report.
+        command: that makes the report again.
+        awaited: titles of comparisons that are still being run.
+        left_out: names of comparisons that are not in it.
+    """
+    replay = _replay(outcomes, store)
+    described = [case.described for case in replay.cases] if replay else []
+    content = report_content(outcomes, store, command)
+    content = replace(content, replay=described, awaited=list(awaited), left_out=list(left_out))
+    return Report(content, [point_curves(outcome, store) for outcome in outcomes], replay)
+
+
+def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> ReportContent:
+    """Writes ``report.html`` and ``report.json`` of comparisons alone into a folder, and returns their content.
+
+    The rest is as for :func:`begun`. Raises ProofrollError if the folder cannot be written.
+    """
+    report = begun(outcomes, store, command)
+    report.write(out)
+    return report.content
+
+
+def _replay(outcomes: list[Outcome], store: Store) -> Replay | None:
+    """The replay of the comparisons, one kind of scenes after the other."""
+    kinds = {id(item): kind_of(load_scene(item.comparison.scene)) for item in outcomes}
+    found = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
+    return joined(
+        [replay_content([item for item in outcomes if kinds[id(item)] is kind], store, kind.replay()) for kind in found]
+    )
+
+
+def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:
+    """Pictures by prefix and name; where they cannot be drawn, under ``problem`` a sentence that says why."""
+    try:
+        return {f"{prefix}{name}": markup for name, markup in draw().items()}
+    except ProofrollError as error:
+        return {f"{prefix}problem": str(error)}

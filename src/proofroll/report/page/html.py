@@ -1,0 +1,150 @@
+"""The report's page: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import json
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from proofroll.core import number_text
+from proofroll.core.errors import InputError
+from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
+from proofroll.report import labels
+from proofroll.report.comparison import tables, verdict_matrix
+from proofroll.report.kinds import ReportKind, kind_of, report_kinds
+from proofroll.report.pages import environment, packed, rendered
+from proofroll.report.parts import Part, part_kinds
+from proofroll.report.styles import OUTLINES, styles
+from proofroll.running.case import told_hosts
+
+if TYPE_CHECKING:
+    import jinja2
+    import markupsafe
+
+    from proofroll.report.comparison.plots import PointCurves
+    from proofroll.report.comparison.records import ReportedComparison, ReportedRun
+    from proofroll.report.page.records import ReportContent
+    from proofroll.report.replay.records import Replay
+
+_EXPONENT = re.compile(r"\d[\d.]*e-\d+")
+
+
+def page(
+    content: ReportContent,
+    curves: Sequence[Sequence[PointCurves]],
+    pictures: Mapping[str, str] = MappingProxyType({}),
+    replay: Replay | None = None,
+) -> str:
+    """The HTML page.
+
+    Args:
+        content: from :func:`proofroll.report.page.records.report_content`.
+        curves: from :func:`proofroll.report.comparison.plots.point_curves`, one list for each comparison.
+        pictures: of the further studies, markup by name; what is not there is left out.
+        replay: as the comparisons' kind of element gives it; None: the page has none.
+    """
+    drawn = {
+        "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
+        "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
+    }
+    return rendered(
+        templates(),
+        "page.html",
+        content=content,
+        curves=curves,
+        pictures=pictures,
+        styles=[styles(comparison.rows) for comparison in content.comparisons],
+        replay=replay,
+        replay_scripts=[kind.replay_script for kind in report_kinds() if kind.replay_script],
+        data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
+        plotly=_plotly(),
+    )
+
+
+def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
+    """The curves with what the scene's kind of element marks on them."""
+    kind = _kind(comparison)
+    return curves if kind is None else kind.mark(comparison, curves)
+
+
+def _kind(comparison: ReportedComparison) -> type[ReportKind] | None:
+    """What shows more of a comparison's scene; None: nothing, or the data are of a scene that is not here."""
+    try:
+        return kind_of(load_scene(comparison.scene))
+    except InputError:
+        return None
+
+
+@functools.cache
+def _plotly() -> str:
+    """The program that draws, compressed."""
+    import plotly.offline
+
+    return packed(plotly.offline.get_plotlyjs().encode())
+
+
+def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
+    rows = comparison.rows
+    return [{"name": name, **vars(style)} for name, style in zip(labels.names(rows), styles(rows), strict=True)]
+
+
+def templates() -> jinja2.Environment:
+    """The templates of the report, with the names that they use; each is compiled once in a process."""
+    return _templates(part_kinds() + report_kinds())
+
+
+@functools.cache
+def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Environment:
+    made = environment(*(Path(inspect.getfile(kind)).parent / "templates" for kind in kinds))
+    made.filters |= {
+        "number": number_text.number,
+        "error": number_text.error,
+        "symbol": labels.symbol,
+        "unit": labels.unit,
+        "values": labels.values,
+        "settings": labels.settings_text,
+        "name_of": labels.name_of,
+        "unbroken": _unbroken,
+        "plain": plain,
+    }
+    made.globals |= {
+        "tables": tables,
+        "verdict_matrix": verdict_matrix,
+        "names": labels.names,
+        "step": labels.step,
+        "detail": labels.detail,
+        "setting": labels.setting,
+        "caveats": labels.caveat_lines,
+        "symbols": labels.SYMBOLS,
+        "meanings": labels.MEANINGS,
+        "outlines": OUTLINES,
+        "again": _again,
+        "told_hosts": told_hosts,
+        "part_kinds": part_kinds(),
+        "kind_of": _kind,
+    }
+    for kind in kinds:
+        made.globals |= kind.names
+    return made
+
+
+def _unbroken(text: str) -> markupsafe.Markup:
+    """A sentence in which no line ends within a number such as ``1e-3``, where browsers see a hyphen."""
+    import markupsafe
+
+    return markupsafe.Markup(_EXPONENT.sub(r'<span class="whole">\g<0></span>', str(markupsafe.escape(text))))
+
+
+def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
+    """The command that makes one run again."""
+    words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
+    for name, value in run.parameters.items():
+        words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]
+    return shlex.join([*words, "--until", f"{comparison.until:g}", "--every", f"{comparison.every:g}"])

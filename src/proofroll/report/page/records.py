@@ -1,0 +1,184 @@
+"""All that the report says, as records."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from typing import Any
+
+import proofroll
+from proofroll.files.json_data import MERGED, OPTIONAL
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.report.comparison.growth import Growth, growth
+from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.sentences import Findings, findings
+from proofroll.report.comparison.summary import outcome_content
+from proofroll.report.kinds import kind_of
+from proofroll.report.page.scene_sheet import SceneSheet, scene_sheet
+from proofroll.report.page.summary import three_sentences
+from proofroll.report.parts import PartEntry, part_kinds
+from proofroll.running.store import Store
+from proofroll.running.timing import machine
+from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.findings import load_findings
+
+
+@dataclass(frozen=True)
+class ErrorBar:
+    """How well the truth knows a quantity."""
+
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class ReportedTruth:
+    """Where the truth at a point comes from and how well it is known; ``own``: what its kind of scene tells of it.
+
+    Without a trajectory there are no routes and no error bars.
+    """
+
+    point: str
+    parameters: dict[str, float]
+    trajectory: str
+    wall_seconds: float | None
+    route: str | None = field(default=None, metadata=OPTIONAL)
+    second_route: str | None = field(default=None, metadata=OPTIONAL)
+    error_bars: dict[str, ErrorBar] | None = field(default=None, metadata=OPTIONAL)
+    own: Any = field(default=None, metadata=MERGED)
+
+
+@dataclass(frozen=True)
+class ComparisonEvidence:
+    """What a report has of a comparison besides its verdicts."""
+
+    truths: list[ReportedTruth]
+    sheet: SceneSheet
+    findings: Findings
+    growth: Growth | None
+
+
+@dataclass(frozen=True)
+class MadeWith:
+    """Where and with what a report was made."""
+
+    command: str
+    machine: str
+    versions: dict[str, str]
+
+
+@dataclass(frozen=True)
+class KnownFinding:
+    """What is known of an engine."""
+
+    name: str
+    engine: str
+    title: str
+    seen: str
+    gone: str
+
+
+@dataclass(frozen=True)
+class Sentences:
+    """Three, for the whole report."""
+
+    sentences: list[str]
+
+
+@dataclass(frozen=True)
+class ReportContent:
+    """All that the report says.
+
+    Attributes:
+        date: when it was written.
+        comparisons: in their order.
+        awaited: titles of comparisons that are still being run.
+        left_out: names of the comparisons that a report of all studies leaves out.
+        engine_findings: what is known of engines.
+        entries: of further studies, by the key of their kind.
+        environment: where and with what it was made.
+        replay: its cases without their numbers, which follow from the trajectories that they name.
+    """
+
+    date: str
+    comparisons: list[ReportedComparison]
+    awaited: list[str]
+    left_out: list[str]
+    engine_findings: list[KnownFinding]
+    entries: Mapping[str, Sequence[PartEntry]] = field(metadata=MERGED)
+    environment: MadeWith
+    findings: Sentences
+    replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
+
+    @property
+    def further(self) -> list[PartEntry]:
+        """The entries of all further studies."""
+        return [item for kind in part_kinds() for item in self.entries.get(kind.key, ())]
+
+
+def report_content(outcomes: list[Outcome], store: Store, command: str) -> ReportContent:
+    """All that a report of comparisons says; paths of files are relative to its folder."""
+    comparisons = [_comparison(outcome, store) for outcome in outcomes]
+    facts = machine()
+    versions = {"proofroll": proofroll.__version__, "python": platform.python_version()}
+    for run in (run for outcome in outcomes for run in outcome.runs):
+        versions |= run.result.versions
+    entries: dict[str, list[PartEntry]] = {kind.key: [] for kind in part_kinds()}
+    return ReportContent(
+        datetime.now(UTC).isoformat(timespec="seconds"),
+        comparisons,
+        [],
+        [],
+        [KnownFinding(item.name, item.engine, item.title, item.seen, item.gone) for item in load_findings()],
+        entries,
+        MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
+        Sentences(three_sentences(comparisons, entries)),
+    )
+
+
+def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
+    """A comparison's content with its truths, what its kind of scene tells of each run, claims, costs and findings."""
+    content, truths = outcome_content(outcome), _truths(outcome, store)
+    kind = kind_of(load_scene(outcome.comparison.scene))
+    facts = kind.run_facts(truths, outcome.runs, store) if kind is not None else [None] * len(outcome.runs)
+    runs = [
+        dataclasses.replace(run, trajectory=run.trajectory and f"{store.folder.name}/{run.trajectory}", own=own)
+        for run, own in zip(content.runs, facts, strict=True)
+    ]
+    content = dataclasses.replace(content, runs=runs)
+    sheet = scene_sheet(outcome.comparison.scene, [case.parameters for case in outcome.truths.values()])
+    evidence = ComparisonEvidence(truths, sheet, findings(content, truths, kind), growth(content, truths))
+    return dataclasses.replace(content, evidence=evidence)
+
+
+def _truths(outcome: Outcome, store: Store) -> list[ReportedTruth]:
+    """For each point where the truth comes from and how well it is known."""
+    found = []
+    for name, case in outcome.truths.items():
+        path, result = store.trajectory(case), store.get(case)
+        entry = ReportedTruth(
+            name,
+            case.parameters,
+            f"{store.folder.name}/{path.name}",
+            None if result is None else result.wall_seconds,
+        )
+        if path.is_file():
+            dataset, scene = read(path), load_scene(case.scene, **case.parameters)
+            observables, kind = scene.observables, kind_of(scene)
+            entry = dataclasses.replace(
+                entry,
+                route=dataset.attrs.get("route", ""),
+                second_route=dataset.attrs.get("second_route", ""),
+                error_bars={
+                    str(key): ErrorBar(float(curve.attrs["error_bar"]), curve.attrs["units"])
+                    for key, curve in dataset.data_vars.items()
+                    if (curve.dims == ("time",) or key in observables) and "error_bar" in curve.attrs
+                },
+                own=kind.truth_facts(scene, dataset) if kind is not None else None,
+            )
+        found.append(entry)
+    return found

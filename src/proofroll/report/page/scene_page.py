@@ -1,0 +1,18 @@
+"""A scene at its start as one page: how it starts, its drawing and its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from proofroll.report.page.scene_sheet import scene_sheet
+from proofroll.report.pages import environment, rendered
+
+
+def scene_page(scene: str, start: Sequence[str]) -> str:
+    """The page; everything from the scene's file is escaped.
+
+    Args:
+        scene: its name, or the path of its folder or file.
+        start: sentences about how it starts.
+    """
+    return rendered(environment(), "scene_page.html", sheet=scene_sheet(scene, []), start=start)

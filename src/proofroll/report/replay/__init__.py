@@ -1,0 +1,1 @@
+"""Replay of motions: records packed for the page, and the library that draws them."""

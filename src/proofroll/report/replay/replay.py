@@ -1,0 +1,155 @@
+"""The replay: which cases and which runs it shows, and their numbers packed for the page. Kinds of scenes draw them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from proofroll.core.arrays import FloatArray
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read_some
+from proofroll.report.comparison.summary import outcome_content, runs_at
+from proofroll.report.labels import names
+from proofroll.report.pages import packed
+from proofroll.report.replay.library import three
+from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayedRun, ReplayKind
+from proofroll.report.styles import styles
+from proofroll.running.case import Case, Status
+from proofroll.running.store import Store
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import point_name
+
+# Frames per second of the motion that no eye misses, the fewest of a replay that is slowed down, and the most that it
+# keeps where that is enough.
+LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
+# A body's turn from one frame to the next [rad]: what is smooth, and what must never be passed, for beyond half a
+# turn the shorter way from one orientation to the next is the wrong one.
+SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
+
+
+def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> Replay:
+    """Everything that the replay draws of comparisons, all of scenes of one kind.
+
+    There is one case for each truth of the comparisons. Its ghosts are what the engines make of it with ``default``
+    settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
+    first, of each engine the ``default`` one is shown that is furthest off.
+    """
+    found: dict[str, tuple[Case, list[tuple[Outcome, str]]]] = {}
+    for outcome in outcomes:
+        for point, case in outcome.truths.items():
+            if store.trajectory(case).is_file():
+                found.setdefault(case.key, (case, []))[1].append((outcome, point))
+    looks = {id(outcome): _looks(outcome) for outcome in outcomes}
+    cases, numbers = [], []
+    for case, shared in found.values():
+        scene = load_scene(case.scene, **case.parameters)
+        true = read_some(store.trajectory(case), ["p_WB"])["p_WB"]
+        ghosts = [
+            ghost
+            for outcome, point in shared
+            for ghost in _ghosts(runs_at(outcome, point, store), looks[id(outcome)], true)
+        ]
+        ghosts = _chosen(ghosts, kind.seen(scene))
+        # The comparison that has most to show at this point names the case.
+        title = max(shared, key=lambda pair: len(runs_at(pair[0], pair[1], store)))[0].comparison.title
+        replayed = Replayed(scene, store.trajectory(case), ghosts, title, point_name(case.parameters) or scene.title)
+        content, packed_numbers = case_content(replayed, kind, lambda file: f"{store.folder.name}/{file.name}")
+        cases.append(content)
+        numbers.append(packed_numbers)
+    plainest = [load_scene(case.scene, asks=case.asks).digest == case.scene_digest for case, _ in found.values()]
+    start = plainest.index(True) if any(plainest) else 0
+    return Replay(three(), start, cases, numbers)
+
+
+def joined(parts: list[Replay]) -> Replay | None:
+    """The replays of several kinds of scenes as one; the first begins. None where there is nothing to draw."""
+    parts = [part for part in parts if part.cases]
+    if not parts:
+        return None
+    cases, numbers = [case for part in parts for case in part.cases], [item for part in parts for item in part.packed]
+    return replace(parts[0], cases=cases, packed=numbers)
+
+
+def frame_times(until: float, fastest: float) -> FloatArray:
+    """Evenly spaced times of the frames [s], shape (n,): so many that the fastest body is seen to turn the right way.
+
+    Args:
+        until: the last time [s].
+        fastest: largest angular velocity of the truth [rad/s].
+    """
+    turned = until * fastest
+    wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN, LEAST_FRAMES)
+    return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
+
+
+def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], str]) -> tuple[ReplayCase, str]:
+    """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed.
+
+    ``named`` gives what the page calls a file.
+    """
+    own, frames, drawn = kind.draw(replayed)
+    first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
+    until, whole = own["until"], own["frames"]
+    runs = [
+        ReplayedRun("truth", -1, True, whole, "", named(replayed.file)),
+        *(
+            ReplayedRun(
+                name=ghost.name,
+                colour=ghost.colour,
+                shown=first[ghost.engine] is ghost,
+                frames=count,
+                message=ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
+                trajectory=named(ghost.file),
+                settings=ghost.settings,
+            )
+            for ghost, count in zip(replayed.ghosts, frames, strict=True)
+        ),
+    ]
+    case = ReplayCase(replayed.group, replayed.label, kind.name, replayed.scene.title, own, runs, drawn.arrays)
+    return case, packed(bytes(drawn.content))
+
+
+def in_sight(off: npt.NDArray[np.bool_]) -> int | None:
+    """How many frames to draw of something that is ``off`` the picture in some: until it leaves it for good, or all."""
+    return 1 + int(np.flatnonzero(~off).max(initial=0)) if off[-1] else None
+
+
+def distance(path: FloatArray, true: FloatArray) -> float:
+    """The largest distance between bodies [m]; a run that ended early has fewer samples."""
+    count = min(len(path), len(true))
+    return float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
+
+
+def _looks(outcome: Outcome) -> list[tuple[str, int]]:
+    """Name and colour of each row, as in the comparison's figures."""
+    rows = outcome_content(outcome).rows
+    return [(name, style.colour) for name, style in zip(names(rows), styles(rows), strict=True)]
+
+
+def _ghosts(runs: list[tuple[int, Run, Path]], looks: list[tuple[str, int]], true: FloatArray) -> list[Ghost]:
+    ghosts = []
+    for number, run, file in runs:
+        assert run.case is not None  # it has a trajectory
+        engine, away = run.case.engine, distance(read_some(file, ["p_WB"])["p_WB"], true)
+        message = "" if run.result.status == Status.DONE else run.result.message
+        ghosts.append(Ghost(run.case.key, engine.name, engine.settings, *looks[number], away, file, message))
+    return ghosts
+
+
+def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
+    """By engine in the order of the comparisons, the furthest from the truth first; each run once.
+
+    All that are ``default``, and of the others the furthest, if it is off by more than ``seen`` [m] or there is none.
+    """
+    once = {ghost.key: ghost for ghost in reversed(ghosts)}  # the first comparison's name stays
+    chosen = []
+    for engine in dict.fromkeys(ghost.engine for ghost in ghosts):
+        own = sorted((ghost for ghost in once.values() if ghost.engine == engine), key=lambda ghost: -ghost.distance)
+        default = [ghost for ghost in own if ghost.default]
+        other = [ghost for ghost in own if not ghost.default][:1]
+        chosen += default + [ghost for ghost in other if ghost.distance > seen or not default]
+    return chosen

@@ -1,0 +1,1 @@
+"""Result of one run: text, plot and replay."""

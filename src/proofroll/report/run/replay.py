@@ -1,0 +1,137 @@
+"""A person's own run in motion, beside the truth, as a page of its own."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.dataset import part
+from proofroll.core.element import Element
+from proofroll.core.errors import InputError
+from proofroll.core.scene import Scene
+from proofroll.core.several import each_alone
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
+from proofroll.files.trajectory_file import STORED, write
+from proofroll.report.kinds import kind_of, report_kinds
+from proofroll.report.labels import settings_text
+from proofroll.report.replay.library import three
+from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayKind
+from proofroll.report.replay.replay import case_content, distance
+from proofroll.studies.comparison.planning import point_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_WRITES = "proofroll run … --out writes such a file"
+
+
+def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
+    """The page of what a file holds: the truth of the run's scene, solid, and the run, translucent.
+
+    Of a scene of several elements, which no force couples, each is a case of its own.
+
+    Args:
+        path: of the file, for messages.
+        run: what it holds.
+        scene_of_run: name or path of its scene; None: as the file says.
+
+    Raises:
+        InputError: it does not say of what it is a run, the scene is another by now, or nothing draws such scenes.
+        ProofrollError: the scene has no truth.
+    """
+    from proofroll.report.page.html import templates
+    from proofroll.report.pages import rendered
+
+    name = scene_of_run or str(run.attrs.get("scene_path", run.attrs.get("scene", "")))
+    scene = _scene(path, run, name)
+    parts = list(zip(scene.elements, each_alone(scene), strict=True))
+    drawers = [_drawer(path, scene, element, alone, run) for element, alone in parts]
+    usual = load_scene(name).parameters
+    label = point_name({name: value for name, value in scene.parameters.items() if value != usual[name]})
+    true = truth(scene, run["time"].to_numpy())
+    cases: list[ReplayCase] = []
+    packed: list[str] = []
+    group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
+    with tempfile.TemporaryDirectory() as folder:
+        file, own = (Path(folder) / f"{name}{STORED}" for name in ("truth", "run"))
+        for (element, alone), drawer in zip(parts, drawers, strict=True):
+            true_part, run_part = (part(scene, element, whole) for whole in (true, run))
+            write(true_part, file)
+            write(run_part, own)
+            shown = element.name if len(parts) > 1 else label or scene.title
+            replayed = Replayed(alone, file, _ghosts(own, run_part, true_part), group, shown)
+            case, numbers = case_content(replayed, drawer, lambda _: "")
+            cases.append(case)
+            packed.append(numbers)
+    return rendered(
+        templates(),
+        "run_replay.html",
+        scene=scene,
+        replay=Replay(three(), 0, cases, packed),
+        said=_said(run),
+        replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
+    )
+
+
+def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Dataset) -> ReplayKind:
+    """What draws an element of the run of a scene; ``alone`` holds no other.
+
+    Raises:
+        InputError: nothing does, or the run has no poses of it.
+    """
+    of = f" of {element.name}" if len(scene.elements) > 1 else ""
+    kind = kind_of(alone)
+    if kind is None or not kind.replay_script:
+        what = f"the element {element.name} of " if of else ""
+        raise InputError("run", path, f"nothing that is installed draws {what}the scene {scene.title}")
+    own = part(scene, element, run)
+    if "p_WB" not in own:
+        raise InputError("run", path, f"it has no poses of bodies (p_WB){of}; {_WRITES}")
+    if not (np.diff(own["time"]) > 0).all() or not np.isfinite(own["p_WB"]).all():
+        raise InputError("run", path, f"its times have to rise, and its poses{of} to be numbers; {_WRITES}")
+    return kind.replay()
+
+
+def _said(run: xr.Dataset) -> str:
+    engine = str(run.attrs["engine"])
+    if engine == "truth":
+        return "The truth."
+    settings = settings_text(json.loads(run.attrs["settings"]))
+    return f"The truth, solid, and {engine} ({settings}), translucent; where it agrees it is hidden in the truth."
+
+
+def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
+    """The scene of a run, with all that can be asked of its truth."""
+    try:
+        digest, *_ = [str(run.attrs[key]) for key in ("scene_digest", "engine", "status")]
+        parameters, _ = [dict(json.loads(run.attrs[key])) for key in ("parameters", "settings")]
+    except (KeyError, ValueError, TypeError):
+        name = ""
+    if not name:
+        raise InputError("run", path, f"it does not say which scene it is of, in which engine; {_WRITES}")
+    if not is_scene(name):
+        raise InputError("scene", name, "the scene of this run is not there; say where it lies by --scene PATH")
+    ran, here = str(run.attrs.get("scene")), read_scene_file(name).parameters
+    if lacking := sorted(parameters.keys() - here):
+        raise InputError("scene", name, f"the run is one of {ran}, and this scene has no {', '.join(lacking)}")
+    scene = load_scene(name, **parameters)
+    if digest not in {scene.digest, scene.fully_asked.digest}:
+        advice = f"the scene {name} has changed since this run of {ran}, or is another; run it, or say which by --scene"
+        raise InputError("run", path, advice)
+    return scene.fully_asked
+
+
+def _ghosts(path: Path, run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
+    """The run as a ghost; none if it is the truth itself."""
+    engine = str(run.attrs["engine"])
+    if engine == "truth":
+        return []
+    settings = json.loads(run.attrs["settings"])
+    message = "" if run.attrs["status"] == "done" else str(run.attrs["message"])
+    away = distance(run["p_WB"].to_numpy(), true["p_WB"].to_numpy())
+    return [Ghost("", engine, settings, engine, 0, away, path, message)]

@@ -1,0 +1,1 @@
+"""Stability map in a report and on the terminal."""

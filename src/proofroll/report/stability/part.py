@@ -1,0 +1,145 @@
+"""Where engines stop being right in one scene as a part of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+from proofroll.core.number_text import number
+from proofroll.report.parts import Part, PartEntry, Tell, held
+from proofroll.report.stability import map as stability_map
+from proofroll.report.stability.tables import silent_lines
+from proofroll.running.runner import Runner
+from proofroll.studies.stability.axes import QUICK, Axis, Effort
+from proofroll.studies.stability.claims import STUDY, Claim, StabilityFile, file_for
+from proofroll.studies.stability.map import stability_path
+from proofroll.studies.stability.records import StabilityStudy
+from proofroll.studies.stability.study import make_stability
+from proofroll.studies.study_store import kept
+
+
+@dataclass(frozen=True)
+class JudgedBoundary:
+    """A claim in one sentence, what speaks ``against`` it, or why it is ``untested``; ``holds``: None of the latter."""
+
+    says: str
+    because: str
+    against: list[str]
+    untested: str
+    holds: bool | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class StabilityEntry(PartEntry):
+    """A map, the largest errors that no engine reports, what was claimed, and the axes that were left out."""
+
+    silent: list[str]
+    claims: list[JudgedBoundary]
+    left_out: list[str]
+
+
+@dataclass
+class StabilityPart(Part):
+    """Where engines stop being right in one scene."""
+
+    kind: ClassVar[str] = STUDY
+    key: ClassVar[str] = "stability"
+    order: ClassVar[float] = 40
+    words: ClassVar[str] = "where engines stop being right"
+    command: ClassVar[str] = "stability {.scene}"
+    template: ClassVar[str] = "stability.html"
+    names: ClassVar[Mapping[str, Any]] = {"stability_map": stability_map}
+    asked: StabilityFile
+    engines: Sequence[str] = ()
+    study: StabilityStudy | None = None
+    folder: str = ""
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> StabilityPart:
+        """See the protocol."""
+        return cls(file_for(str(path)), tuple(engines))
+
+    @staticmethod
+    def line(entry: StabilityEntry) -> str:
+        """How many boundaries are silent, and what holds of what was claimed."""
+        study = entry.study
+        return f"{study.silent} of {study.boundaries} boundaries are silent{held(entry.claims)}"
+
+    def keeps(self, out: Path) -> bool:
+        """The whole map, or else a quick one, of all axes if there is."""
+        for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
+            path = stability_path(out, self.asked.scene, axes, self.engines, effort)
+            self.study, _ = kept(path, StabilityStudy)
+            if self.study is not None:
+                self.folder = _programs(path)
+                return True
+        return False
+
+    def make(self, runner: Runner, out: Path, tell: Tell) -> None:
+        """A quick map."""
+        self.study, path = make_stability(
+            self.asked, self._quick_axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
+        )
+        self.folder = _programs(path)
+
+    @property
+    def _quick_axes(self) -> list[Axis]:
+        """Those on which something should happen."""
+        return [axis for axis in self.asked.axes if not axis.scale_free]
+
+    def entry(self) -> StabilityEntry:
+        """See the protocol."""
+        study = self.study
+        assert study is not None  # it was made
+        mapped = {axis.name for axis in study.axes}
+        claims, contradictions = [], []
+        for claim in () if self.engines else self.asked.claims:
+            against = claim.contradictions(study.points)
+            contradictions += against
+            untested = "" if against else claim.untested(study.points)
+            holds = None if untested else not against
+            claims.append(JudgedBoundary(_says(claim, study.step_symbols), claim.because, against, untested, holds))
+        points = [
+            replace(point, reproducer=f"{self.folder}/{Path(point.reproducer).name}") if point.reproducer else point
+            for point in study.points
+        ]
+        return StabilityEntry(
+            **self.head,
+            study=replace(study, points=points),
+            silent=list(silent_lines(study)),
+            claims=claims,
+            left_out=[axis.name for axis in self.asked.axes if axis.name not in mapped],
+            contradictions=contradictions,
+            lost=[] if study.points else [f"{name}: {reason}" for name, reason in study.absent.items()],
+        )
+
+
+def _programs(path: Path) -> str:
+    """The folder of a map's programs, seen from that of all results."""
+    return f"{path.parent.name}/{path.stem}"
+
+
+def _says(claim: Claim, symbols: Mapping[str, str]) -> str:
+    """A claim in one sentence."""
+    said = f"{claim.engine} is {claim.boundary}"
+    if claim.never:
+        said += " at no step or tolerance"
+    elif claim.same:
+        said += " up to the same part of the natural time everywhere"
+    elif claim.number is not None:
+        low, high = claim.between
+        said += f" up to {symbols.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
+    else:
+        said += " up to a boundary"
+    if claim.axes:
+        said += f" along {', '.join(claim.axes)}"
+    if claim.values:
+        low, high = claim.values
+        said += f" at {low:g}" if low == high else f" from {low:g} to {high:g}"
+    if claim.failure:
+        said += f"; beyond: {' or '.join(claim.failure)}"
+    if claim.silent is not None:
+        said += "; the engine does not say so" if claim.silent else "; the engine says so"
+    return said

@@ -1,0 +1,135 @@
+"""A stability map on the terminal, within 100 columns."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from rich.table import Table
+from rich.text import Text
+
+from proofroll.core.number_text import counted, number
+from proofroll.report.labels import name_of, step, with_caveat
+from proofroll.report.terminal.screen import numeric, plain_table, unbroken
+from proofroll.running.case import told_hosts
+from proofroll.studies.stability.records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking
+
+
+def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
+    """A map that is kept in ``path``: its boundaries, the worst silent cases, and what else is to be known."""
+    yield from (headline(study), "", boundary_table(study), "")
+    silent = list(silent_lines(study))
+    if silent:
+        yield "The largest errors that the engines do not report:"
+    yield from (f"  {line}" for line in silent)
+    yield from study.findings
+    yield from (f"{place.axis} = {place.value:g}: {place.problem}" for place in study.places if place.problem)
+    yield from (f"{name}: {reason}" for name, reason in study.absent.items())
+    yield from (f"!! {line}" for line in (study.claims.contradictions if study.claims else ()))
+    yield f"The map is in {path.with_suffix('.svg')}, everything in {path}."
+
+
+def headline(study: StabilityStudy) -> str:
+    """How many points, boundaries, and silent ones among them."""
+    counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
+    sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
+    said = f"{sizes}, {study.silent} of them silent ({counted(study.runs, 'runs')})."
+    if counts:
+        said += f" Beyond: {counts}."
+    if study.refused:
+        said += f" {study.refused} points were refused before the run."
+    if study.wrong_model:
+        said += f" {study.wrong_model} were not run, for what the engine built is not the scene."
+    if study.never_accurate:
+        said += f" At {study.never_accurate} points no step or tolerance that was affordable holds 1 %."
+    return " ".join([said, *told_hosts(study.hosts)])
+
+
+def boundary_table(study: StabilityStudy) -> Table:
+    """One line per engine, formulation, setting and axis: its boundaries from the least to the largest.
+
+    A ``+`` stands where nothing broke on the ladder, ``n!`` for n silent failures beyond the boundaries.
+    """
+    named = (name for point in study.points for name in point.sides["stable"].numbers)
+    symbol = study.step_symbols.get(next(named, ""), "step in natural times")
+    table = plain_table(
+        *unbroken("engine formulation setting", "axis"),
+        *numeric("stable", "holds 1 %"),
+        *unbroken("which is", "beyond"),
+        title=f"Largest {symbol} (or tolerance) along each axis; n!: n times silent",
+    )
+    explained = {(e.curve, e.axis): e for e in study.explanations if e.boundary == "accurate"}
+    before = ""
+    for (curve, axis), points in grouped(study).items():
+        name = name_of(points[0])
+        kinds = Counter(point.failure for point in points if point.failure)
+        silent = sum(point.silent for point in points)
+        common = kinds.most_common(1)
+        beyond = f"{common[0][0]} {silent}!" if common and silent else common[0][0] if common else ""
+        table.add_row(
+            Text(name if name != before else ""),
+            axis,
+            _range(points, "stable"),
+            _range(points, "accurate"),
+            Text(_explained(explained.get((curve, axis)), study.step_symbols)),
+            Text(beyond),
+        )
+        before = name
+    return table
+
+
+def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]:
+    """The points by curve and axis."""
+    found: dict[tuple[str, str], list[BoundaryPoint]] = {}
+    for point in study.points:
+        found.setdefault((point.curve, point.axis), []).append(point)
+    return found
+
+
+def size(point: BoundaryPoint, side: str) -> float | None:
+    """A boundary as the first dimensionless number that the scene has of a step; a tolerance as it is."""
+    found = point.sides[side]
+    if point.resolution != "dt":
+        return found.largest
+    return next(iter(found.numbers.values()), None)
+
+
+def _range(points: Sequence[BoundaryPoint], side: str) -> str:
+    known = [point for point in points if not (point.problem and side == "accurate")]
+    if not known:
+        return "no truth"
+    values = [size(point, side) for point in known]
+    held = [value for value in values if value is not None]
+    if not held:
+        return "none"
+    low = "none" if len(held) < len(values) else number(min(held))
+    high = number(max(held)) + ("" if any(p.sides[side].reached for p in known) else "+")
+    return low if low == high else f"{low}…{high}"
+
+
+def _explained(found: ExplainedBoundary | None, symbols: Mapping[str, str]) -> str:
+    """The number that stays the same while the axis moves the others."""
+    if found is None or not found.explains:
+        return ""
+    return f"{symbols[found.number]} {number(found.low)}…{number(found.high)}"
+
+
+def silent_lines(study: StabilityStudy) -> Iterator[str]:
+    """The eight worst silent cases as sentences, one for each engine, formulation, setting and axis."""
+    seen: set[tuple[str, str]] = set()
+    for point in silent_ranking(study):
+        if (point.curve, point.axis) in seen or len(seen) >= 8:
+            continue
+        seen.add((point.curve, point.axis))
+        side = point.shown
+        wrong = "" if side.error is None else f", off by {number(100 * side.error, 3)} % of the range"
+        finest = step(point.resolution, point.finest)
+        if side.largest is not None:
+            beyond = f"just beyond {step(point.resolution, side.largest)}"
+        elif point.cut:
+            beyond = f"down to {finest}, finer ones have too many steps"
+        else:
+            beyond = f"at every {'step' if point.resolution == 'dt' else 'tolerance'} down to {finest}"
+        where = f"{with_caveat(name_of(point), point.caveat)} at {point.axis} = {point.value:g}"
+        yield f"{where}: {point.failure} {beyond}{wrong}"

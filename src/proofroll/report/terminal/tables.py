@@ -1,0 +1,154 @@
+"""The verdict table and other tables on the terminal, within 100 columns."""
+
+from __future__ import annotations
+
+import math
+import os
+from typing import TYPE_CHECKING
+
+from rich.table import Column, Table
+from rich.text import Text
+
+from proofroll.core.number_text import counted, number
+from proofroll.core.verdict import Verdict
+from proofroll.report.comparison.tables import observables, remarks
+from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
+from proofroll.report.parts import part_kinds
+from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
+from proofroll.running.case import told_hosts
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from proofroll.report.comparison.records import ReportedComparison, WorstJudgement
+    from proofroll.report.page.records import ReportContent
+
+WIDTH = 100
+_WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
+STYLES = {
+    "agrees": "green",
+    "unconfirmed": "yellow",
+    "incomplete": "yellow",
+    "converges": "yellow",
+    "ill-posed": "cyan",
+    "not-judged": "cyan",
+    "another-scene": "cyan",
+    "refused": "magenta",
+    "differs": "red",
+    "failed": "bold red",
+}
+
+
+def console() -> Screen:
+    """The console for data, on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS.
+
+    A text is shown as it is, whatever rich would make of ``[words]`` or ``:words:`` in it.
+    """
+    out = Screen(highlight=False, markup=False, emoji=False)
+    if out.is_terminal:
+        out.width = min(out.width, WIDTH)
+    elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
+        out.width = WIDTH
+    out.width = out.width or 80  # COLUMNS=0 says that nobody knows
+    return out
+
+
+def verdict_table(content: ReportedComparison) -> Table:
+    """One line per engine with settings: the worst over all points of the parameters."""
+    names = columns(content)
+    table = plain_table(
+        # Where the window is narrow those with a least width break between words, and nothing is cut.
+        Column("engine formulation setting", min_width=_WORD, overflow="fold"),
+        *unbroken("step"),
+        Column("verdict", min_width=_WORD),
+        *(Column(Text(f"{name} [{unit}]"), justify="right", min_width=_NUMBER) for name, unit in names),
+        *numeric("order", "s/s"),
+        *unbroken(""),
+        title=content.title,
+    )
+    for row in content.rows:
+        verdict, judged = row.verdict, row.observables
+        shown = [judged[name] for name, _ in names if name in judged]
+        worst = max(shown, key=_beyond, default=None)
+        table.add_row(
+            Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
+            step(row.resolution, row.resolution_value),
+            Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=STYLES[verdict]),
+            *(number(judged[name].error if name in judged else None) for name, _ in names),
+            number(worst.order if worst else None),
+            number(row.seconds_per_second),
+            Text("") if row.as_expected else Text("!!", style="bold red"),
+        )
+    return table
+
+
+def _beyond(item: WorstJudgement) -> float:
+    """How often an error holds its tolerance; what is not finite is shown as such, and not the first to be read."""
+    return item.error / item.tolerance if math.isfinite(item.error) else 0.0
+
+
+def columns(content: ReportedComparison) -> list[tuple[str, str]]:
+    """The observables that fit on the terminal: what moves, and the first reaction."""
+    units = observables(content)
+    shown = [name for name in content.headlines("motion") if name in units]
+    shown += [name for name in content.headlines("reaction") if name in units][:1]
+    return [(name, units[name]) for name in shown]
+
+
+def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
+    """A comparison: the table of verdicts, and what came of it in words."""
+    yield verdict_table(content)
+    yield from closing_lines(content)
+    yield ""
+
+
+def closing_lines(content: ReportedComparison) -> list[str]:
+    """What to look at first, in words."""
+    rows = content.rows
+    counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
+    said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    lines = [f"{counted(len(rows), 'engine settings')}, {counted(len(content.runs), 'runs')} in all: {said}."]
+    for name, row, _ in content.lines():
+        lines += [f"{SYMBOLS[row.verdict]} {name}: {row.reason}"] if row.reason else []
+        lines += [f"  {told.cause.sentence}" for told in row.diagnosis]
+    lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
+    if content.contradictions:
+        count = len(content.contradictions)
+        said = "1 finding contradicts" if count == 1 else f"{count} findings contradict"
+        lines.append(f"{said} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
+        lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
+    elif any(len(row.expected) < len(Verdict) for row in rows):  # else nothing is claimed
+        left = unjudged(content)
+        lines.append(
+            f"Nothing contradicts the comparison file; {left} of its runs could not be judged."
+            if left
+            else "Every verdict is as the comparison file expects."
+        )
+    return [*lines, *caveat_lines(content.rows), *told_hosts(content.hosts)]
+
+
+def part_lines(content: ReportContent) -> list[str]:
+    """One line for each further study of a report."""
+    pairs = [(kind, entry) for kind in part_kinds() for entry in content.entries[kind.key] if entry.study is not None]
+    return [f"{entry.name}: {kind.line(entry)}." for kind, entry in pairs]
+
+
+def first_lines(content: ReportContent) -> list[str]:
+    """What to look at first, in at most three sentences; the terminal wraps them."""
+    entries = content.further
+    unexpected = [line for comparison in content.comparisons for line in comparison.contradictions]
+    unexpected += [line for entry in entries for line in entry.contradictions]
+    missing = [entry for entry in entries if entry.missing]
+    lines = []
+    if unexpected:
+        lines.append(_one_line(f"Look first at what was not expected ({len(unexpected)}): {unexpected[0]}"))
+    if missing:
+        lines.append(_one_line(f"Missing ({len(missing)}): {missing[0].title}: {missing[0].missing}"))
+    if not unexpected:
+        lines.append(_one_line(f"Look first at what is silent: {content.findings.sentences[1]}"))
+    return lines
+
+
+def _one_line(text: str) -> str:
+    """A text without the breaks of what it quotes."""
+    return " ".join(text.split())

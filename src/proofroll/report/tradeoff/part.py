@@ -1,0 +1,119 @@
+"""Speed against accuracy in one scene as a part of a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar
+
+from proofroll.core.comparison import Tolerance
+from proofroll.core.number_text import counted
+from proofroll.files.json_data import MERGED
+from proofroll.report.comparison.work_precision import svg
+from proofroll.report.pages import element
+from proofroll.report.parts import Part, PartEntry, Tell, held
+from proofroll.report.tradeoff import tables as tradeoff_tables
+from proofroll.report.tradeoff.tables import default_quantities
+from proofroll.running.runner import Runner
+from proofroll.studies.study_store import kept
+from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
+from proofroll.studies.tradeoff.cost_claims import ClaimJudgement
+from proofroll.studies.tradeoff.recommend import Answer, recommend
+from proofroll.studies.tradeoff.records import TradeoffStudy
+from proofroll.studies.tradeoff.requirements import Wish
+from proofroll.studies.tradeoff.study import make_tradeoff
+from proofroll.studies.tradeoff.tradeoff import stored
+
+# Parts of its scale to which a quantity is wanted where nobody says otherwise: what an eye sees, an engineer needs, a
+# reference is made from, and what tells the orders of methods apart.
+PARTS = (1e-2, 1e-3, 1e-4, 1e-6)
+
+
+@dataclass(frozen=True)
+class Advice:
+    """An answer with the part of the scale that was asked for; None: it was asked for in the quantity's unit.
+
+    What is the same in all of them, the range and the circumstances, is left to the study.
+    """
+
+    relative: float | None
+    answer: Answer = field(metadata=MERGED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TradeoffEntry(PartEntry):
+    """A study with the quantities that are shown, what to use, and what was claimed."""
+
+    shown: list[str]
+    advice: list[Advice]
+    claims: list[ClaimJudgement]
+
+
+@dataclass
+class TradeoffPart(Part):
+    """Speed against accuracy in one scene."""
+
+    kind: ClassVar[str] = STUDY
+    key: ClassVar[str] = "tradeoffs"
+    order: ClassVar[float] = 30
+    words: ClassVar[str] = "speed against accuracy"
+    command: ClassVar[str] = "tradeoff {.scene}"
+    template: ClassVar[str] = "tradeoff.html"
+    names: ClassVar[Mapping[str, Any]] = {"tradeoffs": tradeoff_tables}
+    asked: TradeoffClaims
+    engines: Sequence[str] = ()
+    study: TradeoffStudy | None = None
+
+    @classmethod
+    def load(cls, path: Path, engines: Sequence[str]) -> TradeoffPart:
+        """See the protocol."""
+        return cls(load_claims(path), tuple(engines))
+
+    @staticmethod
+    def line(entry: TradeoffEntry) -> str:
+        """How much was measured, and what holds of what was claimed."""
+        return f"{counted(len(entry.study.points), 'points')}{held(entry.claims)}"
+
+    def keeps(self, out: Path) -> bool:
+        """The whole study, or else a brief one."""
+        paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
+        self.study = next((study for path in paths if (study := kept(path, TradeoffStudy)[0]) is not None), None)
+        return self.study is not None
+
+    def make(self, runner: Runner, out: Path, tell: Tell) -> None:
+        """A brief study, without the runs over ranges of parameters."""
+        self.study, _ = make_tradeoff(
+            self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,
+            progress=lambda text: tell(text, 1),
+        )  # fmt: skip
+
+    def entry(self) -> TradeoffEntry:
+        """See the protocol."""
+        study = self.study
+        assert study is not None  # it was made
+        return TradeoffEntry(
+            **self.head,
+            study=study,
+            shown=default_quantities(study),
+            advice=advice(study, self.asked),
+            claims=[] if self.engines else self.asked.judged(study),
+            contradictions=[] if self.engines else self.asked.contradictions(study),
+        )
+
+    def pictures(self, prefix: str) -> dict[str, str]:
+        """The work-precision diagram."""
+        assert self.study is not None  # it was made
+        return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
+
+
+def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
+    """What to use, of the study's own quantity for the tolerances of its claims, if there are any, else for parts."""
+    own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
+    parts = [Tolerance(part, True) for part in PARTS]
+    return [
+        Advice(tolerance.value if tolerance.relative else None, recommend(study, Wish(name, tolerance)).answer)
+        for name in default_quantities(study)
+        if study.quantities[name].scale is not None  # a part of nothing
+        for tolerance in (own if own and name == study.quantity else parts)
+    ]

@@ -1,0 +1,277 @@
+"""A trade-off and a recommendation: on the terminal within 100 columns, and what the page tells of them in words."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Collection, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.table import Column, Table
+from rich.text import Text
+
+from proofroll.core.number_text import error, number
+from proofroll.report.labels import listed, name_of, step, with_caveat
+from proofroll.report.terminal.screen import numeric, plain_table, unbroken
+from proofroll.running.timing import CONFIDENCE
+from proofroll.studies.tradeoff.pareto import tied
+
+if TYPE_CHECKING:
+    from proofroll.report.tradeoff.part import Advice
+    from proofroll.studies.study_store import Measured
+    from proofroll.studies.tradeoff.recommend import Choice, Recommendation
+    from proofroll.studies.tradeoff.records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
+
+_MOST_COLUMNS = 4  # of quantities, where nobody names them
+
+
+def default_quantities(study: TradeoffStudy) -> list[str]:
+    """What decides, and what the elements of the scene say is shown beside it; no more than a terminal has room for."""
+    decides = [study.quantity] if study.quantity in study.quantities else []  # of the order of events no curve is kept
+    beside = (name for name, item in study.quantities.items() if item.column)
+    return list(dict.fromkeys([*decides, *beside]))[:_MOST_COLUMNS]
+
+
+def cost_of(point: MeasuredPoint) -> str:
+    """Seconds per second, and how far its interval goes to either side at most.
+
+    The range of fewer than six values is no interval of 95 %, so its own confidence stands behind it.
+    """
+    cost = point.seconds_per_second
+    if cost is None:
+        return "–"
+    confidence = point.confidence
+    if point.interval is None or not confidence:
+        return f"{number(cost)} (once)"
+    spread = max(point.interval[1] - cost, cost - point.interval[0]) / cost
+    return f"{number(cost)} ±{100 * spread:.0f}%" + (f" ({100 * confidence:.2g}%)" if confidence < CONFIDENCE else "")
+
+
+def effort(study: TradeoffStudy) -> str:
+    """How well speeds are known and where the choices hold, in a sentence or two."""
+    said = ""
+    if study.brief:
+        said = (
+            "Speeds were measured briefly, twice at most and those of long runs once, and the finest steps were "
+            "left out: they contradict no claim. "
+        )
+    where = f"at {listed(study.parameters) or 'the default parameters'} over {study.until:g} s"
+    if study.over:
+        return f"{said}Every choice holds {where}, and at the corners of {_ranges(study)}; nothing is known beyond."
+    return f"{said}Every choice holds {where}; it was not checked over ranges of the parameters."
+
+
+def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
+    """Of each quantity what is named for its tolerances, in a few words, and the advice for each."""
+    groups: dict[str, list[Advice]] = {}
+    for item in advice:
+        groups.setdefault(item.answer.quantity, []).append(item)
+    named = {
+        quantity: dict.fromkeys(name_of(item.answer.choice.point) for item in items if item.answer.choice)
+        for quantity, items in groups.items()
+    }
+    return {key: (", then ".join(named[key]) or "nothing holds it", items) for key, items in groups.items()}
+
+
+def curve_names(study: TradeoffStudy) -> dict[str, str]:
+    """Engine, formulation and preset of each curve."""
+    return {point.curve: name_of(point) for point in study.points}
+
+
+def _ranges(study: TradeoffStudy) -> str:
+    return ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study.over.items())
+
+
+def tradeoff_parts(
+    study: TradeoffStudy, shown: Sequence[str], path: Path, *, every_point: bool
+) -> Iterator[Table | str]:
+    """A trade-off: its fronts or all its points, what errors consist of, and what was found.
+
+    Args:
+        study: stored in ``path``, its diagram beside it.
+        shown: quantities with a column; the last tables are about the first of them.
+        path: see there.
+        every_point: all points are listed, and errors told in sentences too.
+    """
+    if every_point:
+        yield point_table(study, study.points, shown, "Every point")
+    else:
+        yield from front_tables(study, shown)
+    if study.over:
+        yield from ("", corner_table(study, shown[0]))
+    yield from ("", budget_table(study, shown[0]), "")
+    if every_point:
+        yield from (f"{item.curve}: {item.sentence}" for item in study.budgets if item.quantity == shown[0])
+    yield from study.findings
+    yield from (f"{name}: {reason}" for name, reason in study.absent.items())
+    yield from (f"?? {line}" for line in study.claims.undecided)
+    yield from (f"!! {line}" for line in study.claims.contradictions)
+    yield f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
+
+
+def point_table(
+    study: TradeoffStudy,
+    points: Sequence[MeasuredPoint],
+    quantities: Sequence[str],
+    title: str,
+    ties: Collection[int] = (),
+) -> Table:
+    """One line per point: what it costs, and its error in each quantity.
+
+    ``ties`` are the numbers of points on a front whose cost cannot be told from that of the next.
+    """
+    caption = Text("cost: wall seconds per simulated second through this adapter")
+    if ties:
+        caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
+    errors = numeric(*(f"{study.quantities[name].symbol} [{study.quantities[name].unit}]" for name in quantities))
+    table = plain_table(*unbroken("engine formulation setting", "step", "cost s/s"), *errors, title=title)
+    table.caption = caption
+    for point in points:
+        shown = [error(point.error.get(name)) if name in point.error else "–" for name in quantities]
+        if point.status != "done":
+            shown = [str(point.status), *[""] * (len(quantities) - 1)]
+        mark = " ≈" if point.id in ties else ""
+        table.add_row(Text(name_of(point)), step(point.resolution, point.step), cost_of(point) + mark, *shown)
+    return table
+
+
+def front_tables(study: TradeoffStudy, quantities: Sequence[str]) -> Iterator[Table]:
+    """The Pareto front of the engines, and that of everything where the scene's own equations are better."""
+    engines, everything = (study.front(key, quantities[0]) for key in ("pareto_engines", "pareto"))
+    title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
+    if engines:
+        yield _front(study, engines, quantities, title)
+    if everything != engines:
+        title = "The front with the scene's own equations, which no engine needs"
+        yield _front(study, everything, quantities, title)
+
+
+def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Sequence[str], title: str) -> Table:
+    ties = {cheap.id for cheap, fine in itertools.pairwise(points) if tied(cheap.interval, fine.interval)}
+    return point_table(study, points, quantities, title, ties)
+
+
+def corner_table(study: TradeoffStudy, quantity: str) -> Table:
+    """For every point that was run over the range: its error here, and the worst at the corners and where."""
+    title = f"Over {_ranges(study)}: error of {quantity} [{study.quantities[quantity].unit}]"
+    columns = [*unbroken("engine formulation setting", "step"), *numeric("here", "worst"), Column("where")]
+    table = plain_table(*columns, title=title)
+    checked = [p for p in study.points if p.corners and quantity in p.error]
+    for point in sorted(checked, key=lambda p: p.seconds_per_second or 0.0):
+        worst, where = _worst(point.corners or [], quantity)
+        here, size = error(point.error[quantity]), step(point.resolution, point.step)
+        table.add_row(Text(name_of(point)), size, here, worst, Text(where))
+    return table
+
+
+def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
+    """The largest error at any corner and where that is; a corner without a result is worse than any error."""
+    missing = [corner for corner in corners if corner.errors.get(quantity) is None]
+    if missing:
+        more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
+        return "–", f"{listed(missing[0].parameters)}{more}: {missing[0].message}"
+    corner = max(corners, key=lambda c: c.errors[quantity])
+    return error(corner.errors[quantity]), listed(corner.parameters)
+
+
+def budget_table(study: TradeoffStudy, quantity: str) -> Table:
+    """For every curve, what its error consists of and what dominates at either end."""
+    unit = study.quantities[quantity].unit
+    title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
+    table = plain_table(
+        *unbroken("engine formulation setting", "order (declared)", "at steps [s]"),
+        *numeric("limit off", "known to", "floor"),
+        *unbroken("dominated by"),
+        title=title,
+    )
+    names = curve_names(study)
+    for item in study.budgets:
+        if item.quantity != quantity:
+            continue
+        limit = (item.model_form, item.model_form_bar, item.floor)
+        ends = [_DOMINANT.get(end, end) for end in (item.coarse, item.fine)]
+        table.add_row(
+            Text(names[item.curve]),
+            Text(_order(item), style="yellow" if item.contradicts_declaration else ""),
+            _steps(item),
+            *(number(value) for value in limit),
+            " → ".join(dict.fromkeys(ends)),
+        )
+    return table
+
+
+# Names that fit a column.
+_DOMINANT = {
+    "time step": "step",
+    "model form": "model",
+    "round-off or solver tolerance": "floor",
+    "truth's own error bar": "truth",
+    "too few runs reached the end": "too few runs",
+    "there is no step and no tolerance": "nothing",
+}
+
+
+def _order(item: CurveBudget) -> str:
+    declared = "" if item.declared is None else f" ({item.declared})"
+    if item.order is None:
+        return f"–{declared}"
+    if item.order_low is None or item.order_high is None:
+        return f"{item.order:.2f} ±?{declared}"  # from two differences, which say nothing of their scatter
+    return f"{item.order:.2f} ±{(item.order_high - item.order_low) / 2:.2f}{declared}"
+
+
+def _steps(item: CurveBudget) -> str:
+    """Coarsest and finest step between which the order was observed."""
+    if item.order_from is None:
+        return ""
+    return f"{number(item.order_from)} → {number(item.order_to)}"
+
+
+def answer_lines(found: Recommendation) -> Iterator[str]:
+    """A recommendation, line by line."""
+    answer = found.answer
+    asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
+    if answer.choice is None:
+        yield f"Nothing that was measured holds {asked} with margin."
+        if answer.closest:
+            yield f"Closest: {_line(answer.closest, answer.unit)}"
+    else:
+        yield f"For {asked}, use {_line(answer.choice, answer.unit)}"
+        if not found.affordable:
+            yield f"That is more than the budget of {number(found.budget)} s per simulated second."
+    for tie in answer.ties:
+        yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer.unit)}"
+    for choice, words in (
+        (found.best_within_budget, "Within the budget"),
+        (answer.runner_up, "Runner-up"),
+        (answer.first_failure, "Cheaper ones fail; the most accurate of them"),
+        (answer.least_model, "If this scene is all you need, its own equations do"),
+    ):
+        if choice:
+            yield f"{words}: {_line(choice, answer.unit)}"
+    yield "Costs are those of an engine through this adapter; another way to drive it may cost more or less."
+    yield _checked(found)
+    if found.not_measured:
+        yield f"Not among what was measured: {', '.join(found.not_measured)}."
+    yield _measured(found.measured)
+
+
+def _line(choice: Choice, of: str) -> str:
+    point = choice.point
+    said = ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
+    said += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
+    return with_caveat(f"{said}; {choice.reason}", point.caveat) + "."
+
+
+def _checked(found: Recommendation) -> str:
+    checked = found.checked
+    over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked.parameters.items()]
+    said = f"Checked over {checked.until:g} s at {listed(found.parameters) or 'the default parameters'}"
+    if over:
+        said += f", and at {checked.corners} corners of {', '.join(over)}"
+    return said + "; nothing is known beyond."
+
+
+def _measured(measured: Measured) -> str:
+    machine = measured.machine
+    return f"Measured {measured.when} on {machine['processor']} ({machine['cores']} cores, {machine['system']})."

@@ -1,0 +1,243 @@
+"""The comparison: every engine of a comparison file against the truth, with one verdict per observable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.beside_events import beside_events
+from proofroll.core.comparison import Band, Comparison
+from proofroll.core.convergence import Limit, floor_text, richardson, tightest
+from proofroll.core.diagnosis.of_scene import diagnosed
+from proofroll.core.errors import Missing, ProofrollError
+from proofroll.core.observable import Role
+from proofroll.core.verdict import Judgement, Verdict, judge
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner
+from proofroll.studies.comparison.expectations import contradictions_of
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import Plan, Planned, at_point, plan, point_name
+from proofroll.studies.judging.reference import Reference
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
+    """Judges the results of a plan's cases."""
+    comparison = planned.comparison
+    judged: list[Run] = []
+    references: dict[str, Reference] = {}
+    for run in planned.runs:
+        if isinstance(run.facts, ProofrollError):
+            judged.append(_absent(run))
+            continue
+        result = results[run.ladder[1.0].key]
+        if result.trajectory is None or result.status != Status.DONE:
+            judged.append(_without_result(run, result))
+            continue
+        name = point_name(run.parameters)
+        truth = results[planned.truths[name].key]
+        if truth.status != Status.DONE:
+            judged.append(_without_truth(run, result, truth))
+            continue
+        if name not in references:
+            scene = load_scene(comparison.scene, **run.parameters)
+            references[name] = Reference.read(scene, runner.store.trajectory(planned.truths[name]))
+        reference = references[name]
+        other = reference.another_scene(result.certificate)
+        if other is not None:
+            judged.append(_of_another_scene(run, result, other))
+            continue
+        trajectories = {
+            factor: read(runner.store.trajectory(case))
+            for factor, case in run.ladder.items()
+            if results[case.key].status == Status.DONE
+        }
+        band = comparison.bands[run.row.tolerance]
+        judgements = _judgements(run, band, reference, trajectories, _lost(run, results))
+        missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
+        found = _run(
+            run,
+            result,
+            judgements=judgements,
+            contradictions=contradictions_of(comparison, run, judgements, missing),
+            missing=missing,
+            shared=reference.shared(run.facts.shares),
+        )
+        if found.verdict == Verdict.DIFFERS:
+            true, main = reference.dataset, trajectories[1.0]
+            causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
+            found = replace(found, diagnosis=causes)
+        judged.append(found)
+    return Outcome(comparison, judged, planned.truths)
+
+
+def compare(
+    comparison: Comparison,
+    runner: Runner,
+    engines: Iterable[str] = (),
+    progress: Callable[[Case, Result], None] | None = None,
+) -> Outcome:
+    """Plans, runs and judges a comparison."""
+    planned = plan(comparison, engines, runner.workers)
+    return evaluate(planned, runner.run(planned.cases, progress), runner)
+
+
+def _run(planned: Planned, result: Result, **found: Any) -> Run:
+    """A run of a plan with its result and what was found of it."""
+    facts = planned.facts if isinstance(planned.facts, EngineFacts) else None
+    return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **found)
+
+
+def _absent(run: Planned) -> Run:
+    """A row whose engine could not even be asked."""
+    status = Status.CRASHED
+    if isinstance(run.facts, Missing):
+        status = Status.MISSING
+    elif isinstance(run.facts, WorkerDied):
+        status = run.facts.status
+    return _run(run, Result(status, str(run.facts)))
+
+
+def _without_result(run: Planned, result: Result) -> Run:
+    """A row that was refused, or failed."""
+    case = run.ladder[1.0]
+    causes = diagnosed(load_scene(case.scene, **run.parameters), result.certificate, step=case.engine.step)
+    found = _run(run, result, diagnosis=causes)
+    expected = run.row.expected(run.parameters)
+    if found.verdict in expected:
+        return found
+    where = f"{run.row.engine}{at_point(run.parameters)}"
+    said = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"
+    return replace(found, contradictions=[said])
+
+
+def _without_truth(run: Planned, result: Result, truth: Result) -> Run:
+    """A row at a point where the truth refuses, which says nothing about the engine; or where it was lost."""
+    lasts = truth.status in LASTING
+    status = Status.NO_TRUTH if lasts else truth.status
+    result = replace(result, status=status, message=f"there is no truth here: {truth.message}")
+    return _run(run, result) if lasts else _without_result(run, result)
+
+
+def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:
+    """A row whose engine ran another scene: shown with its trajectory, and not judged."""
+    result = replace(result, status=Status.ANOTHER_SCENE, message=sentence)
+    expected = {Verdict.ANOTHER_SCENE, Verdict.DIFFERS, Verdict.FAILED} & set(run.row.expected(run.parameters))
+    said = [] if expected else [f"{run.row.engine}{at_point(run.parameters)}: {sentence}"]
+    return _run(run, result, contradictions=said)
+
+
+def _judgements(
+    run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
+) -> list[Judgement]:
+    reference, trajectories = reference.common_span(trajectories)
+    curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
+    main = curves[1.0]
+    judgements = []
+    for name, curve in main.items():
+        tolerance = run.row.bound.get(name) or band.bounds.get(name)
+        if tolerance is None:
+            continue
+        true, bar = reference.true(name, curve)
+        scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
+        limit = _with_floor(run, name, _limit(run, name, curves), curves, true, unit)
+        judgement = judge(
+            name,
+            unit,
+            curve,
+            true,
+            truth_error_bar=bar,
+            tolerance=tolerance.absolute(scale),
+            scale=scale,
+            limit=_with_events(run, name, limit, reference, trajectories),
+            ladder=_has_ladder(run, curve),
+            lost=lost,
+            doubt=reference.doubt(name),
+            own_bar=reference.own_bar(name, trajectories[1.0]),
+            sampled_bar=reference.sampled_bar,
+            between=reference.between(name, trajectories[1.0]),
+            magnitude=reference.magnitude(name),
+            precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
+        )
+        judgements.append(judgement)
+    return judgements
+
+
+def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) -> Limit | None:
+    """Limit of small steps, if every rung of the ladder gave the observable."""
+    assert isinstance(run.facts, EngineFacts)  # there are curves
+    stepped = run.facts.resolution == "dt"
+    # of tolerances those that the engine takes
+    factors = run.row.ladder if stepped else [factor for factor in run.row.ladder if factor in run.ladder]
+    if len(factors) == 1 or not all(name in curves.get(factor, {}) for factor in factors):
+        return None
+    values = [curves[factor][name] for factor in factors]
+    if len({v.shape for v in values}) > 1 or not values[0].size or not all(np.all(np.isfinite(v)) for v in values):
+        return None
+    if not stepped:
+        return tightest(values)
+    return richardson(values, run.row.ladder, run.facts.order, run.facts.precision)
+
+
+def _with_floor(
+    run: Planned,
+    name: str,
+    limit: Limit | None,
+    curves: dict[float, dict[str, FloatArray]],
+    true: FloatArray,
+    unit: str,
+) -> Limit | None:
+    """The limit, or in single precision without one what ended the refinement."""
+    facts = run.facts
+    if limit is None or not isinstance(facts, EngineFacts) or facts.step is None or np.isfinite(limit.order):
+        return limit
+    if facts.precision == "double":
+        return limit
+    errors = {factor: largest_difference(found[name], true) for factor, found in curves.items()}
+    best = min(errors, key=lambda factor: errors[factor])
+    return replace(limit, floor=floor_text(facts.step * best, errors[best], unit, best > min(errors)))
+
+
+def _with_events(
+    run: Planned, name: str, limit: Limit | None, reference: Reference, trajectories: dict[float, xr.Dataset]
+) -> Limit | None:
+    """The limit with what one step beside an event does to its finest run."""
+    if limit is None or not isinstance(run.facts, EngineFacts):
+        return limit
+    factor = run.row.ladder[-1]
+    finest, times = trajectories[factor], reference.dataset["time"].to_numpy()
+    step = run.facts.step
+    if reference.scene.observables[name].role is Role.EVENT:
+        return replace(limit, beside=2 * reference.own_bar(name, finest))
+    times = times[len(times) - len(limit.values) :] if len(limit.values) <= len(times) else times
+    if len(times) != len(limit.values):
+        return limit  # what has a time of its own for each value
+    events = reference.events_of(finest)
+    late = max((event.time_high - event.time_low for event in events), default=0.0)
+    if step is not None:
+        late = min(late, step * factor)
+    return replace(limit, beside=beside_events(times, limit.values, [event.time for event in events], late))
+
+
+def _lost(run: Planned, results: dict[str, Result]) -> str:
+    """The first step of the ladder that has no trajectory, and why; empty if each has one."""
+    for case in run.ladder.values():
+        result, name = results[case.key], case.engine.resolution
+        if result.status != Status.DONE and name is not None:
+            return f"{name} {case.engine.settings[name]:g} {result.status}: {result.message}"
+    return ""
+
+
+def _has_ladder(run: Planned, curve: FloatArray) -> bool:
+    """Whether small steps could confirm the curve: several were asked for, and there is something to converge."""
+    resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
+    return resolved and len(run.row.ladder) > 1 and curve.size > 0

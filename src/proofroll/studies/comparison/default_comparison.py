@@ -1,0 +1,136 @@
+"""A scene about which no file says anything: what can be asked of it all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.observable import Role
+from proofroll.core.plugins import engine_names, parse_engine
+from proofroll.core.scene import Scene
+from proofroll.core.several import each_alone, represents
+from proofroll.core.verdict import Verdict
+from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.running.asking import described, resolve
+from proofroll.running.case import EngineDescription, EngineFacts
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.stability.axes import Axis, AxisTerm
+
+_UNTIL, _SAMPLES = 1.0, 50
+_STEP = 4e-3  # s: samples lie whole numbers of it apart, which a ladder of steps down to 1e-3 s divides
+_CLOSE = "close"
+_BECAUSE = "nobody has said what to expect of this scene"
+# Along an axis a parameter is taken to these parts of its default, where its bounds allow.
+_PARTS = (0.1, 1.0, 10.0)
+
+
+def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None = None) -> Comparison:
+    """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
+
+    ``parameters`` are those that differ from the defaults; engines are asked in one of ``workers``, if they are given.
+
+    Raises:
+        InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
+    """
+    file, scene = read_scene_file(name), load_scene(name, **parameters)
+    duration = file.duration or _UNTIL
+    every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
+    engines = _stepped(able(scene, workers), file.dt, workers)
+    rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in engines]
+    if not rows:
+        raise InputError("scene", name, _why_none(scene, workers))
+    return Comparison(
+        name=scene.name,
+        title=file.title,
+        question=f"Which engines agree with the truth? {file.reason}".strip(),
+        scene=name,
+        until=every * max(1, int(duration / every + 1e-9)),
+        every=every,
+        vary={key: [scene.parameters[key]] for key in parameters},
+        bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene))},
+        rows=rows,
+    )
+
+
+def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) -> list[str]:
+    """The engines, with the step that the scene asks for where their own is longer."""
+    if dt is None:
+        return [*engines]
+    specs = [parse_engine(engine) for engine in engines]
+    found = resolve([(spec.name, spec.options) for spec in specs], workers)
+    return [
+        str(replace(spec, options={**spec.options, "dt": f"{dt:g}"}))
+        if isinstance(facts, EngineFacts) and facts.step is not None and facts.step > dt
+        else engine
+        for engine, spec, facts in zip(engines, specs, found, strict=True)
+    ]
+
+
+def bounds(scene: Scene) -> dict[str, Tolerance]:
+    """One per cent of what moves; where that has no size of its own, a thousandth of its unit."""
+    all_of = {key: item for key, item in scene.observables.items() if item.role is Role.MOTION}
+    moves = {key: item for key, item in all_of.items() if item.headline}
+    moves = moves or {scene.deciding: scene.observable(scene.deciding)}
+    moves |= {key: item for key, item in all_of.items() if item.watched}
+    return {
+        key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
+        for key, item in moves.items()
+    }
+
+
+def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
+    """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
+    found = []
+    for engine, provides in _provided(workers):
+        fitting = [name for name in provides if represents(scene, name, provides)]
+        found += [f"{engine}[formulation={name}]" for name in fitting[: 1 if first else None]]
+    return found
+
+
+def _provided(workers: Workers | None) -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
+    """What the formulations of each installed engine provide."""
+    for engine, told in described(engine_names(), workers).items():
+        if isinstance(told, EngineDescription):
+            yield engine, told.provides
+
+
+def _why_none(scene: Scene, workers: Workers | None) -> str:
+    """What no formulation provides; where each is provided by some, of which elements each engine has no model."""
+    engines = list(_provided(workers))
+    given = {item for _, provides in engines for items in provides.values() for item in items}
+    if lacking := scene.requires - given:
+        return f"no installed engine has {', '.join(sorted(lacking))}"
+    said = []
+    for engine, provides in engines:
+        none = [
+            f"{alone.elements[0].name} ({', '.join(sorted(alone.requires))})"
+            for alone in each_alone(scene)
+            if not any(alone.requires <= set(items) for items in provides.values())
+        ]
+        said.append(f"{engine} has no formulation for {' and '.join(none) or 'all elements of one kind at once'}")
+    return f"no installed engine can represent all of the scene: {'; '.join(said)}"
+
+
+def axes_of(name: str) -> list[Axis]:
+    """Axes of a stability map: each parameter of the scene that is no count and not zero, and the length of the run."""
+    file = read_scene_file(name)
+    values = load_scene(name).parameters
+    found = []
+    for key, item in file.parameters.items():
+        if item.integer or not values[key]:
+            continue
+        allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
+        if len(allowed) > 1:
+            found.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
+    return [*found, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
+
+
+def _loads(name: str, key: str, value: float) -> bool:
+    try:
+        load_scene(name, **{key: value})
+    except ProofrollError:
+        return False
+    return True

@@ -1,0 +1,59 @@
+"""What a comparison expected of a run, held against what came."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from proofroll.core.comparison import Comparison
+from proofroll.core.number_text import number
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.studies.comparison.outcome import SEVERITY, worst
+from proofroll.studies.comparison.planning import Planned, at_point
+
+# Where nobody can be judged; that contradicts no claim, and is expected of every engine.
+NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE})
+
+
+def contradictions_of(
+    comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
+) -> list[str]:
+    """What the claim did not expect, as sentences."""
+    where = f"{run.row.engine}{at_point(run.parameters)}"
+    found = []
+    row, expected = run.row, run.row.expected(run.parameters)
+    known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
+    overall = worst(known, missing)
+    # Where something cannot be judged, the rest contradicts only by being worse than expected.
+    whole = len(known) == len(judgements)
+    worse = bool(known) and SEVERITY.index(overall) > max(map(SEVERITY.index, expected))
+    # What is missing is said below, name by name.
+    if overall not in {*expected, Verdict.INCOMPLETE} and (whole or worse):
+        # Which observables make it so; where it is better than expected, all of them do.
+        guilty = [judgement for judgement in known if judgement.verdict == overall]
+        guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
+        said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
+        said = f"{said}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
+        found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
+    for judgement in judgements:
+        name, verdict = judgement.observable, judgement.verdict
+        alone = row.expect_for.get(name)
+        if alone is not None and verdict not in {*alone, *NOBODY}:
+            found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
+        if name in row.order and not _within(judgement.order, row.order[name]):
+            (low, high), order = row.order[name], number(judgement.order, 3, "not known")
+            found.append(f"{where}: order of {name} is {order}, expected {low:g} to {high:g}")
+        if name in row.limit:
+            allowed = row.limit[name].absolute(judgement.scale)
+            if judgement.limit_error is None or judgement.limit_error > allowed:
+                off = number(judgement.limit_error, 3, "not known")
+                found.append(f"{where}: error of the limit of {name} is {off}, expected at most {number(allowed, 3)}")
+    claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
+    if Verdict.INCOMPLETE not in expected:
+        claimed |= {*missing}
+    for name in sorted(claimed - {judgement.observable for judgement in judgements}):
+        found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
+    return found
+
+
+def _within(value: float | None, bounds: tuple[float, float]) -> bool:
+    return value is not None and bounds[0] <= value <= bounds[1]

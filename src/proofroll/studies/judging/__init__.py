@@ -1,0 +1,1 @@
+"""Judgement of one trajectory: read, held against the truth, put into words."""

@@ -1,0 +1,311 @@
+"""A trajectory of anybody's against the truth of a scene, and the words for how it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.columns import UNCERTAIN
+from proofroll.core.comparison import Tolerance
+from proofroll.core.dataset import BETWEEN
+from proofroll.core.errors import InputError, require_known
+from proofroll.core.number_text import number
+from proofroll.core.observable import Observable, Role
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.core.turns import samples_between
+from proofroll.core.verdict import Doubt, Judgement, Verdict
+from proofroll.core.verdict import judge as judge_curve
+from proofroll.files.scene_file import load_scene
+from proofroll.studies.judging.given_run import GivenRun, Run, read_run
+from proofroll.studies.judging.reference import Reference, turned_alike
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_USUAL = Tolerance(0.01, True)
+_LEAST = 0.01
+_NO_TOLERANCE = "no tolerance is given for it"
+_MOST_TRUTHS = 64
+_truths: dict[tuple[str, bytes, bytes], xr.Dataset] = {}
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One quantity of a trajectory.
+
+    Attributes:
+        judgement: see :class:`proofroll.core.verdict.Judgement`.
+        at: when it is farthest from the truth [s]; None of what has no time.
+    """
+
+    judgement: Judgement
+    at: float | None
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it is within its tolerance of the truth, and the truth known well enough to say so."""
+        return self.judgement.verdict is Verdict.AGREES
+
+    def __str__(self) -> str:
+        """What differs, by how much and when, how much may, and how well the truth is known."""
+        found = self.judgement
+        unit = "" if found.unit == "1" else f" {found.unit}"
+        when = "" if self.at is None else f" at {self.at:.4g} s"
+        error, allowed = number(found.error, 3), number(found.tolerance, 3)
+        said = f"{found.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
+        if not np.isfinite(found.error):
+            said = f"{found.observable} is not finite, or has not as many values as the truth"
+        bar = f"the truth is known to {number(found.truth_error_bar)}{unit}"
+        if found.verdict is Verdict.NOT_JUDGED:
+            bar = f"not judged, for {bar} only"
+        remarks = ["the question is ill-posed here"] if found.verdict is Verdict.ILL_POSED else []
+        return "; ".join([said, bar, *remarks, *found.remarks])
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A trajectory held against the truth of a scene.
+
+    Attributes:
+        scene: its name.
+        compared: each quantity that was judged, the farthest from its tolerance first.
+        because: why the tolerances are what they are; empty if nobody says.
+        unjudged: variables that were given and are not judged -> why.
+    """
+
+    scene: str
+    compared: tuple[Compared, ...]
+    because: str = ""
+    unjudged: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every quantity does."""
+        return all(item.agrees for item in self.compared)
+
+    def __str__(self) -> str:
+        """One line, one for each quantity, and one for each reason why something that was given is not judged."""
+        why = f" (tolerance: {self.because})" if self.because else ""
+        head = f"{'agrees with' if self.agrees else 'differs from'} the truth of {self.scene}{why}"
+        lines = [f"  {'ok' if item.agrees else '!!'} {item}" for item in self.compared]
+        for why in dict.fromkeys(self.unjudged.values()):
+            lines.append(f"  not judged: {', '.join(name for name, its in self.unjudged.items() if its == why)}; {why}")
+        return "\n".join([head, *lines])
+
+    def _repr_html_(self) -> str:
+        """The same as a table, for a notebook."""
+        head, *lines = str(self).splitlines()
+        rows = []
+        for item in self.compared:
+            found, sign = item.judgement, "✓" if item.agrees else "✗"
+            unit = "" if found.unit == "1" else f" {found.unit}"
+            numbers = (number(value) + unit for value in (found.error, found.tolerance, found.truth_error_bar))
+            when = "" if item.at is None else f"{item.at:.4g} s"
+            cells = [f"{sign} {found.verdict.value}", *numbers, when]
+            rows.append(
+                f"<tr><th>{escape(found.observable)}</th>{''.join(f'<td>{escape(c)}</td>' for c in cells)}</tr>"
+            )
+        columns = ("", "verdict", "off by", "allowed", "truth known to", "at")
+        header = "".join(f"<th>{name}</th>" for name in columns)
+        rest = "".join(f"<p>{escape(line.strip())}</p>" for line in lines[len(rows) :])
+        return f"<p><b>{escape(head)}</b></p><table><tr>{header}</tr>{''.join(rows)}</table>{rest}"
+
+    def content(self) -> dict[str, Any]:
+        """As plain data."""
+        names = ("observable", "unit", "error", "tolerance", "truth_error_bar", "scale")
+        rows = [
+            {name: getattr(item.judgement, name) for name in names}
+            | {"at": item.at, "verdict": item.judgement.verdict.value, "remarks": list(item.judgement.remarks)}
+            for item in self.compared
+        ]
+        said = {"scene": self.scene, "agrees": self.agrees, "because": self.because}
+        return said | {"compared": rows, "unjudged": dict(self.unjudged)}
+
+
+def judge(
+    run: Run, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
+) -> Judged:
+    """Holds a trajectory against the truth of a scene at the trajectory's own times.
+
+    Args:
+        run: from :func:`proofroll.simulate`, the path of a file (netCDF, CSV or ``.npz``), or arrays by name: ``time``
+            [s], and the state (``p_WB``, ``v_WB``, ``w_WB``, as in :class:`proofroll.core.engine.Sample`, one row for
+            each time; for mechanisms ``q_WB``; finite, quaternions of length 1), or variables that the truth has, as
+            ``q.hinge``, ``tip.x``, ``positions``, ``z``; in the truth's units.
+        scene: name, path of a folder, or :func:`proofroll.load_scene`.
+        tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
+            one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,
+            of every force and moment, and of places, velocities, spins and orientations that are given.
+        because: why that is close enough.
+
+    Raises:
+        InputError: something that was given does not exist or makes no sense.
+        Refused, Diverged: there is no truth of this scene.
+    """
+    scene = load_scene(scene) if isinstance(scene, str) else scene
+    given = read_run(run, scene)
+    dataset = given.dataset
+    between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
+    reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy(), between))
+    given.require_units(reference.dataset)
+    observed: dict[str, FloatArray] = {}
+    if "scene_digest" in dataset.attrs:  # all variables of a run
+        reference, cut = reference.common_span({0: dataset})
+        dataset, observed = cut[0], reference.observed(cut[0])
+    sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
+    bounds = _bounds(tolerance, reference, observed, sure)
+    compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
+    compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
+    unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
+    if tolerance is None:
+        unjudged |= _events_left(scene, observed, bounds)
+    return Judged(scene.name, tuple(compared), because, unjudged)
+
+
+def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
+    """What somebody gave besides -> why it is not judged."""
+    found = {}
+    for name, why in given.besides.items():
+        if not _comparable(reference, name):
+            found[name] = "the truth has nothing of that name"
+        elif why or name not in judged:
+            found[name] = why or _NO_TOLERANCE
+    return found
+
+
+def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mapping[str, Tolerance]) -> dict[str, str]:
+    """What a run says of its events, for which nobody gives a tolerance -> why it is not judged."""
+    names = [name for name in observed if scene.observables[name].role is Role.EVENT and name not in judged]
+    return dict.fromkeys(names, _NO_TOLERANCE) if any(observed[name].size for name in names) else {}
+
+
+def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
+    """What of a whole run is not judged, for its samples do not tell it -> why."""
+    found = {}
+    for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
+        if name in dataset and UNCERTAIN in dataset[name].attrs:
+            found[f"turns of {name}" if name in judged else name] = str(dataset[name].attrs[UNCERTAIN])
+    return dict(sorted(found.items()))
+
+
+def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
+    """The truth at these times and those off their grid, which tests ask for again and again."""
+    key = scene.digest, times.tobytes(), between.tobytes()
+    if key not in _truths:
+        late = times[0] > 0
+        asked = np.concatenate([[0.0], times]) if late else times
+        found = truth(scene, asked, samples_between(scene, asked), between)
+        _truths[key] = found.isel(time=slice(1, None)) if late else found
+        while len(_truths) > _MOST_TRUTHS:
+            del _truths[next(iter(_truths))]
+    return _truths[key]
+
+
+def _bounds(
+    given: Mapping[str, object] | str | float | None,
+    reference: Reference,
+    observed: Mapping[str, FloatArray],
+    variables: Sequence[str],
+) -> dict[str, Tolerance]:
+    """What is judged, and how far it may be off: observables of a whole run, else variables that the truth has too."""
+    scene = reference.scene
+    able = list(dict.fromkeys([*observed, *(name for name in variables if _comparable(reference, name))]))
+    if not able:
+        known = ", ".join(str(name) for name in reference.dataset.data_vars if _comparable(reference, str(name)))
+        raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
+    if given is None:
+        main = [name for name in observed if _is_main(scene.observables[name])]
+        return dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
+    if not isinstance(given, Mapping):
+        if len(able) > 1 and scene.deciding not in able:
+            raise InputError("tolerance", given, f"say of which variable: {', '.join(able)}")
+        given = {scene.deciding if scene.deciding in able else able[0]: given}
+    if not given:
+        raise InputError("tolerance", "{}", "say how far what may be off")
+    for name in given:
+        require_known("tolerance", name, able, "this trajectory has")
+    return {name: _tolerance(name, text, _unit(reference, name)) for name, text in given.items()}
+
+
+def _is_main(item: Observable) -> bool:
+    """Whether it is judged where nobody says what: what a person asks for first, and every force and moment."""
+    return item.headline or (item.role is Role.REACTION and item.unit != "1")
+
+
+def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
+    """What is given of the state, and is judged as it is: places, velocities, spins and orientations."""
+    scene = reference.scene
+    states = {scene.label(element, name) for element in scene.elements for name in element.sample_type.widths}
+    return [name for name in variables if name in states and _comparable(reference, name)]
+
+
+def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
+    """What a percentage of a variable refers to: its range, but no less than a hundredth of what is natural."""
+    if unit == "1":
+        return 1.0  # of quaternions
+    natural = 0.0
+    for element in reference.scene.elements:
+        speed = 2 * np.pi / element.natural_time
+        own = {"m": element.length, "m/s": element.length * speed, "rad/s": speed, "rad": 1.0}
+        natural = max(natural, own.get(unit, 0.0))
+    return max(reference.sizes.get(name, 0.0), float(np.ptp(true)), _LEAST * natural) or 1.0
+
+
+def _tolerance(name: str, given: object, unit: str) -> Tolerance:
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        given = f"{given!r} {unit}"
+    text = str(given).strip()
+    found = Tolerance.parse(f"tolerance of {name}", text if " " in text else text.replace("%", " %"))
+    if not found.relative and found.unit != unit:
+        raise InputError(f"tolerance of {name}", given, f"its unit is {unit}")
+    return found
+
+
+def _comparable(reference: Reference, name: str) -> bool:
+    return name in reference.dataset.data_vars and "error_bar" in reference.dataset[name].attrs
+
+
+def _unit(reference: Reference, name: str) -> str:
+    item = reference.scene.observables.get(name)
+    return item.unit if item else str(reference.dataset[name].attrs["units"])
+
+
+def _compared(
+    name: str, bound: Tolerance, reference: Reference, observed: Mapping[str, FloatArray], dataset: xr.Dataset
+) -> Compared:
+    item = reference.scene.observables.get(name)
+    if name in observed:
+        values = observed[name]
+        true, bar = reference.true(name, values)
+        scale, doubt = reference.sizes.get(name, 1.0), reference.doubt(name)
+        own, between = reference.own_bar(name, dataset), reference.between(name, dataset)
+    else:
+        values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
+        true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
+        if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
+            true, values = true[1:], values[1:]  # several engines define reactions only after a first step
+        between = reference.between(name, dataset)
+        if truth_of.dims[-1:] == ("wxyz",):
+            values = turned_alike(values, true)
+        scale, doubt = _size(reference, name, true, _unit(reference, name)), Doubt.NONE
+        own = 0.0
+    found = judge_curve(
+        name, _unit(reference, name), values, true,
+        truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
+        own_bar=own, sampled_bar=reference.sampled_bar, between=between,
+    )  # fmt: skip
+    return Compared(found, _farthest(values, true, dataset["time"].to_numpy()))
+
+
+def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:
+    """When two curves are farthest apart [s]."""
+    if values.shape != true.shape or not values.size or len(values) not in {len(times), len(times) - 1}:
+        return None
+    apart = np.abs(values - true).reshape(len(values), -1).max(axis=1)
+    return float(times[len(times) - len(values) :][int(np.argmax(apart))]) if np.all(np.isfinite(apart)) else None

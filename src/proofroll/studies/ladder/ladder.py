@@ -1,0 +1,183 @@
+"""One quantity up the ladder of models, and every optional term switched on and off."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.dataset import observe
+from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
+from proofroll.core.observable import Role
+from proofroll.core.plugins import engine_names
+from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running.asking import described, resolve, resolve_with_truth
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.process import WorkerDied
+from proofroll.running.runner import Runner
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.studies.cases import case_of
+from proofroll.studies.judging.reference import Reference
+from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, switches
+
+_EVERY = 0.02  # interval between samples [s], as in the comparison files
+_TIME_LIMIT = 60.0  # wall seconds for one case
+
+
+@dataclass(frozen=True)
+class ModelAnswer:
+    """What one model gave.
+
+    Attributes:
+        case: what was run; None if its settings make no sense or its engine is missing.
+        result: how that ended.
+        values: of the quantity, None if there are none.
+        timing: wall seconds per simulated second, None if it could not be timed.
+    """
+
+    case: Case | None
+    result: Result
+    values: FloatArray | None = None
+    timing: Timing | None = None
+
+
+class Ladder:
+    """Plans, runs and times; :func:`proofroll.report.ladder.ladder.ladder_content` says what was found.
+
+    Attributes:
+        ladder, switches: what is asked.
+        answers: what every model gave, by :func:`key_of`.
+        truths: by the parameters that a switch puts over the given ones, as text.
+        engines: what every engine tells of itself, or why it cannot.
+
+    Without a ``quantity`` it is what decides the scene, until the time ``until`` [s], of all engines if none are named.
+    Without a ``tolerance`` of it, in its unit, a term counts if it moves the quantity by more than the smaller of the
+    errors with and without it. So many ``rounds`` of the timing count.
+
+    Raises:
+        InputError: something that was given does not exist or makes no sense.
+        Refused: the scene has no truth.
+    """
+
+    def __init__(
+        self,
+        scene: str,
+        parameters: dict[str, Any],
+        runner: Runner,
+        *,
+        quantity: str | None = None,
+        until: float = 2.0,
+        tolerance: float | None = None,
+        engines: Sequence[str] = (),
+        rounds: int | None = None,
+    ) -> None:
+        time_grid(until, _EVERY)  # what makes no sense is refused there
+        if until <= 0:
+            raise InputError("until", until, "give a time in s that is positive")
+        if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
+            raise InputError("tolerance", tolerance, "give a positive number in the unit of the quantity")
+        self._name, self._runner, self.until = scene, runner, until
+        self.tolerance, self._rounds = tolerance, rounds or ROUNDS
+        self.scene = load_scene(scene, **parameters)
+        self._given = {name: self.scene.parameters[name] for name in parameters}
+        curves = [name for name, item in self.scene.observables.items() if item.role != Role.EVENT]
+        self.quantity = quantity or self.scene.deciding
+        require_known("quantity", self.quantity, curves)
+        self.unit = self.scene.observables[self.quantity].unit
+        self.engines = described(engines or engine_names(), runner.workers)
+        for error in self.engines.values():
+            if isinstance(error, InputError):
+                raise error
+        _, self._truth_facts = resolve_with_truth([], runner.workers)
+        self.truths: dict[str, Reference] = {}
+        self.answers: dict[str, ModelAnswer] = {}
+        self.ladder: list[Rung] = rungs(self.engines, self.scene.requires)
+        self.switches: list[Switch] = []
+
+    def run(self, progress: Callable[[str], None] = lambda _: None) -> None:
+        """Runs every model once, stored results where there are some, then times all of them in turns."""
+        self._run_truths([{}], progress)
+        self.switches = switches(self.ladder, self.engines, self.scene, self.truths[str({})].dataset)
+        wanted = [rung.model for rung in self.ladder] + [m for s in self.switches for m in (s.on, s.off)]
+        models = {key_of(model): model for model in wanted if model is not None}
+        self._run_truths([dict(s.on.parameters) for s in self.switches if s.on is not None], progress)
+        facts = resolve([(model.engine, model.options) for model in models.values()], self._runner.workers)
+        cases: dict[str, Case] = {}
+        for (key, model), found in zip(models.items(), facts, strict=True):
+            if isinstance(found, EngineFacts):
+                cases[key] = self._case(found, model)
+            else:
+                self.answers[key] = ModelAnswer(None, absence(found))
+        results = self._runner.run(cases.values(), lambda case, _: progress(case.engine.name))
+        for key, case in cases.items():
+            self.answers[key] = self._answer(models[key], case, results[case.key])
+        self._time(progress)
+
+    def _case(self, facts: EngineFacts, model: LadderModel) -> Case:
+        parameters = self._given | dict(model.parameters)
+        scene = load_scene(self._name, asks=model.asks, **parameters)
+        return case_of(self._name, scene, parameters, facts, self.until, _EVERY, time_limit=_TIME_LIMIT)
+
+    def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
+        wanted = [point for point in wanted if str(point) not in self.truths]
+        cases = {str(point): self._case(self._truth_facts, LadderModel("truth", {}, point)) for point in wanted}
+        results = self._runner.run(cases.values(), lambda *_: progress("truth"))
+        for point in wanted:
+            case = cases[str(point)]
+            result = results[case.key]
+            if result.status != Status.DONE:
+                raise Refused(f"there is no truth of this scene: {result.message}")
+            reference = Reference.read(self._scene_at(point), self._runner.store.trajectory(case))
+            if self.quantity not in reference.curves:
+                raise Refused(f"the truth of this scene has no {self.quantity}")
+            self.truths[str(point)] = reference
+
+    def _scene_at(self, point: Mapping[str, float]) -> Scene:
+        return load_scene(self._name, **(self._given | dict(point)))
+
+    def _answer(self, model: LadderModel, case: Case, result: Result) -> ModelAnswer:
+        if result.status != Status.DONE:
+            return ModelAnswer(case, result)
+        curves = observe(self._scene_at(model.parameters), read(self._runner.store.trajectory(case)))
+        return ModelAnswer(case, result, curves.get(self.quantity))
+
+    def true(self, point: dict[str, float]) -> tuple[FloatArray, float]:
+        """The true values of the quantity in the scene with these parameters, and their error bar."""
+        reference = self.truths[str(point)]
+        return reference.true(self.quantity, reference.curves[self.quantity])
+
+    def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
+        """Largest distance from the truth of the scene with these parameters; None: no answer."""
+        values = self.answers[key_of(model)].values
+        return None if values is None else largest_difference(values, self.true(point)[0])
+
+    def _time(self, progress: Callable[[str], None]) -> None:
+        timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}
+        with Stopwatch(self._runner.workers) as stopwatch:
+            timings = interleaved(
+                {key: partial(stopwatch, case) for key, case in timed.items() if case is not None},
+                self._rounds,
+                lambda _: progress("timing"),
+            )
+        for key, timing in timings.items():
+            self.answers[key] = dataclasses.replace(self.answers[key], timing=timing)
+
+
+def key_of(model: LadderModel) -> str:
+    """Distinguishes models."""
+    return repr((model.engine, sorted(model.options.items()), sorted(model.parameters.items()), model.asks))
+
+
+def absence(error: ProofrollError) -> Result:
+    """Why an engine, or its settings, could not be asked."""
+    if isinstance(error, WorkerDied):
+        return Result(error.status, str(error))
+    return Result(Status.REFUSED if isinstance(error, InputError) else Status.MISSING, str(error))

@@ -1,0 +1,1 @@
+"""Stability maps: where along an axis of parameters a run fails, and what explains it."""

@@ -1,0 +1,207 @@
+"""Reads the files that ask for a stability map and claim something of it: ``study = "stability"``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from proofroll.core.errors import InputError, require_known, told_of
+from proofroll.core.plugins import parse_engine
+from proofroll.core.validation import strict, validated
+from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
+from proofroll.files.toml import study_content, study_files
+from proofroll.studies.comparison.default_comparison import axes_of
+from proofroll.studies.failure import meanings
+from proofroll.studies.stability.axes import Axis, AxisTerm
+from proofroll.studies.stability.records import Boundary, BoundaryPoint, StabilityStudy, dependence
+from proofroll.studies.stability.step_numbers import step_numbers
+
+STUDY = "stability"
+# A dependence along an axis shows between as many values.
+_FEWEST_ALIKE = 2
+# That no step holds is seen on as many of them, each a fraction of the one before; no search goes down to nothing.
+_TRIED = 4
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What is claimed of an engine's boundaries.
+
+    Attributes:
+        engine: name, or ``name[key=value,…]``; every curve with these settings.
+        boundary: of which.
+        because: why.
+        axes: along which; all if empty.
+        values: lowest and highest value of the axis; all if empty.
+        never: no step holds; then nothing else is claimed but ``failure`` and ``silent``.
+        same: in natural times the boundary is the same all along each axis.
+        number: dimensionless number of the boundary that is claimed to lie in ``between``.
+        between: lowest and highest.
+        failure: what is beyond is one of these.
+        silent: whether the engine is silent about it.
+    """
+
+    engine: str
+    boundary: Literal["stable", "accurate"]
+    because: str
+    axes: list[str] = field(default_factory=list)
+    values: list[float] = field(default_factory=list)
+    never: bool = False
+    same: bool = False
+    number: str | None = None
+    between: list[float] = field(default_factory=list)
+    failure: list[str] = field(default_factory=list)
+    silent: bool | None = None
+
+    def untested(self, points: Sequence[BoundaryPoint]) -> str:
+        """Why the points of a map can say nothing of it; empty if they can."""
+        about = [point for point in points if self._about(point) and not point.problem]
+        if not about:
+            return "no point of this map is about it"
+        about = [point for point in about if not point.timed_out]
+        if not about:
+            return "runs met the limit of time, which a faster machine might not"
+        sides = [(point, point.sides[self.boundary]) for point in about]
+        if self.same and sum(side.largest is not None for _, side in sides) < _FEWEST_ALIKE:
+            return "nothing holds at two values of the axis"
+        cut = [side.largest is None and point.cut for point, side in sides]
+        tried = max(point.runs for point in about)
+        if all(cut) and not self.failure and not (self.never and tried >= _TRIED):
+            return "its searches were cut: finer runs have too many steps for this map"
+        return ""
+
+    def contradictions(self, points: Sequence[BoundaryPoint]) -> list[str]:
+        """What the points of a map do not confirm, as sentences; where a run met the limit of time, nothing."""
+        found = []
+        about = [p for p in points if self._about(p) and not p.problem and not p.timed_out]
+        if self.same:
+            for curve, axis in dict.fromkeys((point.curve, point.axis) for point in about):
+                along = [p for p in about if (p.curve, p.axis) == (curve, axis)]
+                said = dependence(along, self.boundary)
+                if said:
+                    found.append(f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere")
+        expected = self.failure and not any(point.sides[self.boundary].failure for point in about)
+        if about and expected and not any(point.cut for point in about):
+            found.append(f"{self.engine}: nothing fails beyond {self.boundary}, expected: {' or '.join(self.failure)}")
+        for point in about:
+            side = point.sides[self.boundary]
+            where = f"{point.curve} at {point.axis} = {point.value:g}"
+            found += [f"{where}: {sentence}" for sentence in self._wrong(side, point.cut)]
+        return found
+
+    def _about(self, point: BoundaryPoint) -> bool:
+        spec = parse_engine(self.engine)
+        settings = point.settings
+        if point.engine != spec.name or any(str(settings.get(k)) != str(v) for k, v in spec.options.items()):
+            return False
+        if self.axes and point.axis not in self.axes:
+            return False
+        return not self.values or self.values[0] <= point.value <= self.values[1]
+
+    def _wrong(self, side: Boundary, cut: bool) -> list[str]:
+        """Of one boundary; where the search was ``cut`` for its many steps, a boundary that is missing says nothing."""
+        found = []
+        largest = side.largest
+        if self.never and largest is not None:
+            found.append(f"{self.boundary} at a step or tolerance of {largest:g}, expected at none")
+        if self.number is not None:
+            value = side.numbers.get(self.number)
+            low, high = self.between
+            if value is None and cut:
+                return found
+            if value is None or not low <= value <= high:
+                said = "no step is" if value is None else f"{value:.3g} is the largest"
+                found.append(f"{self.boundary}: {self.number}: {said}, expected between {low:g} and {high:g}")
+        if self.failure and side.failure and side.failure not in self.failure:
+            found.append(f"beyond {self.boundary}: {side.failure}, expected: {' or '.join(self.failure)}")
+        if self.silent is not None and side.failure and side.silent != self.silent:
+            words = {True: "silent", False: "said so"}
+            found.append(f"beyond {self.boundary}: {words[side.silent]}, expected: {words[self.silent]}")
+        return found
+
+
+@dataclass(frozen=True)
+class StabilityFile:
+    """What a file asks and claims.
+
+    Attributes:
+        name: of the file, without ending.
+        title, question: for a person.
+        scene: which scene.
+        axes: along which it is taken to its extremes.
+        claims: what is expected.
+        on_request: a report without names has this map only where it is kept.
+    """
+
+    name: str
+    title: str
+    question: str
+    scene: str
+    axes: list[Axis]
+    claims: list[Claim] = field(default_factory=list)
+    on_request: bool = False
+
+    def contradictions(self, study: StabilityStudy) -> list[str]:
+        """What a map does not confirm, as sentences."""
+        return [sentence for claim in self.claims for sentence in claim.contradictions(study.points)]
+
+
+def file_for(scene: str) -> StabilityFile:
+    """The file about a scene, or the file at a path that ends in ``.toml``; without one its parameters are the axes.
+
+    Raises:
+        InputError: there is no such scene, or the file is broken.
+    """
+    if Path(scene).suffix == ".toml" and not is_scene(scene):
+        return _load(Path(scene))
+    for path, content in study_files(STUDY):
+        if content.get("scene") == scene:
+            return _load(path)
+    question = "Up to which step or tolerance is each engine stable, and up to which is it right to 1 %?"
+    return StabilityFile(Path(scene).stem, read_scene_file(scene).title, question, scene, axes_of(scene))
+
+
+def _load(path: Path) -> StabilityFile:
+    where = path.name
+    content = study_content(path, STUDY)
+    found = validated(StabilityFile, content, where, name=path.stem)
+    with told_of(where):
+        _check(where, found)
+    return found
+
+
+def _check(where: str, found: StabilityFile) -> None:
+    scene = load_scene(found.scene)
+    for index, axis in enumerate(found.axes):
+        if not axis.values:
+            raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
+        for value in axis.values:
+            # a parameter may be infinite, the length of a run not
+            if math.isnan(value) or (axis.horizon and not (math.isfinite(value) and value > 0)):
+                what = "a length in natural times that is positive and finite" if axis.horizon else "a number"
+                raise InputError(f"{where}: axes.{index}.values", value, f"give {what}")
+        axis.at(scene, axis.values[0])
+    known = [axis.name for axis in found.axes]
+    numbers = [item.name for item in step_numbers(scene)]
+    for index, claim in enumerate(found.claims):
+        at = f"{where}: claims.{index}"
+        if not claim.because:
+            raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
+        for name in claim.axes:
+            require_known(f"{at}.axes", name, known, "there is no such axis; choose from")
+        for failure in claim.failure:
+            require_known(f"{at}.failure", failure, meanings(scene))
+        if claim.number is not None:
+            require_known(f"{at}.number", claim.number, numbers)
+        if (claim.number is None) != (not claim.between):
+            raise InputError(f"{at}.between", claim.between, "number and between = [low, high] go together")
+        for name in ("between", "values"):
+            pair = getattr(claim, name)
+            if pair and (len(pair) != 2 or pair[0] > pair[1]):
+                raise InputError(f"{at}.{name}", pair, "write [low, high]")
+
+
+strict(StabilityFile, Claim, Axis, AxisTerm)

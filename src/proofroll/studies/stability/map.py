@@ -1,0 +1,238 @@
+"""Where every engine, formulation and setting stops being right, along axes that take a scene to its extremes.
+
+Each point of the map is a search for two boundaries on a ladder of steps or tolerances. All searches go on side by
+side, each as fast as its answers come. Every run is a stored case, so an interrupted map resumes where it was.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable, Generator, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.studies.failure import TOO_SLOW, RunOutcome, judge
+from proofroll.studies.stability.axes import Axis, Effort
+from proofroll.studies.stability.bisection import SearchResult, search
+from proofroll.studies.stability.places import PER_PERIOD, Place, case_at, measure, places_of
+from proofroll.studies.stability.records import MappedPlace
+from proofroll.studies.tradeoff.curve import Curve
+from proofroll.studies.tradeoff.sweep import curves_of
+
+# Parts into which a sampling interval is divided, about two per octave.
+_FINEST = 17
+_PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << power))]
+_TOLERANCES = [10.0**-power for power in range(1, 14)]
+# Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.
+_STRIDE = {"dt": 4, "rtol": 3}
+# After so many runs that met the limit of time a search goes no further: each finer one would too.
+_TIMEOUTS = 2
+
+
+@dataclass
+class MapPoint:
+    """One engine with its settings at one place.
+
+    Attributes:
+        curve, place: which.
+        ladder: steps [s] or tolerances, coarse first.
+        found: outcomes of the runs, by rung.
+        cases, results: of the runs, by rung.
+    """
+
+    curve: Curve
+    place: Place
+    ladder: list[float]
+    found: SearchResult[RunOutcome] = field(default_factory=SearchResult)
+    cases: dict[int, Case] = field(default_factory=dict)
+    results: dict[int, Result] = field(default_factory=dict)
+
+    def facts(self, rung: int) -> EngineFacts:
+        """The engine with the settings of a rung."""
+        facts = self.curve.facts
+        return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): self.ladder[rung]})
+
+    def too_long(self, rung: int, effort: Effort) -> bool:
+        """Whether a run is not made: it has too many steps, or coarser ones met the limit of time.
+
+        The coarsest is always made: in a long run it may have more steps than are allowed to a finer one.
+        """
+        if self.timeouts >= _TIMEOUTS:
+            return True
+        return rung > 0 and self.curve.fixed_step and self.place.until / self.ladder[rung] > effort.steps * (1 + 1e-9)
+
+    @property
+    def timeouts(self) -> int:
+        """How many runs met the limit of time."""
+        return sum(result.status == Status.TIMEOUT for result in self.results.values())
+
+
+@dataclass
+class StabilityMap:
+    """What the study found.
+
+    Attributes:
+        scene: name of the scene.
+        axes, effort: what was asked.
+        places: the values of the axes.
+        points: every engine at every place.
+        absent: engine -> why it is not on the map.
+    """
+
+    scene: str
+    axes: list[Axis]
+    effort: Effort
+    places: list[MappedPlace]
+    points: list[MapPoint]
+    absent: dict[str, str]
+
+    @property
+    def runs(self) -> int:
+        """How many runs there were."""
+        return sum(len(point.results) for point in self.points)
+
+
+Progress = Callable[[str, int], None]
+Searching = Generator[int, RunOutcome | None, SearchResult[RunOutcome]]
+
+
+def stability(
+    scene: str,
+    axes: Sequence[Axis],
+    runner: Runner,
+    *,
+    engines: Iterable[str] = (),
+    effort: Effort | None = None,
+    progress: Progress | None = None,
+) -> StabilityMap:
+    """Maps the boundaries.
+
+    What an axis does not change keeps the scene's default. Engines are names or ``name[key=value,…]``; all that are
+    installed if there are none. ``progress`` is called with a text and how many points have been finished since.
+
+    Raises:
+        InputError: something that does not exist.
+    """
+    effort = effort or Effort()
+    tell: Progress = progress or (lambda _text, _count: None)
+    curves, absent = curves_of(engines, runner.workers, load_scene(scene).requires)
+    for curve in (curve for curve in curves if curve.facts.resolution is None):
+        absent[curve.engine] = "has neither step nor tolerance: exact at any time, it has no boundary to look for"
+    curves = [curve for curve in curves if curve.facts.resolution is not None]
+    curves = _matched(curves) if effort.matched else curves
+    asked = places_of(scene, axes, effort)
+    places = [place for place in asked if isinstance(place, Place)]
+    measure(scene, places, runner, lambda: tell("the truth", 0))
+    points = [MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places]
+    _search(scene, points, effort, runner, tell)
+    refused = _refused(points)
+    points = [point for point in points if point.curve.engine not in refused]
+    mapped = [MappedPlace(place.axis, place.value, place.parameters, place.problem) for place in asked]
+    return StabilityMap(scene, list(axes), effort, mapped, points, absent | refused)
+
+
+def _refused(points: Sequence[MapPoint]) -> dict[str, str]:
+    """Engines that refuse the scene everywhere and for the same reason, which is then no boundary; and the reason."""
+    said: dict[str, set[tuple[str, str]]] = {}
+    for point in points:
+        answers = {(str(result.status), result.message) for result in point.results.values()}
+        said.setdefault(point.curve.engine, set()).update(answers)
+    only = {engine: next(iter(answers)) for engine, answers in said.items() if len(answers) == 1}
+    return {engine: message for engine, (status, message) in only.items() if status == Status.REFUSED}
+
+
+def _matched(curves: Sequence[Curve]) -> list[Curve]:
+    """One curve for each formulation: with the matched settings, or the first."""
+    kept: dict[tuple[str, object], Curve] = {}
+    for curve in curves:
+        key = curve.facts.name, curve.facts.settings.get("formulation")
+        if key not in kept or curve.facts.settings.get("preset") == "matched":
+            kept[key] = curve
+    return list(kept.values())
+
+
+def _ladder(curve: Curve, place: Place) -> list[float]:
+    if not curve.fixed_step:
+        return list(_TOLERANCES)
+    return [place.scene.natural_time / PER_PERIOD / part for part in _PARTS]
+
+
+def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:
+    """Runs all searches side by side: each asks for its next case as soon as it has the answer to the last."""
+    asking: dict[str, list[tuple[MapPoint, Searching, int]]] = {}
+    known: dict[str, Result] = {}
+    finished = 0
+
+    def ended(point: MapPoint) -> None:
+        nonlocal finished
+        finished += 1
+        where = f"{point.curve.facts.name}, {point.place.axis} = {point.place.value:g}"
+        tell(f"{where}: {finished} of {len(points)} points", 1)
+
+    def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
+        """Goes on with a search until it needs a case that has not been run; that case, unless another asked for it."""
+        while rung is not None:
+            if point.too_long(rung, effort):
+                rung = _send(point, searching, None)
+                continue
+            case = point.cases[rung] = case_at(name, point.place, point.facts(rung), effort.limit)
+            if case.key not in known:
+                asking.setdefault(case.key, []).append((point, searching, rung))
+                return [case] if len(asking[case.key]) == 1 else []
+            rung = answer(point, searching, rung)
+        ended(point)
+        return []
+
+    def answer(point: MapPoint, searching: Searching, rung: int) -> int | None:
+        case = point.cases[rung]
+        point.results[rung] = result = known[case.key]
+        if result.status == Status.TIMEOUT:  # a faster machine would have seen what came of it
+            return _send(point, searching, None)
+        dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
+        return _send(point, searching, judge(result, dataset, point.place.yardstick))
+
+    def arrived(case: Case, result: Result) -> list[Case]:
+        known[case.key] = result
+        tell(case.engine.name, 0)
+        further = []
+        for point, searching, rung in asking.pop(case.key):
+            further += ask(point, searching, answer(point, searching, rung))
+        return further
+
+    first = []
+    for point in points:
+        searching: Searching = search(len(point.ladder), _STRIDE["dt" if point.curve.fixed_step else "rtol"])
+        first += ask(point, searching, next(searching))
+    runner.follow(first, arrived)
+
+
+def _send(point: MapPoint, searching: Searching, outcome: RunOutcome | None) -> int | None:
+    """Gives an answer to a search; returns what it asks next, or None when it has ended."""
+    try:
+        return searching.send(outcome)
+    except StopIteration as stop:
+        point.found = stop.value
+        return None
+
+
+def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
+    """The outcome on a failing rung; where no run was affordable at all, that it is too slow."""
+    if rung is not None:
+        return point.found.seen[rung]
+    if not point.found.seen and point.found.limit == 0:
+        message = "even the coarsest run takes too long"
+        return RunOutcome(False, False, TOO_SLOW, False, None, None, message)
+    return None
+
+
+def stability_path(folder: Path, scene: str, axes: Sequence[Axis], engines: Sequence[str], effort: Effort) -> Path:
+    """Where a map is kept: a file for each scene, axes with their values, engines and effort."""
+    identity = [load_scene(scene).digest, [dataclasses.asdict(axis) for axis in axes], sorted(engines), repr(effort)]
+    digest = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:10]
+    return folder / "stability" / f"{Path(scene).name}-{digest}.json"

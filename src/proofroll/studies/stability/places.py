@@ -1,0 +1,90 @@
+"""The places of a stability map: the scene at each value of an axis, with its truth and its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from proofroll.core.errors import ProofrollError
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running.asking import resolve_with_truth
+from proofroll.running.case import Case, EngineFacts, Status
+from proofroll.running.runner import Runner
+from proofroll.studies.failure import Yardstick
+from proofroll.studies.stability.axes import Axis, Effort
+from proofroll.studies.stability.records import MappedPlace
+from proofroll.studies.tradeoff.curve import Question
+
+# Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
+PER_PERIOD = 8
+# More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
+# samples still visit all phases of an oscillation.
+_MOST_SAMPLES = 400
+# The truth is computed by two routes at the tightest tolerance, once per place.
+_TRUTH_LIMIT = 60.0
+
+
+@dataclass
+class Place:
+    """A value of an axis where there is a scene, and the truth of it.
+
+    Attributes:
+        axis, value: where; the axis by its name.
+        parameters: of the scene, those that differ from the defaults.
+        scene: with them.
+        until, every: length and sampling interval of every run [s].
+        yardstick: what runs are measured by, from the truth.
+        problem: why there is no truth here.
+    """
+
+    axis: str
+    value: float
+    parameters: dict[str, float]
+    scene: Scene
+    until: float
+    every: float
+    yardstick: Yardstick = field(init=False)
+    problem: str | None = None
+
+
+def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | MappedPlace]:
+    """Every value of every axis, without the truth yet; mapped is one that has no scene, with the reason."""
+    default = load_scene(name)
+    found: list[Place | MappedPlace] = []
+    for axis in axes:
+        for value in effort.values_of(axis):
+            # A default that is given is left out, so that axes share the runs of the place where they meet.
+            given = {
+                key: number for key, number in axis.at(default, value).items() if number != default.parameters[key]
+            }
+            try:
+                scene = load_scene(name, **given)
+            except ProofrollError as error:
+                found.append(MappedPlace(axis.name, value, given, str(error)))
+                continue
+            intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
+            stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
+            every = stride * scene.natural_time / PER_PERIOD
+            found.append(Place(axis.name, value, given, scene, every * max(1, intervals // stride), every))
+    return found
+
+
+def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
+    """The truth of every place, or why there is none."""
+    _, facts = resolve_with_truth([], runner.workers)
+    cases = [case_at(name, place, facts, _TRUTH_LIMIT) for place in places]
+    results = runner.run(cases, lambda *_: tell())
+    for place, case in zip(places, cases, strict=True):
+        result = results[case.key]
+        truth = read(runner.store.trajectory(case)) if result.status == Status.DONE else None
+        if truth is None:
+            place.problem = f"there is no truth here: {result.message}"
+        place.yardstick = Yardstick.of(place.scene, truth)
+
+
+def case_at(name: str, place: Place, facts: EngineFacts, limit: float) -> Case:
+    """A run at a place with a limit of time [s]."""
+    question = Question(name, place.parameters, place.until, place.scene.deciding)
+    return question.case(place.scene, facts, place.every, limit)

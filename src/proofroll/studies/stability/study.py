@@ -1,0 +1,171 @@
+"""A stability map as it is kept: counts, boundaries, what explains them, and what depends on what it should not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from operator import attrgetter
+from pathlib import Path
+
+from proofroll.files.scene_file import load_scene
+from proofroll.running.case import hosts
+from proofroll.running.runner import Runner
+from proofroll.studies.failure import ACCURATE, NOT_RUN, REFUSED, WRONG_MODEL, meanings
+from proofroll.studies.stability.axes import Axis, Effort
+from proofroll.studies.stability.claims import StabilityFile
+from proofroll.studies.stability.map import MapPoint, Progress, StabilityMap, failure_beyond, stability, stability_path
+from proofroll.studies.stability.records import (
+    BOUNDARIES,
+    Boundary,
+    BoundaryPoint,
+    ExplainedBoundary,
+    MapClaims,
+    StabilityStudy,
+    dependence,
+)
+from proofroll.studies.stability.reproducers import with_programs
+from proofroll.studies.stability.step_numbers import explanation, step_numbers, values
+from proofroll.studies.study_store import keep, measured
+
+
+def make_stability(
+    asked: StabilityFile,
+    axes: Sequence[Axis],
+    runner: Runner,
+    folder: Path,
+    *,
+    engines: Sequence[str] = (),
+    effort: Effort,
+    progress: Progress | None = None,
+) -> tuple[StabilityStudy, Path]:
+    """Maps the boundaries of a scene, see :func:`stability`, and keeps the map with a program for each boundary.
+
+    Both go below the folder of all results; what the file claims is held against the map.
+
+    Returns:
+        the study with ``claims``, and its file.
+
+    Raises:
+        InputError: something that does not exist.
+        ProofrollError: the folder cannot be written.
+    """
+    found = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
+    path = stability_path(folder, asked.scene, axes, engines, effort)
+    study = with_programs(found, stability_study(found), path.with_suffix(""), runner.workers)
+    study = replace(study, claims=MapClaims(asked.name, asked.contradictions(study)))
+    keep(study, path)
+    return study, path
+
+
+def stability_study(found: StabilityMap) -> StabilityStudy:
+    """Everything, with counts on top."""
+    points = [_point(point) for point in found.points]
+    scene = load_scene(found.scene)
+    failing = [point for point in points if point.failure and point.failure not in NOT_RUN]
+    return StabilityStudy(
+        scene=found.scene,
+        axes=found.axes,
+        periods=found.effort.periods,
+        accurate=ACCURATE,
+        runs=found.runs,
+        boundaries=len(failing),
+        silent=sum(point.silent for point in failing),
+        refused=sum(point.failure == REFUSED for point in points),
+        wrong_model=sum(point.failure == WRONG_MODEL for point in points),
+        failures=dict(Counter(point.failure for point in failing if point.failure)),
+        never_accurate=sum(point.largest_accurate is None and not point.problem for point in points),
+        meanings=dict(meanings(scene)),
+        step_symbols={item.name: item.symbol for item in step_numbers(scene)},
+        points=points,
+        explanations=_explanations(points),
+        findings=_scale_findings(found, points),
+        places=found.places,
+        absent=found.absent,
+        hosts=hosts(result for point in found.points for result in point.results.values()),
+        effort=found.effort,
+        measured=measured(),
+    )
+
+
+def _point(point: MapPoint) -> BoundaryPoint:
+    place, facts = point.place, point.curve.facts
+    sides = {name: _side(point, name) for name in BOUNDARIES}
+    if place.yardstick.true is None:
+        sides["accurate"] = replace(sides["accurate"], largest=None, numbers={})  # without truth nobody is right
+    # Where nothing breaks on the ladder, what is to be shown is where it stops being right.
+    boundary = "stable" if sides["stable"].failure else "accurate"
+    first = sides[boundary]
+    errors = [item.error for item in point.found.seen.values() if item.stable and item.error is not None]
+    return BoundaryPoint(
+        engine=facts.name,
+        settings={key: value for key, value in facts.settings.items() if key != facts.resolution},
+        curve=point.curve.engine,
+        level=point.curve.level,
+        caveat=facts.caveat,
+        precision=facts.precision,
+        resolution=facts.resolution,
+        axis=place.axis,
+        value=place.value,
+        parameters=place.parameters,
+        until=place.until,
+        period=place.scene.natural_time,
+        largest_stable=sides["stable"].largest,
+        largest_accurate=sides["accurate"].largest,
+        boundary=boundary,
+        failure=first.failure,
+        silent=first.silent,
+        message=first.message,
+        sides=sides,
+        least_error=min(errors, default=None),
+        finest=point.ladder[max(point.found.seen)] if point.found.seen else None,
+        too_slow=point.ladder[point.found.limit] if point.found.limit < len(point.ladder) else None,
+        timed_out=point.timeouts > 0,
+        runs=len(point.results),
+        problem=place.problem,
+    )
+
+
+def _side(point: MapPoint, name: str) -> Boundary:
+    """One boundary: the largest step or tolerance that holds, and what is beyond."""
+    holding, failing = point.found.boundary(attrgetter(name))
+    beyond = failure_beyond(point, failing)
+    scene, yardstick = point.place.scene, point.place.yardstick
+    largest = None if holding is None else point.ladder[holding]
+    return Boundary(
+        largest=largest,
+        reached=beyond is not None and holding is not None,
+        numbers=values(scene, largest, yardstick.truth) if point.curve.fixed_step and largest is not None else {},
+        beyond=None if failing is None else point.ladder[failing],
+        failure=None if beyond is None else beyond.failure,
+        silent=beyond is not None and beyond.silent,
+        error=None if beyond is None else beyond.error,
+        time=None if beyond is None else beyond.time,
+        message=None if beyond is None else beyond.message,
+    )
+
+
+def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
+    """For every curve, axis and boundary, the number that is the most constant along the axis."""
+    found = []
+    for curve in dict.fromkeys(point.curve for point in points):
+        for axis in dict.fromkeys(point.axis for point in points):
+            for name in BOUNDARIES:
+                sides = [point.sides[name] for point in points if point.curve == curve and point.axis == axis]
+                best = explanation([side.numbers for side in sides if side.reached and side.numbers])
+                if best is not None:
+                    found.append(ExplainedBoundary(**asdict(best), curve=curve, axis=axis, boundary=name))
+    return found
+
+
+def _scale_findings(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
+    """What depends on an axis along which the dimensionless problem is the same, as sentences."""
+    sentences = []
+    for axis in (axis for axis in found.axes if axis.scale_free):
+        for curve in dict.fromkeys(point.curve for point in points):
+            along = [point for point in points if point.curve == curve and point.axis == axis.name]
+            for name in BOUNDARIES:
+                said = dependence([p for p in along if not (p.problem and name == "accurate")], name)
+                if said:
+                    sentences.append(f"{curve} depends on {axis.name}, as it should not: {name} up to {said}")
+    return sentences

@@ -1,0 +1,1 @@
+"""Speed against accuracy: curves of error against cost, error budgets, fronts and recommendations."""

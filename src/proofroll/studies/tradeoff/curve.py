@@ -1,0 +1,214 @@
+"""Points and curves of a sweep with their errors, and the question that they answer."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.timing import Timing
+from proofroll.studies.cases import case_of
+from proofroll.studies.judging.reference import Reference
+from proofroll.studies.tradeoff.pareto import envelope
+from proofroll.studies.tradeoff.records import Corner
+
+# Samples per run. An oscillation of the founding scene's z has a dozen of them.
+SAMPLES = 40
+# An adaptive step ends at each sample, so that with many of them no tolerance may be too loose. A run with so few is
+# made besides, and the larger of both errors counts.
+SPARSE = 2
+# Errors of runs that are the same but for round-off differ by less than this part.
+_SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is swept.
+
+    Attributes:
+        scene: name of the scene.
+        parameters: its parameters that differ from the defaults.
+        until: length of every run [s].
+        quantity: the observable that decides how far the sweep goes.
+    """
+
+    scene: str
+    parameters: dict[str, float]
+    until: float
+    quantity: str
+
+    @property
+    def every(self) -> float:
+        """Sampling interval [s]."""
+        return float(f"{self.until / SAMPLES:.12g}")
+
+    @property
+    def sparse(self) -> float:
+        """Sampling interval of the second run of an adaptive step [s]."""
+        return float(f"{self.until / SPARSE:.12g}")
+
+    def step(self, factor: float) -> float:
+        """So many sampling intervals [s], without the digits that multiplying leaves (0.005000000000000001)."""
+        return float(f"{self.every * factor:.12g}")
+
+    def loaded(self) -> Scene:
+        """The scene with these parameters."""
+        return load_scene(self.scene, **self.parameters)
+
+    def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = 60.0) -> Case:
+        """One run, on the loaded scene."""
+        return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
+
+    def cases(self, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
+        """The run, and with an adaptive step the one over few samples."""
+        adaptive = facts.resolution not in {None, "dt"}
+        return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
+
+
+@dataclass
+class CurvePoint:
+    """One engine with complete settings on the scene.
+
+    Attributes:
+        case, result: the run.
+        curves: observables of its trajectory; empty if there is none.
+        errors: largest distance of each from the truth; with an adaptive step also over few samples.
+        bars: error bars of the truth, by observable.
+        dense: ``errors`` over the many samples alone.
+        sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
+        timing: of the run, wall seconds per simulated second; None where it is not measured.
+        corners: the runs at the corners of a range of the scene's parameters; None where it was not checked there.
+    """
+
+    case: Case
+    result: Result
+    curves: dict[str, FloatArray] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+    bars: dict[str, float] = field(default_factory=dict)
+    dense: dict[str, float] = field(default_factory=dict)
+    sparse: CurvePoint | None = None
+    timing: Timing | None = None
+    corners: list[Corner] | None = None
+
+    @property
+    def step(self) -> float | None:
+        """Value of the setting that trades speed for accuracy; None if there is none."""
+        facts = self.case.engine
+        return None if facts.resolution is None else float(facts.settings[facts.resolution])
+
+
+class Floor(NamedTuple):
+    """Where the runs of a curve come no closer, for each step rounds the state.
+
+    Attributes:
+        best: the most accurate run; those with smaller steps are worse.
+        error: of that run.
+        scatter: what the next smaller step changes.
+    """
+
+    best: CurvePoint
+    error: float
+    scatter: float
+
+
+@dataclass
+class Curve:
+    """One engine, formulation and preset over its range.
+
+    Attributes:
+        engine: ``name[formulation=…,preset=…]``.
+        facts: with the preset's own step or tolerance.
+        level: its rung on the ladder of models, or None if the engine does not tell.
+        points: coarse first.
+        dropped: step -> why there is no run with it.
+    """
+
+    engine: str
+    facts: EngineFacts
+    level: str | None
+    points: list[CurvePoint] = field(default_factory=list)
+    dropped: dict[float, str] = field(default_factory=dict)
+
+    @property
+    def fixed_step(self) -> bool:
+        """Whether it is swept over steps rather than over tolerances."""
+        return self.facts.resolution == "dt"
+
+    @property
+    def tried(self) -> set[float | None]:
+        """Steps or tolerances with which there is a run, or why there is none."""
+        return {point.step for point in self.points} | self.dropped.keys()
+
+    def envelope(self, quantity: str) -> list[float]:
+        """Of each point's error, see :func:`proofroll.studies.tradeoff.pareto.envelope`.
+
+        That round-off of single precision grows below the best step says nothing of this one.
+        """
+        errors, floor = [point.errors.get(quantity, np.inf) for point in self.points], self.floor(quantity)
+        last = self.points.index(floor.best) + 1 if floor else len(errors)
+        return envelope(errors[:last]) + errors[last:]
+
+    def floor(self, quantity: str) -> Floor | None:
+        """Where smaller steps become worse in single precision; None: double, or none of them is."""
+        if self.facts.precision == "double" or not self.fixed_step:
+            return None
+        done = [point for point in self.points if np.isfinite(point.errors.get(quantity, np.inf))]
+        used = [point for point in done if point.curves[quantity].shape == done[-1].curves[quantity].shape]
+        changes = [largest_difference(a.curves[quantity], b.curves[quantity]) for a, b in itertools.pairwise(used)]
+        if not changes or changes[-1] == min(changes):
+            return None
+        least = int(np.argmin(changes))
+        errors = [point.errors[quantity] for point in done]
+        best = done.index(used[least + 1])
+        while best and errors[best - 1] <= errors[best]:  # an error that cancels at one step alone is not reached
+            best -= 1
+        return Floor(done[best], errors[best], changes[least + 1])
+
+    def saturated(self, quantity: str) -> bool:
+        """Whether the two loosest tolerances give the same run: something else than they limits its steps.
+
+        Where an array happens to lie in memory may change the round-off of a run, so equal is equal up to that.
+        """
+        if self.fixed_step or len(self.points) < 2:
+            return False
+        loosest, other = (point.errors.get(quantity, np.inf) for point in self.points[:2])
+        bar = self.points[0].bars.get(quantity, 0.0)
+        return bool(np.isfinite(loosest) and abs(loosest - other) <= max(bar, _SAME * loosest))
+
+
+def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], runner: Runner) -> CurvePoint:
+    """The point with its observables and their errors, if it has a trajectory that reached the end.
+
+    ``points`` are the run, and the one over few samples if there is one; the truth is known by sampling interval.
+    """
+    point, *others = (_measured(point, references[point.case.every], runner) for point in points)
+    if not others:
+        return point
+    (sparse,) = others
+    reference = references[sparse.case.every]
+    # What is derived from neighbouring samples, as an audit, is not compared where there are few.
+    errors = {
+        name: max(error, sparse.errors.get(name, np.inf)) if name in reference.dataset else error
+        for name, error in point.errors.items()
+    }
+    return replace(point, errors=errors, dense=point.errors, sparse=sparse)
+
+
+def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurvePoint:
+    if point.result.status != Status.DONE:
+        return point
+    curves = reference.observed(read(runner.store.trajectory(point.case)))
+    errors, bars = {}, {}
+    for name, curve in curves.items():
+        true, bar = reference.true(name, curve)
+        errors[name], bars[name] = largest_difference(curve, true), bar
+    return replace(point, curves=curves, errors=errors, bars=bars)

@@ -1,0 +1,233 @@
+"""The error budget of a curve: model form, time step with its order, round-off or solver tolerance, truth.
+
+The run with step h is x(h). With the limit x(0) of small steps, estimated from the finest runs alone, its distance
+from the truth is at most |x(h) - x(0)| (the time step) + |x(0) - truth| (the model form) + the truth's own error bar;
+what keeps the fine runs from coming closer to one another is the floor of round-off and solver tolerances.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, size, tightest
+from proofroll.core.number_text import number
+from proofroll.core.verdict import round_off_of
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint
+from proofroll.studies.tradeoff.records import CurveBudget
+
+# Neighbouring local orders this near to each other belong to one power law.
+_SAME_ORDER = 0.3
+# Differences that shrink with less than this order do not shrink.
+_STALLED = 0.25
+# Differences this many times larger than the scatter are more than scatter.
+_ABOVE = 3.0
+# How far a declared order may lie outside the interval of the observed one before it is a finding.
+_SLACK = 0.25
+_CONFIDENCE = 0.95
+
+NOTHING = "there is no step and no tolerance"
+TIME_STEP, MODEL_FORM, FLOOR, TRUTH = (
+    "time step",
+    "model form",
+    "round-off or solver tolerance",
+    "truth's own error bar",
+)
+
+
+class Order(NamedTuple):
+    """An order of convergence, and where it was observed; all None where no power law shows.
+
+    Attributes:
+        value: of the order.
+        low, high: its confidence interval of 95 %; None from too few runs.
+        coarsest, finest: steps of the runs that follow the power law.
+    """
+
+    value: float | None = None
+    low: float | None = None
+    high: float | None = None
+    coarsest: float | None = None
+    finest: float | None = None
+
+
+def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: str) -> CurveBudget:
+    """The budget of one quantity, with its true values and unit, along a curve.
+
+    Order and limit come from runs that are sampled at ``every`` [s]. One with a longer step has fewer samples, and only
+    the coarsest of them counts, as the coarse end.
+    """
+    used = [p for p in curve.points if p.case.every == every and np.isfinite(p.errors.get(quantity, np.inf))]
+    bar, single = _bar(used, quantity), curve.floor(quantity)
+    if single:  # runs with smaller steps show their roundings alone
+        used = used[: max(sum((p.step or 0.0) >= (single.best.step or 0.0) for p in used), 3)]
+    found = CurveBudget(
+        engine=curve.facts.name,
+        curve=curve.engine,
+        quantity=quantity,
+        declared=curve.facts.order,
+        truth=bar if np.isfinite(bar) else None,
+        coarse="too few runs reached the end" if curve.facts.resolution else NOTHING,
+    )
+    if len(used) < 3:
+        return replace(found, fine=found.coarse, sentence=f"{found.coarse[0].upper()}{found.coarse[1:]}.")
+    values = [point.curves[quantity] for point in used]
+    steps = [point.step or 0.0 for point in used]
+    differences = [size(a - b) for a, b in itertools.pairwise(values)]
+    if curve.fixed_step:
+        limit = richardson(values[-3:], steps[-3:], curve.facts.order, curve.facts.precision)
+        stalled = not observed_order(differences[-2], differences[-1], steps[-3:]) > _STALLED
+        seen = differences
+        if single:
+            seen = list(itertools.takewhile(lambda difference: difference > _ABOVE * single.scatter, differences))
+        elif stalled:  # what lies in the scatter of the finest runs shows no order
+            scatter = _ABOVE * max(differences[-2:])
+            seen = list(itertools.takewhile(lambda difference: difference > scatter, differences))
+        order = order_of(steps[: len(seen) + 1], seen)
+    else:
+        limit, order = tightest(values), Order()
+        # A tolerance that limits nothing any more gives the same run again; one at the floor gives scatter.
+        stalled = differences[-1] >= differences[-2]
+    floor = max(differences[-2:]) if stalled else None
+    if single:
+        floor = single.error
+    if curve.facts.precision == "single":
+        limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", size(true))))
+    model_form, error = size(limit.values - true), used[-1].errors[quantity]
+    first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
+    coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
+    found = replace(
+        found,
+        model_form=model_form,
+        model_form_bar=limit.error_bar,
+        order=order.value,
+        order_low=order.low,
+        order_high=order.high,
+        order_from=order.coarsest,
+        order_to=order.finest,
+        contradicts_declaration=_contradicted(order, curve.facts.order),
+        floor=floor,
+        best_step=single.best.step if single else None,
+        coarse=coarse,
+        coarse_step=first.step or 0.0,
+        fine=TRUTH if error <= bar else fine,
+        fine_step=steps[-1],
+        fine_error=error,
+    )
+    return replace(found, sentence=_sentence(found, unit, str(curve.facts.resolution)))
+
+
+def _contradicted(order: Order, declared: int | None) -> bool:
+    """Whether the declared order lies outside the interval of the observed one."""
+    if declared is None or order.low is None or order.high is None:
+        return False
+    return not order.low - _SLACK <= declared <= order.high + _SLACK
+
+
+def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
+    """Order and its confidence interval from the longest stretch of runs that follow one power law.
+
+    Steps fall; the difference of neighbouring runs is C |h1^p - h2^p|, and C and p are fitted in logarithms.
+    """
+    from scipy.optimize import curve_fit
+    from scipy.stats import t
+
+    local = [observed_order(differences[i], differences[i + 1], steps[i : i + 3]) for i in range(len(differences) - 1)]
+    start, end = _stretch(local)
+    if end == start:
+        return Order()
+    between = steps[start], steps[end + 1]
+    span = slice(start, end + 1)  # the differences that the local orders of the stretch come from
+    pairs = np.array(list(itertools.pairwise(steps)), dtype=np.float64)[span]
+    pairs /= pairs[-1, 1]
+    if len(pairs) < 3:
+        return Order(float(np.mean(local[start:end])), None, None, *between)
+
+    def law(h: FloatArray, constant: float, power: float) -> FloatArray:
+        return np.asarray(constant + np.log(np.abs(h[:, 0] ** power - h[:, 1] ** power)))
+
+    seen = np.log(np.asarray(differences)[span])
+    (_, order), covariance = curve_fit(law, pairs, seen, p0=(seen[-1], np.mean(local[start:end])))
+    half = float(t.ppf(0.5 + _CONFIDENCE / 2, len(pairs) - 2) * np.sqrt(covariance[1, 1]))
+    return Order(float(order), float(order) - half, float(order) + half, *between)
+
+
+def _stretch(local: Sequence[float]) -> tuple[int, int]:
+    """First and past-the-last index of the longest run of local orders that agree; the finer of equally long ones."""
+    best = (0, 0)
+    for start in range(len(local)):
+        end = start
+        while end < len(local) and local[end] > _STALLED and np.ptp(local[start : end + 1]) <= _SAME_ORDER:
+            end += 1
+        if end > start and end - start >= best[1] - best[0]:
+            best = (start, end)
+    return best
+
+
+def _bar(points: Sequence[CurvePoint], quantity: str) -> float:
+    return max((point.bars.get(quantity, 0.0) for point in points), default=0.0)
+
+
+def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tuple[CurvePoint, FloatArray] | None:
+    """The coarsest run that reached the end, and how far it is from the limit; None if it cannot be compared.
+
+    With a step longer than the sampling interval it has only some of the limit's samples.
+    """
+    done = (p for p in curve.points if p.case.every > every and np.isfinite(p.errors.get(quantity, np.inf)))
+    point = next(done, None)
+    if point is None:
+        return None
+    stride, at_start = round(point.case.every / every), len(limit.values) > round(point.case.until / every)
+    values, common = point.curves[quantity], limit.values[0 if at_start else stride - 1 :: stride]
+    return (point, values - common) if values.shape == common.shape else None
+
+
+def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
+    """What the error of a run at some distance from the limit of small steps mostly is."""
+    # Where the runs still approach one another, what is not known of their limit is the time step's too.
+    time_step = max(size(departure), limit.error_bar if floor is None else 0.0)
+    parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
+    # A limit that is no further from the truth than it is uncertain says nothing about the model.
+    parts[MODEL_FORM] = model_form if model_form > limit.error_bar + truth else 0.0
+    return max(parts, key=lambda name: parts[name])
+
+
+def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
+    """What dominates the error at each end, for a person."""
+    assert found.model_form is not None  # there are enough runs
+    assert found.model_form_bar is not None
+    step = " s" if resolution == "dt" else ""
+    coarse, fine = found.coarse, found.fine
+    if resolution != "dt":
+        coarse, fine = (name.replace(TIME_STEP, "step control") for name in (coarse, fine))
+    said = f"At {resolution} {number(found.coarse_step, 3)}{step} the {coarse} dominates{_order(found)}; "
+    said += f"at {number(found.fine_step, 3)}{step}, with an error of {number(found.fine_error)} {unit}, "
+    said += "still it does" if fine == coarse else f"the {fine}"
+    if found.truth is None:
+        said += ". Nothing is known of the model itself: the truth's error bar is not finite"
+    elif found.model_form > found.model_form_bar + found.truth:
+        known = number(found.model_form_bar, 1)
+        said += f". In the limit of small steps {number(found.model_form)} {unit} remain (known to {known})"
+    else:
+        seen = max(found.model_form_bar, found.truth)
+        said += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
+    if found.floor is not None and found.best_step is not None:
+        said += f"; {floor_text(found.best_step, found.floor, unit, worse=True)}, smaller steps are worse"
+    elif found.floor is not None:
+        said += f"; refining ends at a scatter of {number(found.floor, 1)} {unit}"
+    return said + "."
+
+
+def _order(found: CurveBudget) -> str:
+    if found.order is None:
+        return ""
+    declared = "" if found.declared is None else f", declared {found.declared}"
+    seen = f" from {number(found.order_from, 3)} s to {number(found.order_to, 3)} s{declared}"
+    if found.order_low is None or found.order_high is None:
+        return f" (order {found.order:.2f}{seen})"
+    return f" (order {found.order:.2f} ± {(found.order_high - found.order_low) / 2:.2f}{seen})"

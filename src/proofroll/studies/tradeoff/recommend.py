@@ -1,0 +1,238 @@
+"""The cheapest engine, formulation and step that holds a tolerance, from measured points alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from proofroll.core.engine_abilities import Level
+from proofroll.core.errors import InputError
+from proofroll.core.plugins import parse_engine
+from proofroll.files.json_data import MERGED, OPTIONAL
+from proofroll.studies.study_store import Measured
+from proofroll.studies.tradeoff.pareto import tied
+from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
+from proofroll.studies.tradeoff.requirements import MARGIN, Wish, absolute_tolerance, why_it_fails
+
+# What of a measured point is told.
+_OF_A_POINT = (
+    "engine", "settings", "resolution", "step", "level", "seconds_per_second", "interval", "confidence", "measurements",
+)  # fmt: skip
+# Rungs of the ladder that are worked out for a scene by hand rather than modelled in an engine.
+_BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
+
+
+def by_hand(level: str | None) -> bool:
+    """Whether a rung of the ladder solves equations derived for the scene, and is not an engine's model of it."""
+    return level in set(_BY_HAND)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A measured point, its error of the quantity, and why it is named."""
+
+    point: MeasuredPoint
+    error: float | None
+    reason: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: what a person needs of the point, the error and the reason."""
+        told = {name: getattr(self.point, name) for name in _OF_A_POINT}
+        return told | {"caveat": self.point.caveat, "error": self.error, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What to use for a tolerance of a quantity.
+
+    Attributes:
+        quantity, unit: what matters.
+        tolerance: in that unit.
+        margin: how many times smaller an error must be.
+        choice: the cheapest point that holds the tolerance with margin, and at every corner of the range.
+        ties: others that hold it and whose cost cannot be told from the choice's, for their intervals overlap.
+        runner_up: the cheapest of another engine or formulation.
+        first_failure: of all cheaper points, which fail, the most accurate.
+        least_model: the cheapest solution of the scene's own equations.
+        closest: where there is no choice, the most accurate point.
+    """
+
+    quantity: str
+    unit: str
+    tolerance: float
+    margin: float
+    choice: Choice | None
+    ties: list[Choice]
+    runner_up: Choice | None
+    first_failure: Choice | None
+    least_model: Choice | None
+    closest: Choice | None = field(default=None, metadata=OPTIONAL)
+
+
+@dataclass(frozen=True)
+class CheckedOver:
+    """The ranges of parameters at whose corners a choice was checked, how many these are, and for how long [s]."""
+
+    parameters: dict[str, list[float]]
+    corners: int
+    until: float
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """An answer with its circumstances.
+
+    Attributes:
+        answer: what to use.
+        scene, parameters: where.
+        budget: wall seconds per simulated second that may be spent, or None.
+        affordable: whether the choice is within it.
+        best_within_budget: where it is not, the most accurate point that is.
+        checked: the range.
+        measured: when, on which machine and with which versions.
+        not_measured: engines that were not asked about.
+    """
+
+    answer: Answer = field(metadata=MERGED)
+    scene: str
+    parameters: Mapping[str, float]
+    budget: float | None
+    affordable: bool
+    best_within_budget: Choice | None
+    checked: CheckedOver
+    measured: Measured
+    not_measured: list[str] | None = field(default=None, metadata=OPTIONAL)
+
+
+def recommend(study: TradeoffStudy, wish: Wish) -> Recommendation:
+    """The cheapest point that holds a tolerance, and what else a person should know.
+
+    Raises:
+        InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
+    """
+    absolute = absolute_tolerance(study, wish)
+    timed = [p for p in study.points if p.seconds_per_second is not None and wish.quantity in p.envelope]
+    timed.sort(key=lambda p: p.cost)
+    _require_measured(study, wish)
+
+    def why_not(point: MeasuredPoint) -> str | None:
+        return why_it_fails(study, point, wish, absolute)
+
+    def told(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
+        if point is None:
+            return None
+        return Choice(point, point.error.get(wish.quantity), reason or _holds(study, point, wish, absolute))
+
+    def best(points: Iterable[MeasuredPoint], reason: str) -> Choice | None:
+        return told(min(points, key=lambda p: p.held(wish.quantity), default=None), reason)
+
+    asked = [p for p in timed if _asked(p, wish)]
+    choice = next((p for p in asked if why_not(p) is None), None)
+    affordable = choice is not None and (wish.budget is None or choice.cost <= wish.budget)
+    others = [p for p in asked if choice is not None and p.id != choice.id and why_not(p) is None]
+    cheaper = asked if choice is None else asked[: asked.index(choice)]
+    failing = min(cheaper, key=lambda p: p.held(wish.quantity), default=None)
+    hand = next((p for p in timed if by_hand(p.level) and why_not(p) is None), None)
+    answer = Answer(
+        quantity=wish.quantity,
+        unit=study.quantities[wish.quantity].unit,
+        tolerance=absolute,
+        margin=MARGIN,
+        choice=told(choice),
+        ties=[tie for p in others if choice and tied(p.interval, choice.interval) and (tie := told(p))],
+        runner_up=told(next((p for p in others if choice and _model(p) != _model(choice)), None)),
+        first_failure=told(failing, why_not(failing) or "") if failing is not None else None,
+        least_model=None if hand is not None and choice is not None and hand.id == choice.id else told(hand),
+        closest=best(asked, "the most accurate that was measured; nothing beyond is guessed") if not choice else None,
+    )
+    within = [p for p in asked if wish.budget is not None and p.cost <= wish.budget]
+    return Recommendation(
+        answer,
+        study.scene,
+        study.parameters,
+        wish.budget,
+        affordable,
+        None if affordable else best(within, "the most accurate within the budget"),
+        CheckedOver(
+            {name: [min(values), max(values)] for name, values in study.over.items()},
+            max((len(p.corners) for p in study.points if p.corners is not None), default=0),
+            study.until,
+        ),
+        study.measured,
+    )
+
+
+def holding(study: TradeoffStudy, wish: Wish, *, here: bool = False) -> list[MeasuredPoint]:
+    """Every point among those asked for that holds the tolerance with margin, the cheapest first, untimed ones last.
+
+    With ``here`` the scene's own parameters are enough, whatever happens at the corners of the range.
+    """
+    absolute = absolute_tolerance(study, wish)
+    within = replace(study, over={}) if here else study
+    found = [p for p in study.points if _asked(p, wish) and why_it_fails(within, p, wish, absolute) is None]
+    return sorted(found, key=lambda p: p.cost)
+
+
+def _require_measured(study: TradeoffStudy, wish: Wish) -> None:
+    measured = list(dict.fromkeys(point.engine for point in study.points))
+    for text in wish.engines:
+        if parse_engine(text).name not in measured:
+            absent = study.absent.get(parse_engine(text).name)
+            raise InputError("engine", text, absent or f"measured are {', '.join(measured)}")
+
+
+def _asked(point: MeasuredPoint, wish: Wish) -> bool:
+    if wish.levels and point.level not in wish.levels:
+        return False
+    if not wish.engines:
+        return not by_hand(point.level) or bool(wish.levels)
+    return any(fits(point, text) for text in wish.engines)
+
+
+def fits(point: MeasuredPoint, text: str) -> bool:
+    """Whether a point is of the engine, and has the settings, of ``name[key=value,…]``."""
+    spec = parse_engine(text)
+    if point.engine != spec.name:
+        return False
+    return all(_same(point.settings.get(key), value) for key, value in spec.options.items())
+
+
+def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
+    """Whether a study restricted to some engines (to none: of all) can answer about those that are asked for."""
+    if not measured or not asked:
+        return not measured
+    whole = {spec.name for spec in map(parse_engine, measured) if not spec.options}
+    return all(text in measured or parse_engine(text).name in whole for text in asked)
+
+
+def _same(value: object, text: str) -> bool:
+    try:
+        return float(value) == float(text)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        return str(value).lower() == text.lower()
+
+
+def _holds(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str:
+    """By how much a point holds the tolerance."""
+    held, bar = point.held(wish.quantity), study.quantities[wish.quantity].truth_error_bar or 0.0
+    if not max(held, bar):
+        return "no error is seen"
+    # Of an error below the truth's error bar no more is known than that.
+    said = f"{_times(absolute / max(held, bar), at_least=held < bar)} better than asked"
+    if point.corners:
+        worst = max(corner.off(wish.tolerance.relative)[wish.quantity] for corner in point.corners)
+        there = wish.tolerance.value if wish.tolerance.relative else absolute
+        said += f", and {_times(there / worst)} at the worst of {len(point.corners)} corners" if worst else ""
+    return said
+
+
+def _times(ratio: float, *, at_least: bool = False) -> str:
+    if ratio >= 1000:
+        return "more than 1000 times"
+    return f"{'at least ' if at_least else ''}{ratio:.3g} times"
+
+
+def _model(point: MeasuredPoint) -> tuple[str, str | None]:
+    """The engine and the formulation."""
+    return point.engine, point.settings.get("formulation")

@@ -1,0 +1,121 @@
+"""What is asked of a recommendation, and why a measured point does not hold it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from proofroll.core.comparison import Tolerance
+from proofroll.core.convergence import floor_text
+from proofroll.core.errors import InputError, require_known
+from proofroll.core.number_text import number
+
+if TYPE_CHECKING:
+    from proofroll.studies.tradeoff.records import MeasuredPoint, SparseRun, TradeoffStudy
+
+# How many times smaller than the tolerance an error must be, at the scene's own parameters, to pass with margin.
+MARGIN = 2.0
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What is asked for.
+
+    Attributes:
+        quantity: an observable.
+        tolerance: largest error of it.
+        budget: wall seconds per simulated second that may be spent, or None.
+        engines: the engines among which to choose; every engine proper if empty.
+        levels: the rungs among which to choose; all if empty.
+    """
+
+    quantity: str
+    tolerance: Tolerance
+    budget: float | None = None
+    engines: tuple[str, ...] = ()
+    levels: tuple[str, ...] = ()
+
+
+def absolute_tolerance(study: TradeoffStudy, wish: Wish) -> float:
+    """The tolerance in the quantity's unit."""
+    known = study.quantities
+    require_known("quantity", wish.quantity, known, "measured are")
+    scale = known[wish.quantity].scale
+    if wish.tolerance.relative and scale is None:
+        advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity].unit}"
+        raise InputError("tolerance", f"{number(100 * wish.tolerance.value, 3)} %", advice)
+    return wish.tolerance.absolute(scale or 1.0)
+
+
+def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str | None:
+    """Why a point does not hold the tolerance, in one sentence; None if it does."""
+    sparse = point.sparse
+    lives = _lives_on_the_grid(study, sparse, wish.quantity, absolute) if sparse else None
+    return (
+        lives
+        or _why_not_here(study, point, wish.quantity, absolute)
+        or (_why_not_there(study, point, wish, absolute) if study.over else None)
+    )
+
+
+def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str | None:
+    """Why it does not hold it with margin at the scene's own parameters."""
+    unit = study.quantities[name].unit
+    error, held = point.error.get(name), point.envelope.get(name)
+    if error is None or held is None:
+        return f"{name} has no finite error: {point.message}"
+    if error > absolute:
+        return f"{name} is off by {number(error)} {unit}; {_blame(study, point, name, absolute)}"
+    if held > absolute:
+        finer = f"finer steps of the same model are off by {number(held)} {unit}"
+        return f"its error of {number(error)} {unit} is luck: {finer}"
+    if held * MARGIN > absolute:
+        return f"{name} is off by {number(held)} {unit}, which leaves less than a factor of {MARGIN:g} to the tolerance"
+    bar = study.quantities[name].truth_error_bar or 0.0
+    if bar * MARGIN > absolute:
+        return f"the truth itself is known only to {number(bar)} {unit}, so nothing can be seen to hold it"
+    return None
+
+
+def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
+    """Why a tolerance holds only because a step ends at each of many samples; None if that is not why."""
+    dense, rare, unit = sparse.dense_error.get(name), sparse.error.get(name), study.quantities[name].unit
+    if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
+        return None
+    seen = f"{name} is off by {number(rare)} {unit}" if rare is not None else f"there is no {name}: {sparse.message}"
+    return (
+        f"it holds only because its steps end at every sample: sampled every {sparse.every:g} s instead of "
+        f"{study.every:g} s, {seen}"
+    )
+
+
+def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str | None:
+    """Why it does not hold it at some corner of the range."""
+    name, unit = wish.quantity, study.quantities[wish.quantity].unit
+    if point.corners is None:
+        return "it was not checked over the range of the parameters"
+    relative = wish.tolerance.relative
+    allowed = wish.tolerance.value if relative else absolute
+    for corner in point.corners:
+        where = ", ".join(f"{parameter} = {value:g}" for parameter, value in corner.parameters.items())
+        there = corner.off(relative).get(name)
+        if there is None:
+            return f"at {where} there is no {name}: {corner.message}"
+        if there > allowed:
+            return f"at {where} {name} is off by {number(corner.errors[name])} {unit}"
+    return None
+
+
+def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> str:
+    """Whether a finer step could help."""
+    budget = next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
+    if budget is None or budget.model_form is None:
+        return "too few finer runs reached the end to say whether a finer step would do"
+    if budget.floor is not None and budget.best_step is not None and budget.floor > absolute:
+        floor = floor_text(budget.best_step, budget.floor, study.quantities[quantity].unit, worse=True)
+        return f"no step would do: {floor}"
+    if budget.best_step is not None and (point.step or 0.0) < budget.best_step:
+        return f"the step is too small for single precision, the best one is {number(budget.best_step)} s"
+    if budget.model_form - (budget.model_form_bar or 0.0) > absolute:
+        return f"no step would do, for {number(budget.model_form)} remain in the limit of small steps"
+    return "the step is too coarse"

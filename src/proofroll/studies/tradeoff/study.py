@@ -1,0 +1,220 @@
+"""A trade-off as it is kept: its points, error budgets, fronts and findings."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.convergence import floor_text
+from proofroll.core.number_text import counted, number
+from proofroll.core.observable import Role
+from proofroll.files.json_data import plain, record
+from proofroll.running.case import Status, hosts, told_hosts
+from proofroll.running.runner import Runner
+from proofroll.running.timing import Timing, write_benchmarks
+from proofroll.studies.study_store import keep, measured
+from proofroll.studies.tradeoff.claims import TradeoffClaims
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
+from proofroll.studies.tradeoff.error_budget import budget
+from proofroll.studies.tradeoff.pareto import front
+from proofroll.studies.tradeoff.recommend import by_hand
+from proofroll.studies.tradeoff.records import (
+    CurveBudget,
+    DroppedStep,
+    MeasuredPoint,
+    MeasuredQuantity,
+    SparseRun,
+    TradeoffJudged,
+    TradeoffStudy,
+    TruthCost,
+)
+from proofroll.studies.tradeoff.sweep import BROKEN
+from proofroll.studies.tradeoff.tradeoff import Tradeoff, pareto_entries, stored, tradeoff
+
+
+def make_tradeoff(
+    question: Question,
+    runner: Runner,
+    folder: Path,
+    *,
+    engines: Sequence[str] = (),
+    over: Mapping[str, Sequence[float]] | None = None,
+    claims: TradeoffClaims | None = None,
+    brief: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[TradeoffStudy, Path]:
+    """Measures a trade-off, see :func:`tradeoff`, and keeps it with all its timings in pyperf's form.
+
+    It goes below the folder of all results. ``claims`` are held against it unless it is restricted to some engines.
+
+    Returns:
+        the study with what was judged, and its file.
+
+    Raises:
+        InputError: something that does not exist.
+        ProofrollError: there is no truth, or the folder cannot be written.
+    """
+    found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
+    study = tradeoff_study(found)
+    judged = claims if not engines else None
+    said = TradeoffJudged(
+        claims.name if claims else None,
+        judged.contradictions(study) if judged else [],
+        judged.undecided(study) if judged else [],
+    )
+    study = dataclasses.replace(study, engines=sorted(engines), claims=said)
+    path = stored(folder, question, engines, brief=brief)
+    keep(study, path)
+    timings = {
+        f"{curve.engine} {point.step or ''}".strip(): point.timing
+        for curve in found.curves
+        for point in curve.points
+        if point.timing is not None
+    }
+    write_benchmarks(timings, path.with_suffix(".pyperf.json"))
+    return study, path
+
+
+def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
+    """What is kept of it, as it will be read: numbers that are not finite are None."""
+    question, reference, known = found.question, found.reference, found.reference.scene.observables
+    numbers = {point.case.key: number for number, point in enumerate(found.points)}
+    budgets = _budgets(found)
+    study = TradeoffStudy(
+        scene=question.scene,
+        parameters=question.parameters,
+        until=question.until,
+        every=question.every,
+        quantity=question.quantity,
+        quantities={
+            name: MeasuredQuantity(
+                known[name].unit,
+                reference.scale(name),
+                reference.true(name, curve)[1],
+                known[name].shown + name.removeprefix(known[name].name),  # with the element, where there are several
+                known[name].column,
+            )
+            for name, curve in reference.curves.items()
+        },
+        points=[point for curve in found.curves for point in _points(curve, list(reference.curves), numbers)],
+        dropped=[
+            DroppedStep(curve.engine, step, reason) for curve in found.curves for step, reason in curve.dropped.items()
+        ],
+        absent=found.absent,
+        budgets=budgets,
+        pareto=_fronts(found, found.curves, numbers),
+        pareto_engines=_fronts(found, [curve for curve in found.curves if not by_hand(curve.level)], numbers),
+        truth=TruthCost(**_cost(found.truth_timing), route=reference.dataset.attrs.get("route", "")),
+        over=found.over,
+        findings=_findings(found, budgets),
+        brief=found.brief,
+        measured=measured(),
+    )
+    return record(TradeoffStudy, plain(study))
+
+
+def _budgets(found: Tradeoff) -> list[CurveBudget]:
+    """The error budget of every curve for every quantity that it has."""
+    every, made = found.question.every, []
+    for curve in found.curves:
+        for quantity in found.reference.curves:
+            shown = [(point, point.curves[quantity]) for point in curve.points if quantity in point.curves]
+            declared = found.reference.scene.observables[quantity]
+            if not shown or (declared.role == Role.EVENT and not declared.asked_for):
+                continue
+            true = found.reference.true(quantity, shown[-1][1])[0]
+            if all(values.shape == true.shape for point, values in shown if point.case.every == every):
+                made.append(budget(curve, quantity, every, true, declared.unit))
+    return made
+
+
+def _fronts(found: Tradeoff, curves: Sequence[Curve], numbers: Mapping[str, int]) -> dict[str, list[int]]:
+    """For every observable the points that nothing beats, cheapest first."""
+    return {
+        name: [numbers[point.case.key] for point in front(pareto_entries(curves, name))] for name in found.quantities
+    }
+
+
+def _points(curve: Curve, quantities: Sequence[str], numbers: Mapping[str, int]) -> list[MeasuredPoint]:
+    envelopes = {name: curve.envelope(name) for name in quantities}
+    found = []
+    for index, point in enumerate(curve.points):
+        held = {name: errors[index] for name, errors in envelopes.items() if name in point.errors}
+        found.append(_point(curve, point, numbers[point.case.key], held))
+    return found
+
+
+def _point(curve: Curve, point: CurvePoint, number: int, envelope: dict[str, float]) -> MeasuredPoint:
+    facts, few = point.case.engine, point.sparse
+    return MeasuredPoint(
+        **_cost(point.timing),
+        id=number,
+        engine=facts.name,
+        curve=curve.engine,
+        level=curve.level,
+        settings=facts.settings,
+        resolution=facts.resolution,
+        step=point.step,
+        order=facts.order,
+        caveat=facts.caveat,
+        precision=facts.precision,
+        status=point.result.status,
+        message=point.result.message,
+        host=point.result.host,
+        error={**point.errors},
+        envelope={**envelope},
+        sparse=SparseRun(few.case.every, {**few.errors}, {**point.dense}, few.result.message) if few else None,
+        corners=point.corners,
+    )
+
+
+def _cost(timing: Timing | None) -> dict[str, Any]:
+    """The fields of :class:`~proofroll.studies.tradeoff.records.MeasuredCost`."""
+    if timing is None:
+        return {}
+    found = timing.interval
+    return {
+        "seconds_per_second": found.value,
+        "interval": (found.low, found.high) if found.confidence else None,
+        "confidence": found.confidence,
+        "rounds": list(timing.values),
+        "measurements": len(timing.values),
+    }
+
+
+def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
+    """What stands out, as sentences."""
+    said = told_hosts(hosts(point.result for point in found.points))
+    quantity = found.question.quantity
+    scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit
+    judged = [item for item in budgets if item.quantity in found.quantities and item.contradicts_declaration]
+    for curve in found.curves:
+        if other := [item for item in judged if item.curve == curve.engine]:
+            shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
+            said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
+    for item in budgets:
+        if item.quantity == quantity and item.best_step is not None and item.floor is not None:
+            told = floor_text(item.best_step, item.floor, unit, worse=True)
+            said.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
+    whole = [
+        c for c in found.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
+    ]
+    if whole:
+        names = ", ".join(curve.engine for curve in whole)
+        said.append(f"No tolerance breaks {names}, sampled every {found.question.sparse:g} s either.")
+    done = [point for point in found.points if point.result.status == Status.DONE]
+    broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
+    refused = sum(point.result.status == Status.REFUSED for point in found.points)
+    wrong = sum(point.result.status == Status.WRONG_MODEL for point in found.points)
+    ended = len(found.points) - len(done) - refused - wrong
+    built = f"{wrong} of a wrong model, " if wrong else ""
+    said.append(
+        f"{counted(len(found.points), 'runs')}: {refused} refused, {built}{ended} that did not reach the end, "
+        f"all with a reason; {len(broken)} that reached it silently "
+        f"with {quantity} off by more than {number(BROKEN * scale)} {unit}."
+    )
+    return said

@@ -1,0 +1,193 @@
+"""Every engine, formulation and preset over its usable range of steps or tolerances, on one scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.engine import whole_steps
+from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
+from proofroll.running.asking import described, resolve, resolve_with_truth
+from proofroll.running.case import Case, EngineDescription, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.judging.reference import Reference
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
+
+# Steps in sampling intervals: those that every curve starts with, and those by which it may be extended.
+_STEPS = (1.0, 1 / 2, 1 / 5, 1 / 10, 1 / 25, 1 / 50, 1 / 100, 1 / 250)
+_COARSER = (2.0, 4.0, 8.0)
+FINER = (1 / 500, 1 / 1000, 1 / 2500)
+_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+_LOOSER = (1.0, 10.0, 100.0)
+# A run is broken where its error is this part of the quantity's scale; a curve starts in the broken range.
+BROKEN = 0.1
+# A curve is refined while that still takes off this part of the error; the finest step is short enough to end that,
+# and how fast the machine is must not.
+GAIN = 0.4
+
+
+Progress = Callable[[Case, Result], None]
+
+
+def curves_of(
+    engines: Iterable[str], workers: Workers | None = None, requires: frozenset[str] = frozenset()
+) -> tuple[list[Curve], dict[str, str]]:
+    """A curve without points for every formulation and preset of the engines, and why some engine has none.
+
+    An engine is a name, or ``name[key=value,…]`` for one formulation or setting; none means all that are installed.
+    Formulations that provide nothing of what the scene requires are for other kinds of scenes, and left out.
+    """
+    wanted: list[tuple[str, str | None]] = []
+    absent: dict[str, str] = {}
+    asked = [(text, parse_engine(text)) for text in list(engines) or engine_names()]
+    told = described((spec.name for _, spec in asked), workers)
+    for text, spec in asked:
+        answer = told[spec.name]
+        if isinstance(answer, InputError):
+            raise answer
+        if isinstance(answer, ProofrollError):
+            absent[spec.name] = str(answer)
+            continue
+        chosen, foreign = _chosen(spec, answer, requires)
+        if foreign:
+            absent.setdefault(spec.name, "none of its formulations is for scenes of this kind")
+        wanted += chosen
+        if any(parse_engine(name).name == spec.name for name, _ in wanted):
+            absent.pop(spec.name, None)
+        elif spec.name not in absent:
+            raise InputError("engine", text, f"{spec.name} has {', '.join(answer.presets)}")
+    specs = [parse_engine(name) for name, _ in wanted]
+    curves = []
+    resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
+    for (name, level), facts in zip(wanted, resolved, strict=True):
+        if isinstance(facts, InputError):
+            raise facts
+        if isinstance(facts, EngineFacts):
+            curves.append(Curve(name, facts.on(requires), level))
+        else:
+            absent[name] = str(facts)
+    return curves, absent
+
+
+def _chosen(
+    spec: EngineSpec, described: EngineDescription, requires: frozenset[str]
+) -> tuple[list[tuple[str, str | None]], bool]:
+    """Formulations and presets that a specification means, each with its level; whether some are for other scenes."""
+    chosen: list[tuple[str, str | None]] = []
+    foreign = False
+    for formulation, presets in described.presets.items():
+        if spec.options.get("formulation", formulation) != formulation:
+            continue
+        if requires and not requires & set(described.provides[formulation]):
+            foreign = True
+            continue
+        for preset in presets:
+            if spec.options.get("preset", preset) == preset:
+                options = {"formulation": formulation, "preset": preset, **spec.options}
+                inner = ",".join(f"{key}={value}" for key, value in options.items())
+                chosen.append((f"{spec.name}[{inner}]", described.levels.get(formulation)))
+    return chosen, foreign
+
+
+def sweep(
+    question: Question,
+    curves: list[Curve],
+    runner: Runner,
+    progress: Progress | None = None,
+    finer: Sequence[float] = FINER,
+    gain: float = GAIN,
+) -> dict[float, Reference]:
+    """Fills the curves with points, and returns the truth by sampling interval.
+
+    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to ``finer`` ones,
+    in sampling intervals, while each takes off this part of the error, ``gain``.
+    """
+    references: dict[float, Reference] = {}
+    for first in (True, False, False, False):
+        wanted = [
+            (curve, value)
+            for curve in curves
+            for value in (_first(question, curve) if first else _further(question, curve, references, finer, gain))
+        ]
+        if not wanted:
+            break
+        _run(question, wanted, runner, references, progress)
+        for curve in curves:
+            curve.points.sort(key=lambda point: -(point.step or 0.0))
+    return references
+
+
+def _first(question: Question, curve: Curve) -> list[float]:
+    if curve.facts.resolution is None:
+        return [0.0]  # a closed form has nothing to refine: one point
+    own = float(curve.facts.settings[curve.facts.resolution])
+    if curve.fixed_step:
+        return [question.step(factor) for factor in _STEPS]
+    return list(dict.fromkeys([*_TOLERANCES, own]))
+
+
+def _further(
+    question: Question,
+    curve: Curve,
+    references: Mapping[float, Reference],
+    finer_steps: Sequence[float] = FINER,
+    gain: float = GAIN,
+) -> list[float]:
+    """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays."""
+    if curve.facts.resolution is None or not curve.points:
+        return []
+    found = []
+    scale = references[question.every].scale(question.quantity) or 1.0
+    coarsest, finest = curve.points[0], curve.points[-1]
+    ladder = [question.step(factor) for factor in _COARSER] if curve.fixed_step else _LOOSER
+    coarser = next((value for value in ladder if value not in curve.tried), None)
+    whole = coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale
+    if coarser is not None and whole and not curve.saturated(question.quantity):
+        found.append(coarser)
+    if not curve.fixed_step:
+        return found
+    finer = next((step for step in map(question.step, finer_steps) if step not in curve.tried), None)
+    if finer is not None and len(curve.points) > 1:
+        now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
+        if now < (1 - gain) * before:
+            found.append(finer)
+    return found
+
+
+def _run(
+    question: Question,
+    wanted: list[tuple[Curve, float]],
+    runner: Runner,
+    references: dict[float, Reference],
+    progress: Progress | None,
+) -> None:
+    """Runs curves with steps or tolerances, and the truths that they need besides those that are there."""
+    scene = question.loaded()
+    options: list[tuple[str, dict[str, Any]]] = []
+    for curve, value in wanted:
+        facts = curve.facts
+        options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
+    resolved, truth_facts = resolve_with_truth(options, runner.workers)
+    cases: list[tuple[Curve, tuple[Case, ...]]] = []
+    for (curve, value), found in zip(wanted, resolved, strict=True):
+        try:
+            if isinstance(found, ProofrollError):
+                raise found
+            if found.step is not None:
+                whole_steps(0.0, question.until, found.step)
+            cases.append((curve, question.cases(scene, found, max(question.every, found.step or 0.0))))
+        except ProofrollError as error:
+            curve.dropped[value] = str(error)
+    intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()
+    truths = {every: question.case(scene, truth_facts, every) for every in intervals}
+    results = runner.run([*truths.values(), *(case for _, both in cases for case in both)], progress)
+    for every, case in truths.items():
+        if results[case.key].status != Status.DONE:
+            raise ProofrollError(f"there is no truth here: {results[case.key].message}")
+        references[every] = Reference.read(scene, runner.store.trajectory(case))
+    for curve, both in cases:
+        curve.points.append(judged([CurvePoint(case, results[case.key]) for case in both], references, runner))

@@ -1,0 +1,220 @@
+"""Speed against accuracy: the curves of all engines, what their errors consist of, and the Pareto front.
+
+Three phases: the sweep, whose runs may go side by side; the check of the best points over a range of the scene's
+parameters; and the timing, in which one process at a time advances an engine while everything else is idle.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import itertools
+import json
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from proofroll.core.errors import Missing
+from proofroll.running.asking import resolve_with_truth
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.timing import ROUNDS, Timing, interleaved
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.judging.reference import Reference
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
+from proofroll.studies.tradeoff.pareto import front
+from proofroll.studies.tradeoff.records import Corner
+from proofroll.studies.tradeoff.sweep import FINER, GAIN, curves_of, sweep
+
+# What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
+# show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
+# A shorter measurement scatters more, which the interval of the rounds shows.
+BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS = 2, 0.1, 0.02
+# The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval,
+# and only where a step takes off as much of the error as with order 2: with order 1 the curve goes on as it came.
+BRIEF_FINER, BRIEF_GAIN = tuple(part for part in FINER if part >= 1e-3), 0.65
+
+
+@dataclass
+class Tradeoff:
+    """What the study found.
+
+    Attributes:
+        question: what was swept.
+        curves: with their points.
+        absent: engine -> why it has no curve.
+        references: the truth by sampling interval.
+        truth_timing: of the truth itself, measured in turns with the points; None if it could not be.
+        over: parameter -> values; the range over which the best points were checked.
+        brief: whether speeds were measured less often, as the option of :func:`tradeoff` says.
+    """
+
+    question: Question
+    curves: list[Curve]
+    absent: dict[str, str]
+    references: dict[float, Reference]
+    truth_timing: Timing | None = None
+    over: dict[str, list[float]] = field(default_factory=dict)
+    brief: bool = False
+
+    @property
+    def reference(self) -> Reference:
+        """The truth at the sampling interval of the question."""
+        return self.references[self.question.every]
+
+    @property
+    def points(self) -> list[CurvePoint]:
+        """Every point of every curve."""
+        return [point for curve in self.curves for point in curve.points]
+
+    @property
+    def quantities(self) -> list[str]:
+        """The observables of the truth that a recommendation may be asked for."""
+        return [name for name in self.reference.curves if self.reference.scene.observables[name].asked_for]
+
+
+Progress = Callable[[str], None]
+
+
+def tradeoff(
+    question: Question,
+    runner: Runner,
+    *,
+    engines: Iterable[str] = (),
+    over: Mapping[str, Sequence[float]] | None = None,
+    rounds: int = ROUNDS,
+    brief: bool = False,
+    progress: Progress | None = None,
+) -> Tradeoff:
+    """Runs the study.
+
+    Args:
+        question: the scene, how long, and the quantity that decides how far each curve goes.
+        runner: where the cases run.
+        engines: names or ``name[key=value,…]``; all that are installed if empty.
+        over: parameter -> values; every combination is a corner of the range.
+        rounds: how often every speed is measured.
+        brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
+            finest steps, but for those of curves that fall with order 2 or more.
+        progress: called with a short text after every run and every measurement.
+
+    Raises:
+        InputError: something that does not exist, or a quantity that the scene does not have.
+        Missing: no engine can be asked.
+    """
+    scene = question.loaded()
+    scene.observable(question.quantity)
+    curves, absent = curves_of(engines, runner.workers, scene.requires)
+    if not curves:
+        raise Missing("there is no engine to measure: " + "; ".join(f"{name}: {why}" for name, why in absent.items()))
+    tell = progress or (lambda _: None)
+
+    def told(case: Case, _: Result) -> None:
+        tell(case.engine.name)
+
+    finer, gain = (BRIEF_FINER, BRIEF_GAIN) if brief else (FINER, GAIN)
+    references = sweep(question, curves, runner, told, finer, gain)
+    ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
+    found = Tradeoff(question, curves, absent, references, over=ranges, brief=brief)
+    _, truth = resolve_with_truth([], runner.workers)
+    _time(found, question.case(found.reference.scene, truth, question.every), runner.workers, rounds, tell)
+    if ranges:
+        _check(found, truth, runner, told)
+    return found
+
+
+def _time(found: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:
+    """Measures the speed of every point that reached the end, and of the truth."""
+    cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
+    cases[truth.key] = truth
+    seconds = BRIEF_SECONDS if found.brief else None
+    with Stopwatch(workers) as stopwatch:
+        timings = interleaved(
+            {key: partial(stopwatch, case, seconds) for key, case in cases.items()},
+            min(rounds, BRIEF_ROUNDS) if found.brief else rounds,
+            once_above=BRIEF_ONCE if found.brief else np.inf,
+            progress=lambda key: tell(f"timing {cases[key].engine.name}"),
+        )
+    found.truth_timing = timings.get(truth.key)
+    for point in found.points:
+        point.timing = timings.get(point.case.key)
+
+
+def _check(found: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[Case, Result], None]) -> None:
+    """Runs the points on any formulation's own Pareto front, for any quantity, at every corner of the range.
+
+    Whoever asks for a kind of model must not lose a formulation that another one of the same engine dominates.
+    """
+    formulations: dict[tuple[str, object], list[Curve]] = {}
+    for curve in found.curves:
+        formulations.setdefault((curve.facts.name, curve.facts.settings.get("formulation")), []).append(curve)
+    chosen = {
+        point.case.key: point
+        for curves in formulations.values()
+        for quantity in found.quantities
+        for point in front(pareto_entries(curves, quantity))
+    }
+    asked = []
+    for values in itertools.product(*found.over.values()):
+        place = dict(zip(found.over, values, strict=True))
+        question = dataclasses.replace(found.question, parameters={**found.question.parameters, **place})
+        scene = question.loaded()
+        runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
+        intervals = {case.every for both in runs.values() for case in both}
+        truths = {every: question.case(scene, truth, every) for every in intervals}
+        asked.append((place, scene, truths, runs))
+    cases = [case for _, _, truths, runs in asked for case in (*truths.values(), *itertools.chain(*runs.values()))]
+    results = runner.run(cases, told)
+    corners: dict[str, list[Corner]] = {key: [] for key in chosen}
+    for place, scene, truths, runs in asked:
+        references = {
+            every: Reference.read(scene, runner.store.trajectory(case))
+            for every, case in truths.items()
+            if results[case.key].status == Status.DONE
+        }
+        for key, both in runs.items():
+            lost = next((case.every for case in both if case.every not in references), None)
+            if lost is None:
+                point = judged([CurvePoint(case, results[case.key]) for case in both], references, runner)
+                corners[key].append(_corner(place, point, references[both[0].every]))
+            else:
+                said = results[truths[lost].key].message
+                corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
+    for point in found.points:
+        point.corners = corners.get(point.case.key)
+
+
+def _corner(place: dict[str, float], point: CurvePoint, reference: Reference) -> Corner:
+    errors = {name: error for name, error in point.errors.items() if np.isfinite(error)}
+    relative = {name: error / (reference.scale(name) or 1.0) for name, error in errors.items()}
+    ended = point.sparse or point
+    return Corner(place, errors, relative, (point if not point.errors else ended).result.message)
+
+
+def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePoint, float, float]]:
+    """Every timed point with its cost and the envelope of its error, of which the truth shows no more than its bar."""
+    entries = []
+    for curve in curves:
+        for point, error in zip(curve.points, curve.envelope(quantity), strict=True):
+            if point.timing is not None and np.isfinite(error):
+                entries.append((point, point.timing.interval.value, max(error, point.bars.get(quantity, 0.0))))
+    return entries
+
+
+def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
+    """Where the study of a question is stored below the folder of results; a brief or restricted one by itself."""
+    scene = question.loaded()
+    parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
+    digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)
+    return folder / "tradeoff" / f"{'-'.join([scene.name, *digests])}{'-brief' if brief else ''}.json"
+
+
+def restricted(folder: Path, question: Question) -> list[Path]:
+    """Files of the studies of a question that are restricted to some engines."""
+    whole = stored(folder, question)
+    found = whole.parent.glob(f"{whole.stem}-*.json")
+    return sorted(path for path in found if not path.stem.endswith("-brief") and path.suffixes == [".json"])

@@ -1,0 +1,1 @@
+"""Two versions of one engine on the same cases, and their differences."""

@@ -1,0 +1,194 @@
+"""One case in two versions of an engine: verdicts, observed orders and numbers that changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from proofroll.core.dataset import observe, scales
+from proofroll.core.observable import Role
+from proofroll.core.plugins import parse_engine
+from proofroll.core.scene import Scene
+from proofroll.core.turns import on_turns_of
+from proofroll.core.verdict import Verdict
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import read
+from proofroll.running.case import Result, Status
+from proofroll.running.runner import Runner
+from proofroll.studies.comparison.outcome import Run
+from proofroll.studies.comparison.planning import Plan, point_name
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Of two runs relative to the size of the quantity: another compiler or another order of sums moves numbers by some
+# 1e-13, and the solvers of constraints stop at tolerances of theirs; what physics or a method changes is far above.
+ROUND_OFF = 1e-9
+# Two observed orders that are further apart are different methods: a ladder shows a whole order to a tenth or two.
+_ANOTHER_ORDER = 0.5
+
+
+def setting_of(run: Run) -> str:
+    """Settings as the file writes them, without the engine."""
+    return ", ".join(f"{key}={value}" for key, value in parse_engine(run.row.engine).options.items()) or "as it is"
+
+
+class NumberKind(StrEnum):
+    """How far numbers of two versions are apart."""
+
+    SAME_BITS = "same bits"
+    ROUND_OFF = "round-off"
+    CHANGED = "changed"
+
+
+@dataclass(frozen=True)
+class NumbersApart:
+    """How far two trajectories are apart, by the observable that differs most for its size.
+
+    Attributes:
+        quantity, unit: of that observable; empty where nothing differs.
+        difference: the largest, in its unit.
+        relative: the same in parts of its size [1].
+        kind: what that means.
+    """
+
+    quantity: str = ""
+    unit: str = ""
+    difference: float = 0.0
+    relative: float = 0.0
+    kind: NumberKind = NumberKind.SAME_BITS
+
+
+@dataclass(frozen=True)
+class RunInVersion:
+    """A case in one of the versions.
+
+    Attributes:
+        status, message: how it ended.
+        verdict: of its worst observable.
+        declared_order: of the engine with these settings, or None.
+        errors: largest error of each observable that is judged.
+        versions: of all that it ran on.
+    """
+
+    status: Status
+    message: str
+    verdict: Verdict
+    declared_order: int | None
+    errors: dict[str, float]
+    versions: dict[str, str]
+
+    @classmethod
+    def of(cls, run: Run) -> Self:
+        """What is told of a judged run."""
+        order = run.facts.order if run.facts else None
+        errors = {judgement.observable: judgement.error for judgement in run.judgements}
+        return cls(run.result.status, run.result.message, run.verdict, order, errors, run.result.versions)
+
+
+@dataclass(frozen=True)
+class OrderChange:
+    """Observed orders of convergence of a quantity that are those of different methods."""
+
+    quantity: str
+    old: float
+    new: float
+
+
+@dataclass(frozen=True)
+class CaseDifference:
+    """One case in both versions.
+
+    Attributes:
+        comparison, scene, setting, point: which case.
+        old, new: how it went.
+        numbers: how far they are apart; None where one has no trajectory.
+        orders: observed orders that changed.
+        changed: what did of verdicts, ``refused (why) → agrees``.
+    """
+
+    comparison: str
+    scene: str
+    setting: str
+    point: str
+    old: RunInVersion
+    new: RunInVersion
+    numbers: NumbersApart | None
+    orders: list[OrderChange]
+    changed: list[str]
+
+
+def case_difference(
+    item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner
+) -> CaseDifference:
+    """One case in both versions."""
+    verdicts = [
+        (one.observable, one.verdict, other.verdict)
+        for one in before.judgements
+        for other in after.judgements
+        if one.observable == other.observable and one.verdict != other.verdict
+    ]
+    changed = []
+    if before.result.status != after.result.status:
+        changed.append(f"{_ending(before)} → {_ending(after)}")
+    elif before.verdict != after.verdict or verdicts:
+        which = ", ".join(f"{name} {one} → {other}" for name, one, other in verdicts)
+        changed.append(which or f"{before.verdict} → {after.verdict}")
+    orders = [
+        OrderChange(one.observable, one.order, other.order)
+        for one in before.judgements
+        for other in after.judgements
+        if one.observable == other.observable and one.order and other.order
+        if abs(one.order - other.order) > _ANOTHER_ORDER
+    ]
+    return CaseDifference(
+        comparison=item.comparison.name,
+        scene=item.comparison.scene,
+        setting=setting_of(before),
+        point=point_name(before.parameters),
+        old=RunInVersion.of(before),
+        new=RunInVersion.of(after),
+        numbers=_numbers(item, before, after, results, runner),
+        orders=orders,
+        changed=changed,
+    )
+
+
+def _ending(run: Run) -> str:
+    return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
+
+
+def _numbers(item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner) -> NumbersApart | None:
+    """How far the trajectories are apart; None: there are none."""
+    if before.case is None or after.case is None or not before.result.trajectory or not after.result.trajectory:
+        return None
+    one, other = (read(runner.store.trajectory(run.case)) for run in (before, after) if run.case is not None)
+    scene = load_scene(item.comparison.scene, **before.parameters)
+    truth = item.truths[point_name(before.parameters)]
+    sizes = scales(scene, read(runner.store.trajectory(truth))) if results[truth.key].trajectory else {}
+    return _apart(scene, one, other, sizes)
+
+
+def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:
+    found = NumbersApart()
+    values, others = observe(scene, one), observe(scene, other)
+    for name, mine in values.items():
+        item, theirs = scene.observables[name], others.get(name)
+        if theirs is None or item.role not in {Role.MOTION, Role.REACTION} or mine.ndim != theirs.ndim:
+            continue
+        theirs = on_turns_of(mine, theirs, name, (one, other))
+        if theirs is None:
+            continue
+        count = min(len(mine), len(theirs))
+        if mine[:count].shape != theirs[:count].shape or np.array_equal(mine[:count], theirs[:count], equal_nan=True):
+            continue
+        difference = float(np.nanmax(np.abs(mine[:count] - theirs[:count]), initial=0.0))
+        relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
+        if not relative < found.relative:  # also where it is not a number: then they differ
+            kind = NumberKind.CHANGED if relative > ROUND_OFF else NumberKind.ROUND_OFF
+            found = NumbersApart(name, item.unit, difference, relative, kind)
+    return found

@@ -1,0 +1,223 @@
+"""One engine in two versions: the same cases in both, and what changed."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from proofroll.core.comparison import Comparison
+from proofroll.core.plugins import parse_engine, plain_name
+from proofroll.running.asking import describe
+from proofroll.running.case import EngineDescription, Status, hosts
+from proofroll.running.runner import Runner
+from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.timing import Interval, interleaved, ratio
+from proofroll.studies.comparison.compare import evaluate
+from proofroll.studies.comparison.outcome import Run
+from proofroll.studies.comparison.planning import Plan, plan
+from proofroll.studies.versions.difference import (
+    CaseDifference,
+    NumberKind,
+    NumbersApart,
+    OrderChange,
+    case_difference,
+    setting_of,
+)
+
+# Rounds of timing: with twelve one estimate moved by 5 % between series, with twenty the interval is some 4 % wide.
+ROUNDS = 20
+
+Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class SettingDifference:
+    """All points of a setting in both versions.
+
+    Attributes:
+        comparison, setting: which.
+        cases: how many points.
+        verdicts: ``old`` and ``new`` -> verdict -> how many cases.
+        numbers: of the case whose numbers are farthest apart.
+        declared_order: ``old`` and ``new`` -> those of its points, without repetition; none declared is left out.
+        orders: observed orders that changed, of all cases.
+        changed: how many cases have another verdict.
+        speed: time of the new version over that of the old one, or None.
+    """
+
+    comparison: str
+    setting: str
+    cases: int
+    verdicts: dict[str, dict[str, int]]
+    numbers: NumbersApart | None
+    declared_order: dict[str, list[int]]
+    orders: list[OrderChange]
+    changed: int
+    speed: Interval | None
+
+
+@dataclass(frozen=True)
+class EngineVersion:
+    """One of the versions: the engine as ``--engine`` takes it, its version, and the path of its Python."""
+
+    name: str
+    version: str
+    interpreter: str
+
+
+@dataclass(frozen=True)
+class ChangedDefault:
+    """What the engine takes where nobody chooses, or a formulation provides, in both versions; None: nothing."""
+
+    name: str
+    old: Any
+    new: Any
+
+
+@dataclass(frozen=True, kw_only=True)
+class VersionsStudy:
+    """One engine in two versions.
+
+    Attributes:
+        engine: its name.
+        old, new: the versions.
+        comparisons: names of what was run; of a robot its file.
+        rows: what changed by comparison and setting.
+        cases: what changed by case.
+        defaults: what changed of the engine's own choices.
+        hosts: machine of a cluster -> how many of the results it made.
+        robot: of a robot file: its ``file``, ``layers``, and rows ``old`` and ``new``; else None.
+        changed: sentences about verdicts that changed.
+        lost: sentences about runs whose engine is missing.
+    """
+
+    engine: str
+    old: EngineVersion
+    new: EngineVersion
+    comparisons: list[str]
+    rows: list[SettingDifference] = field(default_factory=list)
+    cases: list[CaseDifference] = field(default_factory=list)
+    defaults: list[ChangedDefault] = field(default_factory=list)
+    hosts: dict[str, int] = field(default_factory=dict)
+    robot: Any = None
+    changed: list[str]
+    lost: list[str]
+
+
+def compared(
+    sides: tuple[str, str],
+    comparisons: Sequence[Comparison],
+    runner: Runner,
+    rounds: int = ROUNDS,
+    progress: Progress | None = None,
+) -> VersionsStudy:
+    """The same cases in two versions of an engine, the old and the new ``NAME`` or ``NAME@PLACE``, and what changed.
+
+    Speeds are measured in so many rounds; with 0 they are not. ``progress`` is called with what has just been done.
+
+    Raises:
+        InputError, Missing, WorkerDied: one of them cannot be asked at all.
+    """
+    progress = progress or (lambda _: None)
+    told = [describe(side, runner.workers) for side in sides]
+    plans = [plan(dataclasses.replace(item, timed=False), sides, runner.workers) for item in comparisons]
+    cases = {case.key: case for item in plans for case in item.cases}
+    results = runner.run(cases.values(), lambda case, _: progress(case.engine.name))
+    found: list[tuple[Plan, Run, Run]] = []
+    for item in plans:
+        runs = evaluate(item, results, runner).runs
+        one, other = ([run for run in runs if parse_engine(run.row.engine).name == side] for side in sides)
+        found += [(item, before, after) for before, after in zip(one, other, strict=True)]
+    differences = [case_difference(item, before, after, results, runner) for item, before, after in found]
+    speeds = _speeds(found, runner, rounds, progress) if rounds else {}
+    old, new = (EngineVersion(name, its.version, its.interpreter) for name, its in zip(sides, told, strict=True))
+    return VersionsStudy(
+        engine=plain_name(parse_engine(sides[0]).name),
+        old=old,
+        new=new,
+        comparisons=[item.name for item in comparisons],
+        rows=_rows(differences, speeds),
+        cases=differences,
+        defaults=_defaults(*told),
+        hosts=hosts(run.result for _, *pair in found for run in pair),
+        changed=[f"{_where(case)}: {what}" for case in differences for what in case.changed],
+        lost=[
+            f"{name} {_where(case)}: {side.message}"
+            for case in differences
+            for name, side in (("old", case.old), ("new", case.new))
+            if side.status == Status.MISSING
+        ],
+    )
+
+
+def _where(case: CaseDifference) -> str:
+    return f"{case.comparison}: {case.setting}" + (f" at {case.point}" if case.point else "")
+
+
+def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Interval]) -> list[SettingDifference]:
+    """Summaries of all points of a setting."""
+    grouped: dict[tuple[str, str], list[CaseDifference]] = {}
+    for case in cases:
+        grouped.setdefault((case.comparison, case.setting), []).append(case)
+    return [
+        SettingDifference(
+            comparison=key[0],
+            setting=key[1],
+            cases=len(group),
+            verdicts={
+                "old": dict(Counter(str(case.old.verdict) for case in group)),
+                "new": dict(Counter(str(case.new.verdict) for case in group)),
+            },
+            numbers=max(
+                (case.numbers for case in group if case.numbers is not None),
+                key=lambda item: (item.relative, item.kind != NumberKind.SAME_BITS),
+                default=None,
+            ),
+            declared_order={
+                "old": sorted({order for case in group if (order := case.old.declared_order)}),
+                "new": sorted({order for case in group if (order := case.new.declared_order)}),
+            },
+            orders=[order for case in group for order in case.orders],
+            changed=sum(bool(case.changed) for case in group),
+            speed=speeds.get(key),
+        )
+        for key, group in grouped.items()
+    ]
+
+
+def _speeds(
+    found: Sequence[tuple[Plan, Run, Run]], runner: Runner, rounds: int, progress: Progress
+) -> dict[tuple[str, str], Interval]:
+    """Time of the new version over that of the old one, for the first point of each setting that both run."""
+    chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
+    for item, before, after in found:
+        if before.result.status == after.result.status == Status.DONE:
+            chosen.setdefault((item.comparison.name, setting_of(before)), (before, after))
+    speeds = {}
+    with Stopwatch(runner.workers) as watch:
+        for key, (before, after) in chosen.items():
+            assert before.case is not None  # both ran
+            assert after.case is not None
+            timings = interleaved({"old": partial(watch, before.case), "new": partial(watch, after.case)}, rounds)
+            progress(f"timing {key[1]}")
+            if timings.keys() == {"old", "new"} and len(timings["old"].values) == len(timings["new"].values):
+                speeds[key] = ratio(timings["new"], timings["old"])
+    return speeds
+
+
+def _defaults(old: EngineDescription, new: EngineDescription) -> list[ChangedDefault]:
+    """What the engine itself takes where nobody chooses, and what formulations can represent, if that changed."""
+    both: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
+        (old.defaults, new.defaults),
+        (old.provides, new.provides),
+    )
+    return [
+        ChangedDefault(name, one.get(name), other.get(name))
+        for one, other in both
+        for name in sorted(one.keys() | other.keys())
+        if one.get(name) != other.get(name)
+    ]

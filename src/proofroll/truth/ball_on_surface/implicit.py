@@ -1,0 +1,268 @@
+"""Stick and slip by implicit collocation in the world frame: the second route, for every surface."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.errors import Diverged
+from proofroll.elements.ball_on_surface.mechanics import always_pressed
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.truth.ball_on_surface import unreduced_taylor
+from proofroll.truth.ball_on_surface.contact import ContactRates
+from proofroll.truth.ball_on_surface.impact import by_equations
+from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
+from proofroll.truth.collocation import Step, System, next_length, nodes, take
+from proofroll.truth.crossing import first_rise
+
+_TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
+_APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,
+_CLOSE = 0.99  # and when it is near, where the time left is well known
+_FURTHER = 1.2  # a polynomial is continued over this part of the length of its own step
+_MANY = 300  # steps of a leg that rolls: the rest of a longer one is left to a compiled series
+_STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
+
+
+class Implicit(Route):
+    """Route in the state y = (p, ω, u) of :class:`ContactRates`.
+
+    Args:
+        body: the scene's ball.
+        first_step: longest first step of a slip, relative to the pace of the motion. That step goes from u = 0 on.
+    """
+
+    name = "world frame by signed distance, implicit collocation"
+    impact = staticmethod(by_equations)
+
+    def __init__(self, body: RollingBall, first_step: float = 0.1) -> None:
+        self._body = body
+        self._contact = ContactRates(body)
+        self._first = first_step
+        self._pace = body.ball.radius / max(float(self._contact.scale[-1]), 1e-300)  # [s]
+        self._mu = body.contact.mu_static
+        self._held = always_pressed(body)  # then no step need be searched for a lift-off
+
+    def start(self) -> FloatArray:
+        """See :class:`Route`."""
+        return np.concatenate([self._body.p0, self._body.w0, np.zeros(3)])
+
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        gap, e1 = float(self._body.surface.gap(p_WB)), self._body.surface.normal(p_WB)
+        slip = v_WB + self._body.ball.radius * cross(w_WB, e1)
+        return np.concatenate([p_WB + gap * e1, w_WB, slip - (slip @ e1) * e1])
+
+    def friction(self, state: FloatArray) -> tuple[float, float]:
+        """See :class:`Route`; [N]."""
+        needed, available = (float(x[0]) for x in self._needed_and_available(state[None, :]))
+        return needed, available
+
+    def rates(self, state: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        return np.asarray(self._contact.rates(state[None, :], True)[0])
+
+    def world(self, state: FloatArray) -> World:
+        """See :class:`Route`."""
+        return state[:3], self._contact.velocity(state[None, :])[0], state[3:6]
+
+    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        e1 = self._body.surface.normal(state[:3])
+        w = (state[3:6] @ e1) * e1 - cross(e1, v_WB) / self._body.ball.radius
+        return np.concatenate([state[:3], w, np.zeros(3)])
+
+    def stick(self, time: float, state: FloatArray, until: float) -> Leg:
+        """See :class:`Route`."""
+        walk = _Walk(self._contact.system(sticking=True), time, state, until)
+        resisted = self._body.contact.rolling_resistance > 0
+        length = self._pace
+        compiled = self._held and self._body.wall_rate is None and unreduced_taylor.available(self._body)
+        while walk.time < until:
+            if compiled and len(walk.steps) == _MANY:
+                return self._rolls_on(walk, until)
+            left = self._until_still(walk.state, True) if resisted else np.inf
+            if left < _STILL * self._pace:
+                halted = walk.state + left * self.rates(walk.state)
+                return walk.leg(self, True, walk.time + left, self.nudged(halted, np.zeros(3)), End.HALT)
+            step, length = walk.step(min(length, self._approach(left)))
+            ends = [] if self._held else [(End.LIFTOFF, partial(self._pull_along, step, True))]
+            ends += [(End.CONE, partial(self._excess_along, step))] if np.isfinite(self._mu) else []
+            found = [(first_rise(g, step.time, step.time + step.length), why) for why, g in ends]
+            if ended := [(when, why) for when, why in found if when is not None]:
+                when, why = min(ended, key=lambda item: item[0])
+                return walk.leg(self, True, when, walk.cut(when), why)
+        return walk.leg(self, True, until, walk.state, End.TIME)
+
+    def _rolls_on(self, walk: _Walk, until: float) -> Leg:
+        """The rest of a long leg by Taylor series of the same equations, which take a fraction of the time."""
+        y, begun = walk.state, walk.time
+        end, slips, states = unreduced_taylor.until_slip(self._body, begun, y[:6], until)
+
+        def at(times: FloatArray) -> FloatArray:
+            return np.concatenate([states(times), np.zeros((len(times), 3))], axis=1)
+
+        early = walk.leg(self, True, begun, y, End.TIME).motion
+
+        def motion(times: FloatArray) -> BallMotion:
+            return joined(times, [(-np.inf, early), (begun, lambda late: self.motion(at(late), True))], self.name)
+
+        return Leg(walk.start, end, True, at(np.array([end]))[0], End.CONE if slips else End.TIME, motion)
+
+    def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
+        """See :class:`Route`."""
+        if slip is not None:
+            state = np.concatenate([state[:6], slip])
+        walk = _Walk(self._contact.system(sticking=False), time, state, until)
+        length = min(self._first * self._pace, until - time)
+        while walk.time < until:
+            started = bool(walk.steps) or slip is not None
+            left = self._until_still(walk.state, False) if started else np.inf
+            if left < _STILL * self._pace:
+                still = walk.state + left * self._contact.rates(walk.state[None, :], False)[0]
+                still[6:] = 0.0
+                if walk.time + left > until:
+                    break
+                return walk.leg(self, False, walk.time + left, still, End.STILL)
+            guess = None if started else self._first_guess(state)
+            step, length = walk.step(min(length, self._approach(left)), guess)
+            pull = partial(self._pull_along, step, False)
+            gone = None if self._held else first_rise(pull, step.time, step.time + step.length)
+            if gone is not None:
+                return walk.leg(self, False, gone, walk.cut(gone), End.LIFTOFF)
+        return walk.leg(self, False, until, walk.state, End.TIME)
+
+    def motion(self, y: FloatArray, sticking: bool) -> BallMotion:
+        """Motion in states, shape (n, 9)."""
+        return BallMotion(y[:, :3], self._contact.velocity(y), y[:, 3:6], self._contact.force(y, sticking), self.name)
+
+    def force_at_start(self, state: FloatArray) -> FloatArray:
+        """Force of the wall at the very start of a slip [N], shape (3,), where u = 0 but has a direction."""
+        tiny = np.concatenate([state[:6], 1e-100 * self._contact.slip_direction_at_rest(state)])
+        return np.asarray(self._contact.force(tiny[None, :], False)[0])
+
+    def _needed_and_available(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        friction, N = self._contact.split(y, sticking=True)
+        return np.linalg.norm(friction, axis=-1), self._mu * N
+
+    def _excess_along(self, step: Step, times: FloatArray) -> FloatArray:
+        """Friction that is missing [N]: smooth also where a step reaches beyond N = 0."""
+        needed, available = self._needed_and_available(step(times))
+        return needed - available
+
+    def _pull_along(self, step: Step, sticking: bool, times: FloatArray) -> FloatArray:
+        """-N [N]: rises through zero where the ball leaves the wall."""
+        return -self._contact.split(step(times), sticking)[1]
+
+    def _until_still(self, state: FloatArray, sticking: bool) -> float:
+        """Time until the centre (sticking) or the contact point (slipping) stands still at the present rate [s]."""
+        rates = self._contact.rates(state[None, :], sticking)[0]
+        if sticking:
+            v, e1 = self._contact.velocity(state[None, :])[0], self._body.surface.normal(state[:3])
+            v_rate = -self._body.ball.radius * cross(rates[3:6], e1)
+        else:
+            v, v_rate = state[6:], rates[6:]
+        size = float(np.linalg.norm(v))
+        slowing = -float(v @ v_rate) / size if size > 0 else 0.0
+        return size / slowing if slowing > 0 else np.inf
+
+    def _approach(self, left: float) -> float:
+        """Longest step when so much time is left until something stands still [s]."""
+        return left * float(np.clip(1 - 2 * left / self._pace, _APPROACH, _CLOSE))
+
+    def _first_guess(self, state: FloatArray) -> Callable[[float], FloatArray]:
+        """States at the nodes of a first step: u = (G t + α t²/2) d, the rest along its tangent."""
+        d = self._contact.slip_direction_at_rest(state)
+
+        def growth(y: FloatArray) -> tuple[float, FloatArray]:
+            along = self._contact.slip_direction_at_rest(y)
+            rates = self._contact.rates(np.concatenate([y[:6], 1e-100 * along])[None, :], False)[0]
+            return float(rates[6:] @ along), rates
+
+        G, rates = growth(state)
+        span = 1e-4 * self._pace
+        alpha = (growth(state + span * rates)[0] - G) / span
+
+        def guess(length: float) -> FloatArray:
+            t = nodes(length)[:, None]
+            y = state + t * rates
+            y[:, 6:] = np.maximum(G * t + 0.5 * alpha * t**2, 1e-100) * d
+            return y
+
+        return guess
+
+
+class _Walk:
+    """Steps of one leg, each controlled by its error."""
+
+    def __init__(self, system: System, time: float, state: FloatArray, until: float) -> None:
+        self._system, self.start, self._state, self._until = system, time, state, until
+        self.steps: list[Step] = []
+
+    @property
+    def time(self) -> float:
+        """Reached so far [s]; exactly ``until`` at the end."""
+        if not self.steps:
+            return self.start
+        end = self.steps[-1].time + self.steps[-1].length
+        return self._until if self._until - end <= 4 * np.spacing(self._until) else end
+
+    @property
+    def state(self) -> FloatArray:
+        """Reached so far, shape (9,)."""
+        return self.steps[-1].last if self.steps else self._state
+
+    def step(self, length: float, guess: Callable[[float], FloatArray] | None = None) -> tuple[Step, float]:
+        """One accepted step, at most of this length [s], and the length to try next."""
+        length = min(length, self._until - self.time)
+        # A spin or slip that has grown has round-off of its present size, below which no error can be told.
+        sizes = [0.0, *np.linalg.norm(self.state[3:].reshape(2, 3), axis=-1)]
+        system = replace(self._system, scale=np.maximum(self._system.scale, np.repeat(sizes, 3)))
+        guess = guess or self._continued
+        while True:
+            if self.time + length == self.time:
+                raise Diverged(f"the truth (implicit collocation) could not be integrated past {self.time:g} s")
+            step = take(system, self.time, self.state, length, guess(length))
+            wanted = next_length(step, _TOLERANCE)
+            if step.error <= _TOLERANCE:
+                self.steps.append(step)
+                return step, wanted
+            length, guess = min(wanted, 0.8 * length), self._tangent if self.steps else guess
+
+    def _continued(self, length: float) -> FloatArray:
+        """The last step's polynomial, or where it would have to reach too far the tangent at its end."""
+        if not self.steps or length > _FURTHER * self.steps[-1].length:
+            return self._tangent(length)
+        return self.steps[-1](self.time + nodes(length))
+
+    def _tangent(self, length: float) -> FloatArray:
+        """Tangent at the end of the last step: a poorer guess for Newton's method than a polynomial, but safer."""
+        rates = self._system.rates(self.state[None, :])[0]
+        return np.asarray(self.state + nodes(length)[:, None] * rates)
+
+    def cut(self, time: float) -> FloatArray:
+        """State at a time within the last step, shape (9,)."""
+        return np.asarray(self.steps[-1](np.array([time]))[0])
+
+    def leg(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> Leg:
+        """The leg made of the steps so far."""
+        steps, first = self.steps, self._state
+        starts = np.array([step.time for step in steps])
+
+        def motion(times: FloatArray) -> BallMotion:
+            y = np.broadcast_to(first, (len(times), 9)).copy()
+            index = np.searchsorted(starts, times, side="right") - 1
+            for number in np.unique(index[index >= 0]):
+                here = index == number
+                y[here] = steps[number](np.minimum(times[here], starts[number] + steps[number].length))
+            result = route.motion(y, sticking)
+            if not sticking:
+                for row in np.flatnonzero(~np.any(y[:, 6:], axis=-1)):
+                    result.force[row] = route.force_at_start(y[row])
+            return result
+
+        return Leg(self.start, end, sticking, state, why, motion)

@@ -1,0 +1,116 @@
+"""The truth of a ball on a surface: which two routes it takes, and its error bar."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element import Element
+from proofroll.core.errors import Diverged, InputError
+from proofroll.core.events import with_events
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
+from proofroll.elements.ball_on_surface.mechanics import always_pressed
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
+from proofroll.truth.ball_on_surface import rolling, unreduced_taylor
+from proofroll.truth.ball_on_surface.error_bars import dataset_of, put_error_bars
+from proofroll.truth.ball_on_surface.onset import edge_between, onset
+from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS
+from proofroll.truth.ball_on_surface.stick_slip import stays_on, stick_slip
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_ILL_POSED = "the time of the first slip hangs on less than the parameters are known to"
+# A route's own round-off: its values carry a relative error of some machine epsilons even where the routes agree.
+_ROUND_OFF = 4 * np.finfo(float).eps
+
+
+class BallOnSurfaceTruth:
+    """See :class:`proofroll.core.truth.ElementTruth`, :class:`proofroll.core.truth.FindsEdges`."""
+
+    @staticmethod
+    def covers(element: Element) -> bool:
+        """Every ball on a surface."""
+        return isinstance(element, BallOnSurface)
+
+    @staticmethod
+    def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
+        """See :func:`truth`; with bounded friction also the conditioning of the first slip."""
+        scene = Scene(element.name, "", (element,), asks=tuple(asks))
+        try:
+            # What is not finite is refused by name; a warning before that says nothing more.
+            with np.errstate(invalid="ignore", divide="ignore"):
+                found = truth(scene, times)
+        except ZeroDivisionError:
+            said = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
+            raise Diverged(f"{said}; start further off") from None
+        if "sticking" in found and BallCapability.SLIPPING_START not in element.requires:
+            first = onset(scene, float(times[-1]))
+            found.attrs["onset"] = json.dumps(dataclasses.asdict(first))
+            if first.verdict == "ill-posed":
+                # Where the routes disagree too, they have said it, and from when on.
+                found.attrs.setdefault("ill_posed", _ILL_POSED)
+        return found
+
+    @staticmethod
+    def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
+        """A value of static friction at which the time of the first slip jumps, see :func:`.onset`."""
+        if parameter != "mu_static":
+            raise InputError(parameter, "edge_between", "an edge can be found only for mu_static")
+        return edge_between(Scene(element.name, "", (element,)), low, high, until)
+
+
+def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
+    """The true trajectory, each variable with the attribute ``error_bar`` in its own unit.
+
+    The first route is the closed form where there is one, else the reduced equations; the second is the unreduced
+    Newton-Euler system, derived and integrated independently (where heyoka is installed by Taylor series, which ten
+    thousand oscillations take a second). The error bar of a variable is the largest difference
+    between the routes plus round-off, times a factor of safety. Where the scene asks for the orientation, each route
+    gives it by a quadrature of its own.
+
+    With bounded friction, where the ball leaves the wall, and where rolling is resisted, the routes are those of
+    :mod:`truth.stick_slip`; with bounded friction the dataset also holds ``sticking`` and the events
+    (:func:`events.events_of`), which it has of a ball that leaves the wall too.
+
+    Raises:
+        Diverged: a route could not be integrated, or a value is not finite.
+        Refused: the ball leaves the wall and lands on it again.
+    """
+    body, bounded = rolling_ball(scene), BallCapability.BOUNDED_FRICTION in scene.requires
+    times = np.asarray(times, dtype=np.float64)
+    by_series = unreduced_taylor.available(body)
+    # Between its ends a step of DOP853 is less accurate than at them, and an orientation asks between samples; and it
+    # takes some ten times as long.
+    stepped = not by_series or BallCapability.ORIENTATION in scene.requires
+    stepped = stepped and closed_form(body, times[:1]) is None
+    if bounded or stepped or body.gap0 or not (always_pressed(body) or stays_on(body, float(times[-1]))):
+        result, events = stick_slip(scene, times)
+        result = result if bounded else result.drop_vars("sticking")
+        return with_events(result, events) if bounded or events else result
+
+    def first(at: FloatArray) -> BallMotion:
+        return closed_form(body, at) or rolling.reduced(body, at)
+
+    def second(at: FloatArray) -> BallMotion:
+        return unreduced_taylor.unreduced(body, at) if by_series else rolling.unreduced(body, at)
+
+    def second_spin(at: FloatArray) -> FloatArray:  # forces would take longer than all of a series
+        return unreduced_taylor.states(body, at)[:, 6:] if by_series else second(at).w_WB
+
+    def from_start(spin: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:
+        return lambda at: spin(at) if at[0] == 0 else spin(np.append(0.0, at))[1:]
+
+    result = dataset_of(scene, times, first(times), from_start(lambda at: first(at).w_WB), (), QUATERNIONS)
+    check = dataset_of(scene, times, second(times), from_start(second_spin), (), MATRICES)
+    put_error_bars(result, check, _ROUND_OFF)
+    result.attrs["second_route"] = check.attrs["route"]
+    return result

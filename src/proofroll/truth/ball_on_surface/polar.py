@@ -1,0 +1,233 @@
+"""Stick and slip on the surface's coordinates with size and direction of the slip: the first route on any surface.
+
+With A = (1 + κ)/(κ m) and the friction F* that sticking would need, the slip velocity u obeys u̇ = A (F - F*) for any
+friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, sin φ) and b = -A F*,
+
+    d|u|/dt = b · (cos φ, sin φ) - A μk N,      |u| (φ̇ + ė2 · e3) = b · (-sin φ, cos φ).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
+from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
+from proofroll.truth.ball_on_surface.explicit import ExplicitRun, Piece, Rates, stop
+from proofroll.truth.ball_on_surface.route import End
+from proofroll.truth.ball_on_surface.sliding import Sliding
+
+_APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
+_STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
+
+
+class Polar(Sliding):
+    """Route in (u, u̇, ω1); see :class:`Sliding`."""
+
+    name = "surface coordinates with direction of slip, DOP853"
+
+    def __init__(self, body: RollingBall, handover: float = 1e-5) -> None:
+        super().__init__(body, handover)
+        ball = body.ball
+        self._mu_k = body.contact.mu_kinetic if np.isfinite(body.contact.mu_kinetic) else 0.0  # then it never slips
+        self._A = (1 + ball.inertia_ratio) / (ball.inertia_ratio * ball.mass)
+        pace = max(float(np.sqrt(ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)), 1e-300)
+        self._pace = ball.radius / pace
+        # Absolute tolerances: round-off in the rates of u, u̇, ω1 (and |u| or ln|u|, φ, t) must not drive the step.
+        lengths = np.array(body.surface.length_scales)
+        scales = [*(ball.radius / lengths), *(pace / lengths), max(pace / ball.radius, np.linalg.norm(body.w0))]
+        self._atol = 1e-15 * np.array([*scales, 1.0, 1.0, self._pace])
+        self._atol_slaved = 1e-15 * np.array([*scales, pace])
+
+    def start(self) -> FloatArray:
+        """See :class:`Route`."""
+        return start(self._body)
+
+    def at(self, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        u = self._body.surface.locate(p_WB)
+        udot = np.linalg.pinv(self._body.surface.tangents(u)) @ v_WB
+        return np.concatenate([u, udot, [w_WB @ self._body.surface.normal(p_WB)]])
+
+    def friction(self, state: FloatArray) -> tuple[float, float]:
+        """See :class:`Route`; [N]."""
+        b, N = self._drive(state)
+        return float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
+
+    def _missing(self, state: FloatArray) -> float:
+        """Friction that is missing to stick [N]: smooth also where a step reaches beyond N = 0."""
+        needed, available = self.friction(state)
+        return needed - available
+
+    def rates(self, state: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        return reduced_rates(self._body, state)[0]
+
+    def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
+        """See :class:`Route`."""
+        udot = np.linalg.pinv(self._body.surface.tangents(state[:2])) @ v_WB
+        return np.concatenate([state[:2], udot, state[4:]])
+
+    def _stick(self, time: float, state: FloatArray, until: float) -> ExplicitRun:
+        resisted = self._body.contact.rolling_resistance > 0
+
+        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
+            if found := self._ended(piece):
+                return found
+            left = self._until_halt(piece.last) if resisted else np.inf
+            if not (left < _STILL * self._pace and piece.end < until):
+                return None
+            halted = piece.last + left * self.rates(piece.last)
+            return piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT
+
+        cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
+        return ExplicitRun(self.rates, time, state, until, atol=self._atol[:5], ended=ended, cap=cap)
+
+    def _grown(self, time: float, state: FloatArray, until: float) -> float:
+        strength, change = self._pull(state)
+        pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
+        # Below the last digits of the time a slip cannot be seen to grow.
+        return float(max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny))
+
+    def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> ExplicitRun:
+        rates: Rates = lambda y: self._following(y)[0]  # noqa: E731 -- one line each for two closures
+
+        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
+            size = piece.last[5]
+            if size >= handover and (grown := stop(rates, piece, lambda y: y[5] - handover)):
+                return *grown, End.GROWN
+            if size <= 0 and (back := stop(rates, piece, lambda y: -y[5])):
+                return *back, End.STILL
+            return None
+
+        return ExplicitRun(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
+
+    def _slide(self, first: FloatArray, floor: float, until: float) -> ExplicitRun:
+        stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
+            (End.LIFTOFF, lambda y: -self._drive(y)[1]),
+            (End.TIME, lambda y: y[7] - until),
+            (End.STILL, lambda y: floor - y[5]),
+        )
+
+        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
+            # Clock and ln|u| pass their limits but once, so the end of a step tells whether one was passed.
+            passed = [(end, g) for end, g in stops if g(piece.last) > 0]
+            found = [(*when, end) for end, g in passed if (when := stop(self._slipping, piece, g))]
+            return min(found, key=lambda item: item[0], default=None)
+
+        return ExplicitRun(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
+
+    def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
+        """Drive b along e2, e3 [m/s²], shape (2,), and N [N]."""
+        return self._with_slip(y, 0.0, 0.0)[1:3]
+
+    def _pull(self, y: FloatArray) -> tuple[float, float]:
+        """|b| and |ḃ| while sticking; ḃ by a central difference, for it only sets a scale."""
+        rates = self.rates(y)
+        span = self._span(y)
+        b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
+        return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
+
+    def _turning_back(self, y: FloatArray) -> float:
+        """Time in which gravity and friction stop the centre [s], where the direction of the resistance jumps."""
+        contact, body = self._body.contact, self._body
+        if not contact.rolling_resistance:
+            return np.inf
+        frame, tangents = body.surface.frame(y[:2]), body.surface.tangents(y[:2])
+        speed = float(np.linalg.norm(tangents @ y[2:4]))
+        strength = float(np.linalg.norm(frame.T[1:] @ body.gravity)) + contact.mu_kinetic * abs(self._drive(y)[1]) / (
+            body.ball.mass
+        )
+        return speed / strength if speed > 0 and strength > 0 else np.inf
+
+    def _span(self, y: FloatArray) -> float:
+        """Time over which to difference the drive [s]: short where the centre is about to stand still."""
+        return min(1e-4 * self._pace, 0.1 * self._turning_back(y))
+
+    def _with_slip(self, y: FloatArray, size: float, phi: float) -> tuple[FloatArray, FloatArray, float, float]:
+        """Rates of (u, u̇, ω1) while slipping, b, N and ė2 · e3."""
+        body, surface = self._body, self._body.surface
+        a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
+        frame, tangents, bending = surface.frame(y[:2]), surface.tangents(y[:2]), surface.second(y[:2]) @ y[2:4]
+        across = frame.T[1:]
+        (t22, t23), (t32, t33) = (across @ tangents).tolist()  # tangents along e2, e3
+        inverse = np.array([[t33, -t23], [-t32, t22]]) / (t22 * t33 - t23 * t32)
+        du2, du3 = y[2:4].tolist()
+        v2, v3 = t22 * du2 + t23 * du3, t32 * du2 + t33 * du3
+        turn2, turn3 = (-(frame[:, 0] @ bending) @ inverse).tolist()  # ė1 along e2, e3
+        g1, g2, g3 = (frame.T @ body.gravity).tolist()
+        N = m * (turn2 * v2 + turn3 * v3 + g1)
+        spin, speed, grip = a * float(y[4]), math.hypot(v2, v3), self._mu_k * N / m
+        ahead = f * N / (kappa * m * a * speed) if f and speed > 0 else 0.0
+        b = np.array([g2 - spin * turn3 + ahead * v2, g3 + spin * turn2 + ahead * v3])  # e1 × (x, y) = (-y, x)
+        c, s = math.cos(phi), math.sin(phi)
+        u_second = inverse @ (np.array([g2 - grip * c, g3 - grip * s]) - across @ (bending @ y[2:4]))
+        w2, w3 = (v3 - size * s) / a, (size * c - v2) / a  # e1 × (u - v) / a
+        rates = np.array([du2, du3, *u_second.tolist(), w2 * turn2 + w3 * turn3])
+        return rates, b, N, float(frame[:, 2] @ bending[:, 0]) / math.hypot(t22, t32)
+
+    def _slipping(self, y: FloatArray) -> FloatArray:
+        """d/dτ of (u, u̇, ω1, ln|u|, φ, t)."""
+        size, phi = float(np.exp(y[5])), float(y[6])
+        rates, b, N, turning = self._with_slip(y, size, phi)
+        grip = self._A * self._mu_k * N
+        c, s = math.cos(phi), math.sin(phi)
+        b2, b3 = b.tolist()
+        along, around = b2 * c + b3 * s - grip, b3 * c - b2 * s - size * turning
+        return np.array([*(size * rates).tolist(), along, around, size])
+
+    def _slaved(self, states: FloatArray) -> FloatArray:
+        return np.array([self._following(y)[1] for y in states])
+
+    def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
+        """Rates of (u, u̇, ω1, |u|) and φ on the slow solution, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
+        b, N = self._drive(y)
+        grip = self._A * self._body.contact.mu_kinetic * N
+        phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
+        leading, _, _, turning = self._with_slip(y, size, phi)
+        span = self._span(y)
+        change = (self._drive(y[:5] + span * leading)[0] - self._drive(y[:5] - span * leading)[0]) / (2 * span)
+        rotation = float(b[0] * change[1] - b[1] * change[0]) / strength**2 + turning
+        delta = -size * rotation / (2 * strength - grip)
+        rates = self._with_slip(y, size, phi + delta)[0]
+        return np.append(rates, strength * np.cos(delta) - grip), phi + delta
+
+    def _stood_still(self, last: FloatArray) -> FloatArray:
+        rates = self._slipping(last)
+        return np.asarray(last + rates / -rates[5])
+
+    def _axes(self, state: FloatArray) -> FloatArray:
+        return self._body.surface.frame(state[:2])
+
+    def _until_halt(self, y: FloatArray) -> float:
+        _, v, force = reduced_rates(self._body, y[:5])
+        v_rate = force / self._body.ball.mass + self._body.gravity
+        speed = float(np.linalg.norm(v))
+        slowing = -float(v @ v_rate) / speed if speed > 0 else 0.0
+        return speed / slowing if slowing > 0 else np.inf
+
+    def _ended(self, piece: Piece) -> tuple[float, FloatArray, End] | None:
+        """What ends rolling without slip first within a step: time, state and reason."""
+        ends: list[tuple[End, Callable[[FloatArray], float]]] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
+        if np.isfinite(self._body.contact.mu_static):
+            ends.append((End.CONE, self._missing))
+        found = [(*when, end) for end, g in ends if (when := stop(self.rates, piece, g))]
+        return min(found, key=lambda item: item[0], default=None)
+
+    def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
+        frame = self._body.surface.frame(y[:, :2])
+        v = np.einsum("nij,nj->ni", self._body.surface.tangents(y[:, :2]), y[:, 2:4])
+        drives = [self._drive(row) for row in y]
+        b, N = np.array([d[0] for d in drives]).reshape(-1, 2), np.array([d[1] for d in drives])
+        friction, u = -b / self._A, np.zeros((len(y), 2))
+        if phi is not None:
+            along = np.stack([np.cos(phi), np.sin(phi)], axis=-1).reshape(-1, 2)
+            friction, u = -self._body.contact.mu_kinetic * N[:, None] * along, size[:, None] * along
+        local = np.einsum("nij,ni->nj", frame[..., 1:], v)
+        return world_motion(
+            self._body, y[:, :2], velocity=local, spin=y[:, 4], slip=u, friction=friction, press=N, route=self.name
+        )

@@ -1,0 +1,64 @@
+"""What becomes of the ball in the truth, and the analytic boundaries between the regimes."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.truth.ball_on_surface.flight import pressed
+from proofroll.truth.ball_on_surface.route import End
+from proofroll.truth.ball_on_surface.stick_slip import first_route
+from proofroll.truth.ball_on_surface.switching import follow
+
+
+class Regime(IntEnum):
+    """What becomes of the ball until the end of the run."""
+
+    NEVER_SLIPS = 0
+    RECOVERS = 1  # slips, and sticks at the end or still could carry its weight by friction
+    FALLS = 2  # slips at the end, and all the friction there is does not carry its weight; or has left the wall
+
+
+def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
+    """What becomes of the ball until ``until`` [s], how often it began to slip, and when first [s] (nan: never)."""
+    route = first_route(body)
+    path = follow(body, route, until)
+    slips = [time for kind, time in path.events if kind == "slip"]
+    first = slips[0] if slips else float("nan")
+    last = path.legs[-1]
+    if not slips:
+        return Regime.NEVER_SLIPS, 0, first
+    if any(leg.why is End.LIFTOFF for leg in path.legs):
+        return Regime.FALLS, len(slips), first
+    if last.sticking or _carries(body, *route.world(last.state)[:2]):
+        return Regime.RECOVERS, len(slips), first
+    return Regime.FALLS, len(slips), first
+
+
+def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
+    """Whether friction could hold the weight along the surface if it pointed straight against it."""
+    e1 = body.surface.normal(p_WB)
+    weight = np.linalg.norm(body.gravity - float(e1 @ body.gravity) * e1)
+    return bool(body.contact.mu_kinetic * pressed(body, p_WB, v_WB) >= weight)
+
+
+def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    """μ below which the ball falls and above which it never slips, without rolling resistance [1], shape (n,).
+
+    From the closed form on a vertical cylinder with a level start and no spin about the normal; None elsewhere. The
+    friction needed is m g (1 - cos νt / (1 + κ)) with κ = J/ma²: at most 12/7 of the weight of a homogeneous ball.
+    """
+    surface = body.surface
+    if not isinstance(surface, Cylinder):
+        return None
+    axis, e1 = np.asarray(surface.generators[1].axis), surface.normal(body.p0)
+    gravity = float(np.linalg.norm(body.gravity))
+    if np.any(np.cross(axis, body.gravity)) or abs(body.v0 @ axis) > 0 or abs(body.w0 @ e1) > 0:
+        return None
+    kappa = body.ball.inertia_ratio
+    falls = gravity * surface.radius / speeds**2
+    return falls, falls * (2 + kappa) / (1 + kappa)

@@ -1,0 +1,143 @@
+"""The truth with bounded friction: stick, slip, stick again, by two independent routes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_speed
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.truth.ball_on_surface import taylor
+from proofroll.truth.ball_on_surface.error_bars import SAFETY, dataset_of, put_error_bars
+from proofroll.truth.ball_on_surface.implicit import Implicit
+from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS, Quadrature
+from proofroll.truth.ball_on_surface.polar import Polar
+from proofroll.truth.ball_on_surface.route import Path, Route
+from proofroll.truth.ball_on_surface.switching import follow
+from proofroll.truth.conditioning import MOVE, Story, in_common, unmoved
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# What the routes may have in common, relative to a value's size: both stop refining at 1e-13 per step.
+_FLOOR = 1e-12
+
+
+def first_route(body: RollingBall) -> Route:
+    """The route that is taken as the answer: Taylor series where heyoka and the surface allow them, else DOP853."""
+    return taylor.SlidingTaylor(body) if taylor.supports(body) else Polar(body)
+
+
+def stays_on(body: RollingBall, until: float) -> bool:
+    """Whether the ball is on the wall until ``until`` [s], as the first route tells it."""
+    return all(kind != "lift_off" for kind, _ in follow(body, first_route(body), until).events)
+
+
+def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]]:
+    """The true trajectory of one ball on one surface at rising times [s], and the events, with error bars.
+
+    Returns:
+        Dataset as of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in
+        its own unit, and ``sticking`` (bool per sample; a sample at an event belongs to what follows); and the events
+        up to the last sample, each with a bracket that holds both routes. Where other things happen if the parameters
+        are moved by a part :data:`proofroll.truth.conditioning.MOVE` (:func:`moved`), the attribute ``ill_posed`` says
+        from when on; the events are those before, and the error bars as large as the difference of the routes.
+
+    Raises:
+        Diverged: a route could not be integrated.
+        Refused: the ball leaves the wall and lands on it again.
+    """
+    body = rolling_ball(scene)
+    times = np.asarray(times, dtype=np.float64)
+    until = float(times[-1])
+    routes: tuple[Route, Route] = (first_route(body), Implicit(body))
+    paths = [follow(body, route, until) for route in routes]
+    if paths[0].lands is not None:
+        # One that starts in the air has not left the wall.
+        leaves = f"leaves the wall at t = {paths[0].events[-1][1]:.9g} s and " if paths[0].events else ""
+        raise Refused(
+            f"the ball {leaves}lands at t = {paths[0].lands:.9g} s; "
+            "a restitution law would be needed (restitution of the contact), so end the run before it lands"
+        )
+    first, second = (path.events for path in paths)
+    pace = body.ball.radius / natural_speed(body)
+    number, known = in_common(first, second, pace, until)
+    why = "the two routes to the truth disagree about it"
+    posed, well = _unmoved(body, paths[1], pace, until)
+    if not well:
+        number, known = min(number, posed), False
+        why = f"a relative {MOVE:g} of friction, resistance, restitution or gravity changes it"
+    events = []
+    for (kind, time), (_, other) in zip(first[:number], second, strict=False):
+        wide = SAFETY * (abs(time - other) + _FLOOR * time)
+        events.append(Event(kind, time, max(time - wide, 0.0), time + wide))
+    result, check = (
+        _dataset(scene, times, path, route.name, quadrature)
+        for path, route, quadrature in zip(paths, routes, (QUATERNIONS, MATRICES), strict=True)
+    )
+    put_error_bars(result, check, _FLOOR)
+    result.attrs["second_route"] = routes[1].name
+    if not known:
+        after = events[-1].time if events else 0.0
+        result.attrs["ill_posed"] = (
+            f"ill-posed: what happens after {after:.9g} s hangs on the last digits of the parameters: {why}"
+        )
+    return result, events
+
+
+def moved(body: RollingBall, part: float) -> RollingBall:
+    """The ball with its friction, resistance, restitution and gravity moved by this part or less.
+
+    What is zero stays zero, and a restitution of 1 stays 1. The parts differ, lest two of them make up for each other.
+    """
+    contact = body.contact
+
+    def restitution(e: float) -> float:
+        return float(np.clip(e * (1 + part / 3), -1, 1)) if abs(e) < 1 else e
+
+    contact = replace(
+        contact,
+        mu_static=contact.mu_static * (1 + part),
+        mu_kinetic=contact.mu_kinetic * (1 + part),
+        rolling_resistance=contact.rolling_resistance * (1 - part),
+        restitution=contact.restitution and restitution(contact.restitution),
+        tangential_restitution=restitution(contact.tangential_restitution),
+    )
+    return replace(body, contact=contact, gravity=body.gravity * (1 - part / 2))
+
+
+def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[int, bool]:
+    """See :func:`proofroll.truth.conditioning.unmoved`; by the second route, which takes few steps near an edge."""
+    contact = body.contact
+    if always_pressed(body) and not (body.gap0 or contact.rolling_resistance or np.isfinite(contact.mu_static)):
+        return len(own.events), True  # nothing can switch
+
+    def story(path: Path) -> Story:
+        def states(times: FloatArray) -> FloatArray:
+            found = path.motion(times, "")
+            speed = natural_speed(body)
+            a = body.ball.radius
+            return np.hstack([found.p_WB / a, found.v_WB / speed, found.w_WB * a / speed])
+
+        return Story(path.events, states)
+
+    try:
+        others = [follow(ball, Implicit(ball), until) for ball in (moved(body, -MOVE), moved(body, MOVE))]
+    except (Diverged, Refused):
+        return 0, False  # one of them is not known to the end
+    return unmoved(story(own), [story(path) for path in others], pace, until)
+
+
+def _dataset(scene: Scene, times: FloatArray, path: Path, route: str, quadrature: Quadrature) -> xr.Dataset:
+    kinks = [leg.end for leg in path.legs]
+    motion = path.motion(times, route)
+    result = dataset_of(scene, times, motion, lambda at: path.motion(at, route).w_WB, kinks, quadrature)
+    attributes = {"units": "1", "long_name": "whether the ball sticks (rolls without slip)"}
+    return result.assign(sticking=("time", path.sticking(times), attributes))

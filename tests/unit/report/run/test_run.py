@@ -1,0 +1,70 @@
+"""What ``proofroll run`` says of one run."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from rich.console import Console
+
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
+from proofroll.report.run.run import run_content, run_lines
+from proofroll.running.case import Result, Status
+
+
+def _case(scene: str, **parameters: float) -> Any:
+    engine = SimpleNamespace(name="e", settings={}, precision="double")
+    return SimpleNamespace(scene=scene, parameters=parameters, engine=engine, until=1.0, every=0.1, asks=())
+
+
+@pytest.mark.parametrize(("scene", "name", "value"), [("inclined_plane", "tilt", 0.2), ("pendulum", "mass", 2.0)])
+def test_all_numbers_of_the_scene_are_told(scene: str, name: str, value: float, tmp_path: Path) -> None:
+    """Parameters that nobody set stand in the document beside those that were set, for every kind of scene."""
+    content = run_content(_case(scene, **{name: value}), Result(Status.MISSING, "not installed"), tmp_path / "run.npz")
+    assert content.parameters == dict(load_scene(scene, **{name: value}).parameters)
+    assert content.parameters[name] == value
+    assert len(content.parameters) > 3
+    assert (content.until, content.every) == (1.0, 0.1)
+
+
+def test_a_variable_without_value_says_why(tmp_path: Path) -> None:
+    """It stands below the table with its reason, once for all such variables, and no line has a nan or is too long."""
+    units = {"units": "N", "long_name": "a force"}
+    nothing = ("time", np.full(2, np.nan), units | {"absent": "not determined by the equations"})
+    held = {f"force.a_joint_{number}.z": nothing for number in range(9)}
+    dataset = xr.Dataset(held | {"x": ("time", np.ones(2), units)}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
+    write(dataset, tmp_path / "run.npz")
+    case = _case("pendulum")
+    result = Result(Status.DONE, "reached 1 s", trajectory="run.npz", wall_seconds=0.1)
+
+    content = run_content(case, result, tmp_path / "run.npz")
+    shown = Console(file=io.StringIO(), width=80)
+    for line in run_lines(content):
+        shown.print(line)
+    text = shown.file.getvalue()
+
+    assert content.absent == dict.fromkeys(held, "not determined by the equations")
+    assert np.isnan(content.final["force.a_joint_0.z"])
+    assert "nan" not in text
+    assert text.count("not determined by the equations") == 1
+    assert all(name in text for name in held)
+    assert max(map(len, text.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.25, "1 s of wall time, after 0.25 s before the first step"), (None, "1 s of wall time")]
+)
+def test_what_comes_before_the_first_step_is_told(seconds: float | None, said: str, tmp_path: Path) -> None:
+    """The seconds of building, with what an engine compiles, stand beside those of the run."""
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0, build_seconds=seconds)
+    content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
+    assert content.build_seconds == seconds
+    lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}))
+    assert said in [str(line) for line in lines]

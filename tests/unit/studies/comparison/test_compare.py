@@ -1,0 +1,404 @@
+"""What a comparison makes of results: claims about nothing, exceptions, ill-posed questions, missing truths."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from hostile import ENTRY_POINTS
+
+from proofroll.cli.comparing import exit_code
+from proofroll.core.certificate import Line
+from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
+from proofroll.core.scene import Scene
+from proofroll.core.time_grid import time_grid
+from proofroll.core.truth import truth
+from proofroll.core.verdict import Judgement, LimitFinding, Verdict
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.files.scene_file import load_scene
+from proofroll.files.trajectory_file import write
+from proofroll.report.comparison.summary import outcome_content
+from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.simulation import simulate
+from proofroll.running.store import Store
+from proofroll.studies.comparison.compare import compare, evaluate
+from proofroll.studies.comparison.expectations import contradictions_of
+from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.comparison.planning import Plan, Planned, point_name
+from proofroll.truth.ball_on_surface.onset import onset
+
+FACTS = EngineFacts("alpha", "1", "code", {"dt": 1e-3}, "dt", 2)
+TRUTH = EngineFacts("truth", "1", "code", {})
+ROW = Row("alpha", "tight", ladder=[1.0])
+TIGHT = {"gamma": Tolerance(1e-9, False, "rad"), "z": Tolerance(1e-9, False, "m")}
+
+Answer = Callable[[Scene, xr.Dataset], xr.Dataset | Result]
+
+
+def claim(rows: list[Row], speeds: list[float], bounds: Mapping[str, Tolerance] | None = None) -> Comparison:
+    """A comparison at some speeds."""
+    band = Band("the engine gives the truth", dict(bounds or TIGHT))
+    vary = {"speed": speeds}
+    comparison = Comparison("claim", "A claim", "Does it hold?", "sphere_in_cylinder", 0.4, 0.02, vary=vary)
+    return dataclasses.replace(comparison, bands={"tight": band}, rows=rows)
+
+
+def judged(
+    folder: Path,
+    comparison: Comparison,
+    answer: Answer,
+    true: Mapping[float, Result] | None = None,
+    rungs: Mapping[float, Answer] | None = None,
+    certificate: Sequence[Line] = (),
+) -> Outcome:
+    """The outcome where every row's engine gives what ``answer`` makes of the truth.
+
+    ``true``: speeds without a truth; ``rungs``: what comes of other steps, by their factors.
+    """
+    store, results = Store(folder), dict[str, Result]()
+    runs, truths = list[Planned](), dict[str, Case]()
+
+    def put(case: Case, given: xr.Dataset | Result) -> Case:
+        if isinstance(given, xr.Dataset):
+            write(given, store.trajectory(case))
+            lines = [line.as_dict() for line in certificate]
+            given = Result(Status.DONE, "reached the end", certificate=lines, trajectory=store.trajectory(case).name)
+        results[case.key] = given
+        return case
+
+    for row in comparison.rows:
+        for point in comparison.variations(row):
+            scene = load_scene(comparison.scene, **point)
+            dataset = truth(scene, time_grid(comparison.until, comparison.every))
+            if BallCapability.BOUNDED_FRICTION in scene.requires:
+                dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
+            facts = dataclasses.replace(FACTS, name=row.engine)
+            given = (comparison.scene, point, scene.digest)
+            truths[point_name(point)] = put(
+                Case(*given, TRUTH, comparison.until, comparison.every), (true or {}).get(point["speed"], dataset)
+            )
+            ladder = {}
+            for factor, how in {1.0: answer, **(rungs or {})}.items():
+                scaled = dataclasses.replace(facts, settings={"dt": 1e-3 * factor})
+                ladder[factor] = put(Case(*given, scaled, comparison.until, comparison.every), how(scene, dataset))
+            runs.append(Planned(row, point, facts, ladder))
+    return evaluate(Plan(comparison, truths, runs), results, Runner(store, jobs=1))
+
+
+def the_truth(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+    """An engine without error."""
+    return dataset
+
+
+def off(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+    """An engine whose ball is a millimetre too high."""
+    return dataset.assign(z=dataset["z"] + 1e-3)
+
+
+def test_a_claim_that_holds(tmp_path: Path) -> None:
+    """An engine that gives the truth contradicts nothing, and one that is off contradicts once, by its observable."""
+    assert judged(tmp_path / "right", claim([ROW], [4.0]), the_truth).contradictions == []
+    (said,) = judged(tmp_path / "wrong", claim([ROW], [4.0]), off).contradictions
+    assert said.startswith("alpha at speed=4 differs, expected: agrees (z differs; z: error 1e-3 m beyond 1e-9 m")
+
+
+@pytest.mark.parametrize(
+    ("row", "bounds"),
+    [
+        (ROW, TIGHT | {"first_slip": Tolerance(1e-3, False, "s")}),
+        (dataclasses.replace(ROW, bound={"first_slip": Tolerance(1e-3, False, "s")}), TIGHT),
+        (dataclasses.replace(ROW, limit={"first_slip": Tolerance(1e-3, False, "s")}), TIGHT),
+        (dataclasses.replace(ROW, order={"first_slip": (1.0, 2.0)}), TIGHT),
+        (dataclasses.replace(ROW, expect_for={"first_slip": [Verdict.AGREES]}), TIGHT),
+    ],
+    ids=["tolerance", "bound", "limit", "order", "expect_for"],
+)
+def test_a_claim_about_what_is_not_reported(tmp_path: Path, row: Row, bounds: Mapping[str, Tolerance]) -> None:
+    """A claim about an observable that the run does not give is a contradiction, wherever the claim stands."""
+    (said,) = judged(tmp_path, claim([row], [4.0], bounds), the_truth).contradictions
+    assert said == "alpha at speed=4: first_slip is not reported, though claim makes a claim about it"
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (
+            {"order": 0.123456789, "limit_error": 1.23456789e-3},
+            ["order of z is 0.123, expected 1.9 to 2.1", "error of the limit of z is 1.23e-3, expected at most 1e-3"],
+        ),
+        (
+            {},
+            [
+                "order of z is not known, expected 1.9 to 2.1",
+                "error of the limit of z is not known, expected at most 1e-3",
+            ],
+        ),
+    ],
+    ids=["seen", "not seen"],
+)
+def test_orders_and_limits_are_told_in_three_digits(seen: dict[str, float], said: list[str]) -> None:
+    """Numbers of what was not expected are short, one that is not known is no number, and one point has no name."""
+    row = dataclasses.replace(ROW, order={"z": (1.9, 2.1)}, limit={"z": Tolerance(1e-3, False, "m")})
+    right = Judgement(
+        observable="z", unit="m", error=0.0, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, verdict=Verdict.AGREES,
+        **seen,
+    )  # fmt: skip
+    found = contradictions_of(claim([row], []), Planned(row, {}, FACTS), [right], ())
+    assert found == [f"alpha: {sentence}" for sentence in said]
+
+
+def higher(metres: float) -> Answer:
+    """An engine whose ball is so much too high."""
+    return lambda _, dataset: dataset.assign(z=dataset["z"] + metres)
+
+
+def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
+    """An engine that hits the truth at one step only differs; where a finer step gave nothing, nothing is confirmed."""
+    row = dataclasses.replace(ROW, ladder=[1.0, 0.5, 0.25])
+    comparison = claim([row], [4.0], TIGHT | {"z": Tolerance(1e-3, False, "m")})
+    lucky = {0.5: higher(25e-3), 0.25: higher(37.5e-3)}
+    (run,) = judged(tmp_path / "lucky", comparison, the_truth, rungs=lucky).runs
+    assert {item.observable: item.verdict for item in run.judgements} == {"gamma": "agrees", "z": "differs"}
+    assert "another limit" in run.contradictions[0]
+    crashed: dict[float, Answer] = {0.5: the_truth, 0.25: lambda *_: Result(Status.DIVERGED, "NaN")}
+    (run,) = judged(tmp_path / "crashed", comparison, the_truth, rungs=crashed).runs
+    assert run.verdict is Verdict.UNCONFIRMED
+    assert run.contradictions[0].startswith("alpha at speed=4 unconfirmed, expected: agrees (")
+    assert "no limit shown: dt 0.00025 diverged: NaN" in run.contradictions[0]  # which step is missing, and why
+
+
+def silent(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+    """An engine that cannot say forces."""
+    return dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
+
+
+def test_a_silent_engine_does_not_plainly_agree(tmp_path: Path) -> None:
+    """Without forces that the tolerances judge a run is incomplete, and contradicts unless that is expected."""
+    bounds = TIGHT | {"N": Tolerance(1e-6, False, "N")}
+    (run,) = judged(tmp_path / "silent", claim([ROW], [4.0], bounds), silent).runs
+    assert (run.verdict, run.missing) == (Verdict.INCOMPLETE, ["N"])
+    assert run.contradictions == ["alpha at speed=4: N is not reported, though claim makes a claim about it"]
+    expected = dataclasses.replace(ROW, expect=[Verdict.INCOMPLETE])
+    assert judged(tmp_path / "expected", claim([expected], [4.0], bounds), silent).contradictions == []
+
+    def both_wrong(scene: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        return silent(scene, dataset.assign(z=dataset["z"] + 1e-3))
+
+    both = judged(tmp_path / "wrong", claim([expected], [4.0], bounds), both_wrong)
+    assert both.runs[0].verdict is Verdict.DIFFERS
+    assert len(both.contradictions) == 1
+    full = judged(tmp_path / "full", claim([expected], [4.0], bounds), the_truth)
+    assert full.contradictions[0].startswith("alpha at speed=4 agrees, expected: incomplete")
+
+
+def test_who_shares_a_route_with_the_truth_is_marked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run of an engine that declares the truth's own equations is marked; one of an engine that does not is not."""
+    (run,) = judged(tmp_path / "other", claim([ROW], [4.0]), the_truth).runs
+    assert run.shared == ""
+    monkeypatch.setattr(f"{__name__}.FACTS", dataclasses.replace(FACTS, shares=["closed form"]))
+    (run,) = judged(tmp_path / "same", claim([ROW], [4.0]), the_truth).runs
+    assert run.shared.startswith("rests on the same equations as the truth itself (closed form (Blajer 2006))")
+
+
+@pytest.mark.parametrize("expect", [Verdict.AGREES, Verdict.CONVERGES, Verdict.DIFFERS])
+def test_a_tolerance_below_the_truth_contradicts_nobody(tmp_path: Path, expect: Verdict) -> None:
+    """Where the truth is known less well than the tolerance no run agrees, and none contradicts, right or wrong."""
+    bounds = {"z": Tolerance(1e-30, False, "m")}
+    row = dataclasses.replace(ROW, expect=[expect])
+    for name, answer in {"right": the_truth, "wrong": off}.items():
+        (run,) = judged(tmp_path / name, claim([row], [4.0], bounds), answer).runs
+        assert (run.verdict, run.contradictions) == (Verdict.NOT_JUDGED, [])
+
+
+def test_what_cannot_be_judged_hides_nothing(tmp_path: Path) -> None:
+    """Beside an observable that nobody is judged by, another one that differs contradicts as ever."""
+    bounds = TIGHT | {"gamma": Tolerance(1e-30, False, "rad")}
+    (run,) = judged(tmp_path, claim([ROW], [4.0], bounds), off).runs
+    assert {item.observable: item.verdict for item in run.judgements} == {"gamma": "not-judged", "z": "differs"}
+    assert run.contradictions[0].startswith("alpha at speed=4 differs, expected: agrees (z differs")
+
+
+def test_another_scene_is_shown_and_not_judged(tmp_path: Path) -> None:
+    """A friction of 1 where the unbounded scene needs 1.08 is no verdict, and contradicts only who says it agrees."""
+    number = Line("1 / static friction", "1", (0.0,), (1.0,), 1.0, 1.0, "the engine needs a number")
+    agrees = judged(tmp_path / "a", claim([ROW], [1.2, 4.0]), the_truth, certificate=[number])
+    slow, fast = agrees.runs
+    assert slow.result.status is Status.ANOTHER_SCENE
+    assert slow.result.message.startswith("another scene: a friction of 1, where the scene has no bound and needs 1.08")
+    assert slow.result.trajectory is not None
+    assert slow.judgements == []
+    assert fast.verdict is Verdict.AGREES
+    assert agrees.contradictions == [f"alpha at speed=1.2: {slow.result.message}"]
+    row = dataclasses.replace(ROW, except_at=[ExceptAt({"speed": [1.2]}, [Verdict.DIFFERS])])
+    assert judged(tmp_path / "b", claim([row], [1.2, 4.0]), the_truth, certificate=[number]).contradictions == []
+
+
+def test_exceptions_decide(tmp_path: Path) -> None:
+    """At the point of an exception its verdict is expected and no other, elsewhere the row's."""
+    differs = ExceptAt({"speed": [4.0]}, [Verdict.DIFFERS])
+    row = dataclasses.replace(ROW, except_at=[differs])
+    right = judged(tmp_path / "right", claim([row], [3.0, 4.0]), the_truth)
+    wrong = judged(tmp_path / "wrong", claim([row], [3.0, 4.0]), off)
+    assert [said.partition(" (")[0] for said in right.contradictions] == ["alpha at speed=4 agrees, expected: differs"]
+    assert [said.partition(" (")[0] for said in wrong.contradictions] == ["alpha at speed=3 differs, expected: agrees"]
+
+
+def test_an_exception_may_expect_a_failure(tmp_path: Path) -> None:
+    """A run that is expected to fail is neither lost nor a contradiction; the same elsewhere is both."""
+
+    def crash(*_: object) -> Result:
+        return Result(Status.CRASHED, "no licence")
+
+    row = dataclasses.replace(ROW, except_at=[ExceptAt({"speed": [4.0]}, [Verdict.FAILED])])
+    outcome = judged(tmp_path, claim([row], [3.0, 4.0]), crash)
+    assert outcome.contradictions == ["alpha at speed=3 crashed, expected: agrees (no licence)"]
+    assert [run.parameters for run in outcome.lost] == [{"speed": 3.0}]
+    assert [run.verdict for run in outcome.runs] == [Verdict.FAILED] * 2
+
+
+@pytest.mark.parametrize(
+    ("status", "verdict"), [(Status.REFUSED, Verdict.REFUSED), (Status.WRONG_MODEL, Verdict.FAILED)]
+)
+def test_a_refusal_is_no_failure(tmp_path: Path, status: Status, verdict: Verdict) -> None:
+    """An engine that refuses has not failed, one that built something else has; either contradicts what it is not."""
+
+    def answer(*_: object) -> Result:
+        return Result(status, "one coefficient only")
+
+    for expected in (Verdict.AGREES, Verdict.REFUSED, Verdict.FAILED):
+        row = dataclasses.replace(ROW, expect=[expected])
+        outcome = judged(tmp_path / expected, claim([row], [4.0]), answer)
+        assert [run.verdict for run in outcome.runs] == [verdict]
+        said = f"alpha at speed=4 {status}, expected: {expected} (one coefficient only)"
+        assert outcome.contradictions == ([] if expected is verdict else [said])
+        assert outcome.lost == []
+        assert exit_code([outcome]) == (0 if expected is verdict else 1)
+
+
+def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
+    """An engine that runs where a failure is expected contradicts the claim."""
+    row = dataclasses.replace(ROW, expect=[Verdict.FAILED])
+    (said,) = judged(tmp_path, claim([row], [4.0]), the_truth).contradictions
+    assert said.startswith("alpha at speed=4 agrees, expected: failed")
+
+
+def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) -> None:
+    """At a stair edge what hangs on the time of slip is ill-posed, agreement included; energy and gap are judged."""
+    bounds = {
+        "z": Tolerance(0.005, True),
+        "first_slip": Tolerance(2e-3, False, "s"),
+        "event_times": Tolerance(5e-3, False, "s"),
+        "event_order": Tolerance(0.5, False, "events"),
+        "energy_balance": Tolerance(0.01, True),
+        "gap": Tolerance(1e-6, False, "m"),
+    }
+    edge = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.391459}
+    engine = "projection[formulation=rotating_frame]"
+    base = claim([dataclasses.replace(ROW, engine="projection")], [], bounds)
+    comparison = dataclasses.replace(base, vary={}, points=[edge], until=2.0)
+
+    def projection(scene: Scene, _: xr.Dataset) -> xr.Dataset:
+        return simulate(scene, engine, until=2.0, every=0.02)
+
+    (run,) = judged(tmp_path / "right", comparison, projection).runs
+    verdicts = {judgement.observable: judgement.verdict for judgement in run.judgements}
+    events = dict.fromkeys(("first_slip", "event_order", "event_times"), Verdict.ILL_POSED)
+    assert verdicts == events | dict.fromkeys(("z", "energy_balance", "gap"), Verdict.AGREES)
+    assert (run.verdict, run.contradictions) == (Verdict.ILL_POSED, [])
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 2e-3])
+def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Path, tolerance: float) -> None:
+    """An event that ends with the same step on each rung of a ladder is known to that step, within tolerance or not."""
+    row = dataclasses.replace(ROW, ladder=[2.0, 1.0, 0.5])
+    base = claim([row], [], {"first_slip": Tolerance(tolerance, False, "s")})
+    slipping = {"speed": 4.0, "mu_static": 0.15}
+    comparison = dataclasses.replace(base, vary={}, points=[slipping], until=1.0)
+
+    def late(factor: float) -> Answer:
+        def answer(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+            ends = dataset["event_time"] + 3e-4
+            return dataset.assign(event_time=ends, event_low=ends - 1e-3 * factor, event_high=ends)
+
+        return answer
+
+    (run,) = judged(tmp_path, comparison, late(1.0), rungs={factor: late(factor) for factor in (2.0, 0.5)}).runs
+    (found,) = run.judgements
+    assert found.error == pytest.approx(3e-4)
+    assert found.limit is not LimitFinding.ANOTHER
+    assert not found.remarks
+
+
+def test_what_holds_on_every_path_is_judged_at_a_stair_edge(tmp_path: Path) -> None:
+    """At a stair edge a wrong path is not judged, but energy from nowhere and a ball off the wall are."""
+    bounds = {"z": Tolerance(1e-9, False, "m"), "energy_balance": Tolerance(1e-3, True)}
+    edge = {"speed": 4.0, "rolling_resistance": 5e-4, "mu_static": 0.391459}
+    base = claim([ROW], [], bounds | {"gap": Tolerance(1e-6, False, "m")})
+    comparison = dataclasses.replace(base, vary={}, points=[edge], until=2.0)
+
+    def wrong(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        late = (dataset["time"] > 1.0) * 1e-2
+        return dataset.assign(
+            z=dataset["z"] + late, energy=dataset["energy"] * (1 + late), gap=dataset["gap"] + 1e-2 * late
+        )
+
+    (run,) = judged(tmp_path, comparison, wrong).runs
+    verdicts = {judgement.observable: judgement.verdict for judgement in run.judgements}
+    assert verdicts == {"z": Verdict.ILL_POSED, "energy_balance": Verdict.DIFFERS, "gap": Verdict.DIFFERS}
+    (said,) = run.contradictions
+    assert "differs, expected: agrees" in said
+
+
+def test_neighbouring_points_have_truths_of_their_own(
+    tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
+) -> None:
+    """Points that differ in the seventh digit are judged each against its own truth."""
+    install_engines(ENTRY_POINTS)
+    speeds = [4.0, 4.000001]
+    comparison = claim([dataclasses.replace(ROW, engine="oracle")], speeds)
+    outcome = compare(comparison, Runner(Store(tmp_path), jobs=1))
+    assert [run.parameters["speed"] for run in outcome.runs] == speeds
+    assert len({case.key for case in outcome.truths.values()}) == 2
+    assert [run.verdict for run in outcome.runs] == [Verdict.AGREES] * 2
+    # The other point's truth is further away than the tolerance.
+    assert 1e-6 / 0.2 * comparison.until > TIGHT["gamma"].absolute(1.0)
+
+
+def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
+    """Where the truth refuses nobody is judged, with its reason; an engine that failed there failed all the same."""
+    rows = [ROW, dataclasses.replace(ROW, engine="beta")]
+    none = {4.0: Result(Status.REFUSED, "the ball is back on the wall")}
+    outcome = judged(tmp_path, claim(rows, [3.0, 4.0]), the_truth, none)
+    there = [run for run in outcome.runs if run.parameters["speed"] == 4.0]
+    assert outcome.contradictions == []
+    for run in there:
+        assert (run.verdict, run.judgements, run.missing) == (Verdict.NOT_JUDGED, [], [])
+        assert run.result.message == "there is no truth here: the ball is back on the wall"
+        assert run.result.trajectory is not None
+    content = outcome_content(outcome)
+    assert [row.verdict for row in content.rows] == ["agrees", "agrees"]
+    assert [row.verdicts["not-judged"] for row in content.rows] == [1, 1]
+    assert content.runs[1].reason.startswith("no truth at speed=4: there is no truth here: the ball")
+
+
+@pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
+def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status) -> None:
+    """Where the truth crashed or hung every row fails and says so; the other points are judged as ever."""
+    rows = [ROW, dataclasses.replace(ROW, engine="beta")]
+    none = {4.0: Result(status, "the ball is back on the wall")}
+    outcome = judged(tmp_path, claim(rows, [3.0, 4.0, 5.0]), the_truth, none)
+    verdicts = {(run.row.engine, run.parameters["speed"]): run.verdict for run in outcome.runs}
+    assert verdicts == {
+        (engine, speed): Verdict.FAILED if speed == 4.0 else Verdict.AGREES
+        for engine in ("alpha", "beta")
+        for speed in (3.0, 4.0, 5.0)
+    }
+    assert len(outcome.contradictions) == 2
+    for said in outcome.contradictions:
+        assert "at speed=4" in said
+        assert said.endswith("expected: agrees (there is no truth here: the ball is back on the wall)")

@@ -1,0 +1,62 @@
+"""What a comparison asks of truths and engines, and what is refused of it before anything runs."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+from proofroll.core.comparison import Row
+from proofroll.core.errors import InputError
+from proofroll.files.comparison_file import load_comparison
+from proofroll.studies.comparison import default_comparison as first_look
+from proofroll.studies.comparison import planning
+
+
+def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A setting that does not exist is told with file and row, before the truth looks for the edge of a stair."""
+
+    def ran(*_: object) -> None:
+        raise AssertionError("the truth was run first")
+
+    monkeypatch.setattr(planning, "settled", ran)
+    comparison = load_comparison("stick_slip")
+    rows = [Row(engine, comparison.rows[0].tolerance) for engine in ("projection", "projection[step=1]")]
+    said = r"stick_slip\.toml: rows\.1\.engine = 'projection\[step=1\]'.*no such setting"
+    with pytest.raises(InputError, match=said):
+        planning.plan(dataclasses.replace(comparison, rows=rows))
+
+
+def test_a_ladder_asks_for_no_tolerance_of_1_or_more() -> None:
+    """Of a tolerance of a tenth no decades up are asked for, where nothing would be computed."""
+    comparison = load_comparison("inclined_plane")
+    row = Row("projection[formulation=euler,rtol=0.1]", comparison.rows[0].tolerance, ladder=[4.0, 2.0, 1.0, 0.5])
+    found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["projection"])
+    asked = {case.engine.settings["rtol"] for run in found.runs for case in run.ladder.values()}
+    assert sorted(asked) == pytest.approx([0.01, 0.1])
+
+
+def test_the_truth_gives_all_that_can_be_asked_for() -> None:
+    """Of the truth everything is asked, so that a replay need invent nothing; of engines only what the scene asks."""
+    found = planning.plan(load_comparison("inclined_plane"), ["projection"])
+    assert {case.asks for case in found.truths.values()} == {("orientation",)}
+    assert {case.asks for run in found.runs for case in run.ladder.values()} == {()}
+
+
+@pytest.mark.parametrize(
+    ("step", "factors"), [(2.5e-4, [4.0, 2.0, 1.0]), (1e-3, [2.0, 1.0, 0.5]), (2e-3, [1.0, 0.5, 0.25])]
+)
+def test_a_ladder_fits_between_the_samples(step: float, factors: list[float]) -> None:
+    """Steps of the usual ladder that do not divide the interval between samples, 0.01 s, are finer ones instead."""
+    comparison = dataclasses.replace(load_comparison("inclined_plane"), until=0.1, every=0.01)
+    row = Row(f"mujoco[formulation=chart,dt={step}]", comparison.rows[0].tolerance)
+    found = planning.plan(dataclasses.replace(comparison, rows=[row]), ["mujoco"])
+    assert {tuple(run.row.ladder) for run in found.runs} == {tuple(factors)}
+    assert all(run.ladder.keys() == set(factors) for run in found.runs)
+
+
+def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
+    """Engines with a fixed step have that of the scene's file where their own is longer; adaptive ones have theirs."""
+    engines = [row.engine for row in first_look.compared("andrews_squeezer", {}).rows]
+    assert "exudyn[formulation=redundant,dt=0.0001]" in engines
+    assert "projection[formulation=dependent]" in engines

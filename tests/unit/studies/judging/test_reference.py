@@ -1,0 +1,68 @@
+"""What engines are held against."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.engine_abilities import SharesEquations
+from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.engines.reduced import Reduced
+from proofroll.files.scene_file import load_scene
+from proofroll.running.identity import resolve
+from proofroll.studies.judging.reference import Reference
+from proofroll.truth.ball_on_surface.polar import Polar
+from proofroll.truth.ball_on_surface.rolling import reduced
+from proofroll.truth.ball_on_surface.taylor import SlidingTaylor
+
+
+def reference(**curves: list[float]) -> Reference:
+    """A truth of which only some observables matter."""
+    nothing: Any = None
+    found = {name: np.array(values) for name, values in curves.items()}
+    return Reference(load_scene("sphere_in_cylinder"), nothing, found, {"z": 0.2})
+
+
+def test_a_percentage_of_the_first_slip_is_of_its_time() -> None:
+    """The first slip at 1.7 s has that as its scale; where the ball does not slip, there is none."""
+    assert reference(first_slip=[1.7]).scale("first_slip") == 1.7
+    assert reference(first_slip=[]).scale("first_slip") is None
+    assert reference().scale("first_slip") is None
+    assert reference().scale("z") == 0.2
+    assert reference().scale("event_order") is None
+
+
+def against(formulation: str, **parameters: float) -> str:
+    """What is said of a formulation of the least model, held against the truth of a scene."""
+    scene = load_scene("sphere_in_cylinder", **parameters)
+    held = Reference(scene, truth(scene, np.linspace(0.0, 0.1, 3)), {}, {})
+    return held.shared(resolve("reduced", {"formulation": formulation})["shares"])
+
+
+def test_who_rests_on_a_route_of_the_truth_is_told() -> None:
+    """The least model shares the route that the truth takes in this case, or not, and the other route is named."""
+    for bound in ({}, {"mu_static": 0.35}):
+        said = against("equations", rolling_resistance=5e-4, **bound)
+        assert said.startswith("rests on the same equations as the truth itself (local frame with direction of slip")
+        assert said.endswith(": only world frame by signed distance, implicit collocation checks both")
+    assert against("closed_form").startswith(
+        "rests on the same equations as the truth itself (closed form (Blajer 2006))"
+    )
+    assert against("equations") == "", "here the truth is the closed form"
+    assert against("closed_form", rolling_resistance=5e-4) == ""
+
+
+def test_declared_routes_are_those_of_the_truth() -> None:
+    """A route that shares the least model's equations is named as it names itself, so that renaming cannot hide it."""
+    body = rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
+    names = {SlidingTaylor.name, Polar.name, reduced(body, np.zeros(1)).route}
+    assert {name.partition(",")[0] for name in names} == set(Reduced.shares["equations"])
+
+
+def test_routes_are_declared_for_formulations_that_there_are() -> None:
+    """The least model names formulations that it has; an engine that shares nothing need not say so."""
+    assert isinstance(Reduced, SharesEquations)
+    assert set(Reduced.shares) <= set(Reduced.presets)
+    assert resolve("projection", {})["shares"] == []

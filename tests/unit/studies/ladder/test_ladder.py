@@ -1,0 +1,145 @@
+"""The ladder of models: its rungs, the terms in each, and what is said about them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hostile import ENTRY_POINTS
+
+from proofroll.core.engine_abilities import Level
+from proofroll.core.errors import InputError
+from proofroll.files.json_data import plain
+from proofroll.files.scene_file import load_scene
+from proofroll.report.ladder.ladder import LadderContent, ladder_content
+from proofroll.report.ladder.tables import rung_table, term_table
+from proofroll.report.terminal.tables import WIDTH, console
+from proofroll.running.runner import Runner
+from proofroll.running.simulation import simulate
+from proofroll.running.store import Store
+from proofroll.studies.ladder.ladder import Ladder
+
+UNTIL = 0.2
+
+
+@pytest.fixture
+def climb(tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]) -> Callable[..., LadderContent]:
+    """Studies the engines of ``tests/plugins``; results go to ``tmp_path``."""
+    install_engines(ENTRY_POINTS)
+
+    def run(parameters: Mapping[str, float] = {}, **options: Any) -> LadderContent:
+        runner = Runner(Store(tmp_path), jobs=1)
+        chosen = {"engines": ("laddered",), "until": UNTIL, "rounds": 1} | options
+        study = Ladder("sphere_in_cylinder", dict(parameters), runner, **chosen)
+        study.run()
+        return ladder_content(study)
+
+    return run
+
+
+def error_of(f: float, options: str) -> float:
+    """Largest error of z in a run of its own against the truth."""
+    runs = [
+        simulate(load_scene("sphere_in_cylinder", rolling_resistance=f), engine, until=UNTIL, every=0.02)
+        for engine in (f"laddered[{options}]", "truth")
+    ]
+    return float(abs(runs[0].z - runs[1].z).max())
+
+
+def check_rungs(content: dict[str, Any]) -> None:
+    """Every level has a rung or says that it is empty; errors are those of plain runs, and what fails is a row."""
+    rungs = {(rung["level"], rung["variant"]): rung for rung in content["rungs"]}
+    assert list(dict.fromkeys(level for level, _ in rungs)) == [level.value for level in Level]
+    empty = {level for (level, _), rung in rungs.items() if rung["status"] == "empty"}
+    assert empty == {Level.CLOSED_FORM, Level.PROJECTION, Level.CONSTRAINT, Level.FACETS}
+    reduced = rungs[Level.REDUCED, ""]
+    assert reduced["error"] == error_of(0.0, "formulation=midpoint")
+    assert (reduced["resolution"], reduced["resolution_value"]) == ("dt", 1e-3)
+    assert reduced["seconds_per_second"]["value"] > 0
+    assert rungs[Level.CONTACT, "wind=gale"]["error"] == pytest.approx(UNTIL**2 / 2 * 5 / 7, rel=0.5)
+    assert "no ball rolls in a storm" in rungs[Level.CONTACT, "wind=storm"]["message"]
+
+
+def check_terms(content: dict[str, Any]) -> None:
+    """Each term gets its verdict, by its effect on the quantity and against the truth of the scene with it."""
+    terms = {(term["term"], term["formulation"]): term for term in content["terms"]}
+    resistance = terms["rolling resistance", "midpoint"]
+    assert resistance["verdict"] == "needed"
+    assert resistance["on"]["parameters"] == {"rolling_resistance": 5e-4}
+    assert resistance["on"]["error"] == error_of(5e-4, "formulation=midpoint")
+    assert resistance["off"]["error"] > 100 * resistance["on"]["error"]
+    second = terms["second stage", "midpoint"]
+    assert second["verdict"] == "needed"
+    assert second["error_change"] == second["off"]["error"] - second["on"]["error"] > 0
+    assert terms["idle work", "midpoint"]["change"] == 0
+    assert terms["idle work", "midpoint"]["verdict"] in {"paid for, not needed", "free"}  # a matter of the clock
+    assert terms["gale", "heavier"]["verdict"] == "harmful"
+    assert terms["storm", "heavier"]["verdict"] == "no answer"
+    reason = terms["bounded friction", "midpoint"]["reason"]
+    assert reason.startswith("with it: refused, needs bounded friction (slip)")
+    assert terms["orientation asked", "midpoint"]["verdict"] == "no answer"
+    assert terms["orientation asked", "heavier"]["verdict"] == "inherent"
+
+
+def check_findings(content: dict[str, Any]) -> None:
+    """What is missing, harmful or not on the ladder is said in words, and all of it is plain JSON."""
+    said = " ".join(content["findings"])
+    assert "No engine that was asked has a model of the level closed form, projection DAE, " in said
+    assert "gale moves z away from the truth in laddered heavier" in said
+    assert "absent is missing" in said
+    assert "Not on the ladder, for they tell no levels: tiny." in said
+    json.dumps(content, allow_nan=False)
+
+
+def check_tables(content: LadderContent) -> None:
+    """No line of the tables is wider than the terminal's hundred columns, and none is cut."""
+    out = console()
+    with out.capture() as captured:
+        out.print(rung_table(content))
+        out.print(term_table(content))
+    lines = captured.get().splitlines()
+    assert len(lines) > len(content.rungs) + len(content.terms)
+    assert max(map(len, lines)) <= WIDTH
+    assert "…" not in captured.get().replace(" … ", "")
+
+
+def check_slip(content: dict[str, Any]) -> None:
+    """What is zero for a perfect run is held against zero, and no rung is within a tolerance below round-off."""
+    reduced = next(rung for rung in content["rungs"] if rung["level"] == Level.REDUCED)
+    assert (content["unit"], reduced["status"]) == ("m/s", "done")
+    assert 0 < reduced["error"] < 1e-12  # the reduced equations know no slip
+    assert "No rung is within 1e-30 m/s at its own step." in content["findings"]
+
+
+def test_ladder(climb: Callable[..., LadderContent], tmp_path: Path) -> None:
+    """One climb gives rungs, terms, findings and tables; one that asks for another quantity runs nothing again."""
+    content = climb(engines=("laddered", "tiny", "absent"))
+    check_tables(content)
+    for check in (check_rungs, check_terms, check_findings):
+        check(plain(content))
+    stored = {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.*")}
+    assert len(stored) > 10
+    check_slip(plain(climb(quantity="slip", tolerance=1e-30)))
+    assert {file: file.stat().st_mtime_ns for file in tmp_path.glob("*.*")} == stored
+
+
+@pytest.mark.parametrize(
+    ("options", "advice"),
+    [
+        ({"quantity": "first_slip"}, "choose one of gamma, z"),
+        ({"quantity": "height"}, "choose one of gamma, z"),
+        ({"tolerance": 0.0}, "give a positive number"),
+        ({"until": 0.0}, "positive"),
+        ({"engines": ("adams",)}, "there is no such engine"),
+        ({"parameters": {"wheels": 4}}, "there is no such parameter"),
+    ],
+)
+def test_bad_questions(climb: Callable[..., LadderContent], options: dict[str, Any], advice: str) -> None:
+    """A question that makes no sense is answered in one line."""
+    with pytest.raises(InputError) as caught:
+        climb(**options)
+    assert advice in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,132 @@
+"""Sweeps over steps and tolerances, on real engines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.running.case import Case, Result, Status
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
+from proofroll.studies.tradeoff.sweep import BROKEN, _first, _further, curves_of, sweep
+
+QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.1, "z")
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Curve], float]:
+    """Curves over steps and over tolerances, and the range of z."""
+    curves, absent = curves_of(
+        [
+            "projection[formulation=rotating_frame,preset=default]",
+            "projection[formulation=rotating_frame,preset=matched]",
+        ]
+    )
+    assert absent == {}
+    references = sweep(QUESTION, curves, Runner(Store(tmp_path_factory.mktemp("cases")), jobs=1))
+    return {curve.engine: curve for curve in curves}, references[QUESTION.every].sizes["z"]
+
+
+def test_a_curve_over_steps_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
+    """The coarsest step is extended until the run is broken, the finest while the error still falls."""
+    curves, scale = swept
+    points = curves["projection[formulation=rotating_frame,preset=default]"].points
+    assert len(points) >= 6
+    first = points[0]
+    assert first.step is not None
+    broken = first.result.status != Status.DONE or first.errors["z"] >= BROKEN * scale
+    assert broken or first.step == 8 * QUESTION.every
+    assert points[-1].errors["z"] < 1e-4 * scale
+
+
+def test_a_curve_over_tolerances(swept: tuple[dict[str, Curve], float]) -> None:
+    """An adaptive formulation is swept over tolerances down to the preset's own."""
+    curve = swept[0]["projection[formulation=rotating_frame,preset=matched]"]
+    assert not curve.fixed_step
+    steps = [point.step for point in curve.points]
+    assert steps[-1] == curve.facts.settings["rtol"]
+    assert max(steps) >= 1e-2
+    assert curve.points[0].dense.keys() >= {"z", "gamma", "N"}
+
+
+def test_a_curve_over_tolerances_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
+    """Tolerances are loosened until the run is broken, or until something else limits its steps; no clock has a say."""
+    curves, scale = swept
+    curve = curves["projection[formulation=rotating_frame,preset=matched]"]
+    first = curve.points[0]
+    broken = first.result.status != Status.DONE or first.errors["z"] >= BROKEN * scale
+    assert broken or curve.saturated("z")
+    assert first.step is not None
+    assert first.step >= 1e-1
+
+
+def test_round_off_does_not_make_another_run_of_the_same_one() -> None:
+    """Two errors that differ in their last digits are those of one run; two that differ by a part of them are not."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=matched]"])
+
+    def point(error: float) -> CurvePoint:
+        result = Result(Status.DONE, "reached 1 s")
+        return CurvePoint(None, result, errors={"z": error}, bars={"z": 1e-15})  # type: ignore[arg-type]  # no case is run
+
+    for first, second, same in ((7.2e-16, 1.05e-15, True), (2.84893454e-7, 2.84893458e-7, True), (3e-2, 4e-3, False)):
+        curve.points = [point(first), point(second)]
+        assert curve.saturated("z") is same
+
+
+def test_a_tolerance_that_holds_only_between_many_samples_does_not_hold(
+    swept: tuple[dict[str, Curve], float],
+) -> None:
+    """Where a step ends at each of many samples, a loose tolerance looks as good as a tight one; with few it is not."""
+    points = swept[0]["projection[formulation=rotating_frame,preset=matched]"].points
+    loose = next(point for point in points if point.step == 1e-2)
+    assert loose.dense["z"] < 1e-12
+    assert loose.errors["z"] > 1e4 * loose.dense["z"]
+    assert loose.sparse is not None
+    assert loose.errors["z"] == loose.sparse.errors["z"]
+    assert loose.sparse.case.every == QUESTION.until / 2
+    fixed = swept[0]["projection[formulation=rotating_frame,preset=default]"].points
+    assert all(point.sparse is None for point in fixed)
+
+
+def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None:
+    """Runs that seem to have taken a thousand times as long are followed by the same finer steps."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=default]"])
+
+    def point(step: float, error: float, seconds: float) -> CurvePoint:
+        facts = replace(curve.facts, settings=curve.facts.settings | {"dt": step})
+        case = Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
+        return CurvePoint(case, Result(Status.DONE, "reached", wall_seconds=seconds), errors={"z": error})
+
+    reference = SimpleNamespace(scale=lambda _: 1.0)
+    found = []
+    for slowness in (1.0, 1e3):
+        curve.points = [point(2e-4, 4e-4, slowness), point(1e-4, 1e-4, 2 * slowness)]
+        found.append(_further(QUESTION, curve, {QUESTION.every: reference}))  # type: ignore[dict-item]
+    assert found[0] == found[1] != []
+
+
+def test_a_curve_has_each_tolerance_once() -> None:
+    """An engine's own tolerance that is among those of every curve is no second point."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=matched,rtol=1e-8]"])
+    assert curve.facts.settings["rtol"] in (tolerances := _first(QUESTION, curve))
+    assert len(set(tolerances)) == len(tolerances)
+
+
+def test_nothing_of_a_curve_is_lost(swept: tuple[dict[str, Curve], float]) -> None:
+    """Every point has a result, and those that reached the end have an error for every observable."""
+    for curve in swept[0].values():
+        for point in curve.points:
+            assert point.result.message
+            if point.result.status == Status.DONE:
+                assert {"gamma", "z", "N", "F2", "F3", "gap", "slip"} <= point.errors.keys()
+
+
+def test_engines_that_do_not_exist() -> None:
+    """An unknown engine, formulation or setting is an error that names it."""
+    for text in ("adams", "exudyn[formulation=none]", "exudyn[wheels=4]"):
+        with pytest.raises(InputError):
+            curves_of([text])

@@ -1,0 +1,293 @@
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from proofroll.core.errors import Diverged
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.dataset import columns
+from proofroll.elements.ball_on_surface.element import changed, rolling_ball
+from proofroll.elements.ball_on_surface.model import Ball
+from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.elements.ball_on_surface.rolling_equations import closed_form
+from proofroll.elements.ball_on_surface.surfaces import Cylinder
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.ball_on_surface import rolling, unreduced_taylor
+from proofroll.truth.ball_on_surface.rolling import reduced, unreduced
+
+A, C, G, M = 0.025, 0.2, 9.81, 0.517
+
+
+def difference(one: BallMotion, other: BallMotion) -> dict[str, float]:
+    """Largest relative difference of each quantity of two motions."""
+    return {
+        name: float(np.max(np.abs(getattr(one, name) - getattr(other, name))) / np.max(np.abs(getattr(one, name))))
+        for name in ("p_WB", "v_WB", "w_WB", "force")
+    }
+
+
+def final(dataset: xr.Dataset) -> dict[str, float]:
+    """Values at the last time."""
+    return {str(k): float(v[-1]) for k, v in dataset.data_vars.items() if v.dims == ("time",)}
+
+
+@pytest.mark.parametrize("speed", [2.0, 4.0, 6.0, -4.0])
+def test_closed_form_of_the_paper(speed: float) -> None:
+    """For f = 0 the curves are those of the closed form, written out here a second time."""
+    scene = load_scene("sphere_in_cylinder", speed=speed)
+    t = np.linspace(0, 2, 41)
+    motion = closed_form(rolling_ball(scene), t)
+    assert motion is not None
+    found = columns(rolling_ball(scene), t, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force).dataset()
+    rate = speed / C
+    nu = np.sqrt(2 / 7) * abs(rate)
+    z = -5 * G / (2 * rate**2) * (1 - np.cos(nu * t))
+    expected = {
+        "gamma": rate * t,
+        "z": z,
+        "z_rate": -5 * G / (2 * rate**2) * nu * np.sin(nu * t),
+        "omega1": rate * z / A,
+        "omega3": np.full_like(t, -speed / A),
+        "N": np.full_like(t, M * speed**2 / C),
+        "F2": np.zeros_like(t),
+        "F3": M * G * (1 - 5 / 7 * np.cos(nu * t)),
+    }
+    for name, values in expected.items():
+        assert found[name].to_numpy() == pytest.approx(values, rel=1e-12, abs=1e-12), name
+
+
+def test_needed_friction_of_the_paper() -> None:
+    """At V0 = 4 m/s without resistance the friction needed is at most (12/7) g c/V0² = 0.2102."""
+    scene = load_scene("sphere_in_cylinder")
+    half_period = np.pi / (np.sqrt(2 / 7) * 20)
+    found = truth(scene, np.linspace(0, half_period, 11))["needed_friction"]
+    assert float(found.max()) == pytest.approx(12 / 7 * G * C / 16, rel=1e-12)
+    assert float(found.max()) == pytest.approx(0.2102, abs=5e-5)
+
+
+# State where the needed friction first reaches 0.35, from an independent computation.
+PAPER_CASE = {
+    "gamma": 28.02160251, "z": -0.15342234, "gamma_rate": 13.44828166, "z_rate": -0.39505144,
+    "omega1": -101.7254881, "needed_friction": 0.35,
+}  # fmt: skip
+PAPER_TIME = 1.720183172
+
+
+def test_state_of_the_paper_case_with_resistance() -> None:
+    """At f = 0.02a the state at 1.720183172 s is the published one to its last digit (the bound)."""
+    found = final(truth(load_scene("sphere_in_cylinder", rolling_resistance=0.02 * A), np.array([0, PAPER_TIME])))
+    for name, value in PAPER_CASE.items():
+        assert found[name] == pytest.approx(value, rel=4e-9, abs=1e-8), name
+
+
+@pytest.mark.parametrize(
+    ("speed", "mu", "resistance", "time", "z"),
+    [
+        (2.0, 0.35, 0.0, 0.2166732, -0.1469),
+        (2.0, 0.35, 0.02 * A, 0.20720339, None),
+        (4.0, 0.15, 0.0, 0.176667992, None),
+    ],
+)
+def test_first_slip_of_other_cases(speed: float, mu: float, resistance: float, time: float, z: float | None) -> None:
+    """The friction needed reaches μ at the time at which other solvers see the first slip."""
+    found = final(
+        truth(load_scene("sphere_in_cylinder", speed=speed, rolling_resistance=resistance), np.array([0, time]))
+    )
+    assert found["needed_friction"] == pytest.approx(mu, abs=3e-7)
+    if z is not None:
+        assert found["z"] == pytest.approx(z, abs=5e-5)
+
+
+def test_plane_formulas() -> None:
+    """Down a plane a = (5/7) g sin α, friction (2/7) m g sin α, N = m g cos α; across it the speed stays."""
+    alpha, t = 0.35, np.linspace(0, 2, 9)
+    found = truth(load_scene("inclined_plane", tilt=alpha, speed=0.5, cross_speed=0.2), t)
+    acceleration = 5 / 7 * G * np.sin(alpha)
+    assert found["down"].to_numpy() == pytest.approx(0.5 * t + 0.5 * acceleration * t**2, rel=1e-12)
+    assert found["across"].to_numpy() == pytest.approx(0.2 * t, rel=1e-11)
+    assert found["N"].to_numpy() == pytest.approx(M * G * np.cos(alpha), rel=1e-12)
+    assert found["F2"].to_numpy() == pytest.approx(-2 / 7 * M * G * np.sin(alpha), rel=1e-11)
+    assert found["F3"].to_numpy() == pytest.approx(0.0, abs=1e-11)
+
+
+def test_plane_with_resistance() -> None:
+    """Straight down a plane the resistance lessens the acceleration by (5/7)(f/a) g cos α."""
+    f, alpha = 1e-3, 0.35
+    found = truth(load_scene("inclined_plane", rolling_resistance=f, cross_speed=0.0), np.linspace(0, 1, 5))
+    expected = 5 / 7 * G * (np.sin(alpha) - f / A * np.cos(alpha))
+    assert found["down_rate"].to_numpy() == pytest.approx(0.5 + expected * found["time"].to_numpy(), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"speed": 4.0},
+        {"speed": -3.3, "axial_speed": 0.7, "radial_spin": 12.0},
+        {"speed": 0.5, "axial_speed": -2.0, "radial_spin": -30.0, "radius": 0.1},
+        {"gravity": 0.0, "axial_speed": 1.0},
+    ],
+)
+def test_all_routes_agree_without_resistance(parameters: dict[str, float]) -> None:
+    """Closed form, reduced and unreduced equations agree to 1e-11 for general initial motion."""
+    body = rolling_ball(load_scene("sphere_in_cylinder", **parameters))
+    t = np.linspace(0, 0.5, 6)
+    motion = closed_form(body, t)
+    assert motion is not None
+    for other in (reduced(body, t), unreduced(body, t)):
+        assert max(difference(motion, other).values()) <= 1e-11, other.route
+
+
+@pytest.mark.parametrize("speed", [2.0, 4.0])
+def test_both_routes_agree_with_resistance(speed: float) -> None:
+    """Reduced and unreduced equations agree to 1e-10 with rolling resistance, as far as the comparisons go."""
+    body = rolling_ball(
+        load_scene("sphere_in_cylinder", speed=speed, axial_speed=0.4, radial_spin=5.0, rolling_resistance=5e-4)
+    )
+    t = np.linspace(0, 2, 3)
+    assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-10
+
+
+def test_other_balls_and_surfaces() -> None:
+    """A thin shell on a tilted cylinder has no closed form; its two routes agree."""
+    scene = load_scene("sphere_in_cylinder", axial_speed=0.3, rolling_resistance=2e-4)
+    shell = changed(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3), surface=Cylinder("wall", 0.225, tilt=0.5))
+    body, t = rolling_ball(shell), np.linspace(0, 0.5, 3)
+    assert closed_form(body, t) is None
+    assert max(difference(reduced(body, t), unreduced(body, t)).values()) <= 1e-11
+
+
+def test_closed_form_of_a_thin_shell() -> None:
+    """The closed form holds for any ratio of inertias."""
+    scene = load_scene("sphere_in_cylinder", axial_speed=0.3, radial_spin=2.0)
+    body = rolling_ball(changed(scene, ball=Ball("ball", A, M, inertia_ratio=2 / 3)))
+    t = np.linspace(0, 0.5, 3)
+    motion = closed_form(body, t)
+    assert motion is not None
+    assert max(difference(motion, unreduced(body, t)).values()) <= 1e-11
+
+
+def test_closed_form_only_where_it_holds() -> None:
+    """With resistance or a tilted cylinder there is no closed form."""
+    t = np.zeros(1)
+    assert closed_form(rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=1e-6)), t) is None
+    assert closed_form(rolling_ball(load_scene("inclined_plane", rolling_resistance=1e-6)), t) is None
+    tilted = changed(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.1))
+    assert closed_form(rolling_ball(tilted), t) is None
+
+
+def test_every_value_has_an_error_bar(scene: Scene) -> None:
+    """No error bar is zero, and none exceeds 1e-10 of the sizes in the scene."""
+    found = truth(scene, np.linspace(0, 0.1, 3))
+    body = rolling_ball(scene)
+    sizes = {"rad": 1.0, "m": 1.0, "N": 50.0, "J": 10.0, "m/s": 5.0, "rad/s": 200.0, "1": 1.0}
+    assert body.ball.mass == M
+    for name, values in found.data_vars.items():
+        bar = values.attrs["error_bar"]
+        assert bar <= 1e-10 * sizes[values.attrs["units"]], name
+        if np.any(values.to_numpy()):
+            assert bar > 0, name
+
+
+def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
+    """If one route were wrong the error bar would say by how much."""
+    scene = load_scene("inclined_plane")
+    t = np.linspace(0, 0.5, 3)
+    honest = truth(scene, t)["down"].attrs["error_bar"]
+
+    def shifted(*arguments: Any) -> BallMotion:
+        motion = unreduced(*arguments)
+        return dataclasses.replace(motion, p_WB=motion.p_WB + np.array([1e-3, 0, 0]))
+
+    for module in ("rolling", "unreduced_taylor"):
+        monkeypatch.setattr(f"proofroll.truth.{module}.unreduced", shifted)
+    assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(3 * 1e-3 * np.cos(0.35), rel=1e-6)
+    assert honest < 1e-12
+
+
+def test_routes_are_named(times: np.ndarray) -> None:
+    """The truth says how it was found and by what it was checked."""
+    assert "closed form" in truth(load_scene("inclined_plane"), times[:3]).attrs["route"]
+    resisting = truth(load_scene("inclined_plane", rolling_resistance=1e-4), times[:3])
+    assert "surface coordinates" in resisting.attrs["route"]
+    assert "world frame" in resisting.attrs["second_route"]
+    swinging = truth(load_scene("bowl"), times[:3])
+    assert "reduced" in swinging.attrs["route"]
+    assert "unreduced" in swinging.attrs["second_route"]
+
+
+def test_samples_do_not_change_the_truth() -> None:
+    """The values at a time do not depend on how many samples come before it."""
+    body = rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=5e-4))
+    often, once = reduced(body, np.linspace(0, 0.4, 41)), reduced(body, np.array([0, 0.4]))
+    assert often.p_WB[-1] == pytest.approx(once.p_WB[-1], abs=1e-13)
+    assert often.force[-1] == pytest.approx(once.force[-1], abs=1e-10)
+
+
+def test_friction_that_is_never_needed_changes_nothing() -> None:
+    """As long as the friction needed stays below a bound, the bound does not show."""
+    t = np.linspace(0, 0.5, 6)
+    free, bounded = (truth(load_scene("sphere_in_cylinder", **p), t) for p in ({}, {"mu_static": 0.3}))
+    for name in ("p_WB", "v_WB", "w_WB", "N", "F3"):
+        assert bounded[name].to_numpy() == pytest.approx(free[name].to_numpy(), rel=1e-11, abs=1e-11), name
+
+
+def test_routes_share_no_geometry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A wrong second derivative of the surface spoils one route and leaves the other: they are independent."""
+    body = rolling_ball(load_scene("sphere_in_cylinder"))
+    t = np.array([0, 0.1])
+    right = unreduced(body, t).p_WB
+    second = Cylinder.second
+    monkeypatch.setattr(Cylinder, "second", lambda self, u: 1.001 * second(self, u))
+    assert unreduced(body, t).p_WB == pytest.approx(right, abs=1e-15)
+    assert np.max(np.abs(reduced(body, t).p_WB - right)) > 1e-6
+    assert rolling.reduced is reduced
+
+
+needs_heyoka = pytest.mark.skipif(not unreduced_taylor.library.available(), reason="heyoka is not installed")
+
+
+@needs_heyoka
+@pytest.mark.parametrize(
+    "scene",
+    [
+        load_scene("sphere_in_cylinder", axial_speed=1.0, radial_spin=20.0),
+        load_scene("inclined_plane", normal_spin=9.0),
+        changed(load_scene("sphere_in_cylinder"), surface=Cylinder("wall", 0.225, tilt=0.5)),
+    ],
+    ids=["cylinder", "plane", "tilted cylinder"],
+)
+def test_the_compiled_unreduced_route(scene: Scene) -> None:
+    """In Taylor series the unreduced equations give what they give by DOP853, to the latter's 1e-11."""
+    assert unreduced_taylor.available(rolling_ball(scene))
+    times = np.linspace(0, 1, 11)
+    for value in difference(
+        unreduced(rolling_ball(scene), times), unreduced_taylor.unreduced(rolling_ball(scene), times)
+    ).values():
+        assert value < 1e-11
+
+
+def test_where_the_compiled_route_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With resistance, and without heyoka, the second route is the one that needs neither."""
+    assert not unreduced_taylor.available(rolling_ball(load_scene("sphere_in_cylinder", rolling_resistance=1e-4)))
+    monkeypatch.setattr(unreduced_taylor.library, "available", lambda: False)
+    assert truth(load_scene("sphere_in_cylinder"), np.array([0.0, 0.1])).attrs["second_route"].endswith("DOP853")
+
+
+@needs_heyoka
+def test_the_truth_of_ten_thousand_oscillations() -> None:
+    """There is one, to a thousandth of the range of z: constraints that nothing holds drift by that in the world."""
+    scene = load_scene("sphere_in_cylinder")
+    found = truth(scene, np.linspace(0, 1e4 * 2 * np.pi / (np.sqrt(2 / 7) * 20), 12))
+    assert found["z"].attrs["error_bar"] < 1e-3 * np.ptp(found["z"].to_numpy())
+
+
+def test_a_wall_without_curvature_is_named() -> None:
+    """At the apex of a cone the truth ends with one sentence that says where it is, and not with a division by zero."""
+    scene = load_scene("cone", start=1e-7)
+    with pytest.raises(Diverged, match="as at the apex of a cone; start further off"):
+        truth(scene, np.linspace(0.0, 0.2, 3))
