@@ -51,7 +51,7 @@ settings.load_profile("repeatable")
 
 # Each measurement of speed is a real one, but short [s]: no test asks how exact it is.
 stopwatch.SECONDS = 0.002
-# The finest steps of a curve take as long as all others together; tests/unit/studies/test_sweep.py has them.
+# The finest steps of a curve take as long as all others together; tests/unit/studies/tradeoff/test_sweep.py has them.
 tradeoff.FINER = ()
 
 # Each core has a pytest process (``make test``): more worker processes at once would be more to start, and no faster.

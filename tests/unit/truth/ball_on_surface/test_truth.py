@@ -204,7 +204,7 @@ def test_error_bar_shows_a_wrong_route(monkeypatch: pytest.MonkeyPatch) -> None:
         return dataclasses.replace(motion, p_WB=motion.p_WB + np.array([1e-3, 0, 0]))
 
     for module in ("rolling", "unreduced_taylor"):
-        monkeypatch.setattr(f"proofroll.truth.{module}.unreduced", shifted)
+        monkeypatch.setattr(f"proofroll.truth.ball_on_surface.{module}.unreduced", shifted)
     assert truth(scene, t)["down"].attrs["error_bar"] == pytest.approx(3 * 1e-3 * np.cos(0.35), rel=1e-6)
     assert honest < 1e-12
 
