@@ -13,9 +13,8 @@ from proofroll.core.number_text import number
 from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
+from proofroll.files.scene_file import read_scene_file, scene_names
 from proofroll.files.toml import study_of
-from proofroll.files.trajectory_file import read
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.page.html import templates
@@ -83,14 +82,13 @@ def drawn_scene(scene: str, name: str) -> tuple[str, str]:
     return text + "\n", drawings[0].label
 
 
-def truth(outcome: Outcome, runner: Runner) -> str:
+def truth(outcome: Outcome) -> str:
     """By which routes the truth was found, and how well it is known at the first point."""
-    case = next(iter(outcome.truths.values()))
-    result = runner.store.get(case)
-    if result is None or result.trajectory is None:
-        return f"There is none: {result.message if result else 'it was not made'}."
-    dataset = read(runner.store.trajectory(case))
-    name = load_scene(case.scene, **case.parameters).deciding
+    point = next(iter(outcome.points.values()))
+    result = point.result
+    if point.reference is None:
+        return f"There is none: {result.message}."
+    dataset, name = point.reference.dataset, point.scene.deciding
     said = f"{result.message}."
     if name in dataset and "error_bar" in dataset[name].attrs:
         bar, unit = dataset[name].attrs["error_bar"], dataset[name].attrs["units"]
@@ -108,7 +106,7 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     outcome = compare(comparison, runner)
     content = outcome_content(outcome)
     path = f"comparisons: {comparison.name}"
-    parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome, runner)}\n"]
+    parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome)}\n"]
     # Without costs, which are measured in turns where that is asked.
     table = "".join(line.rstrip("\n").rsplit("|", 2)[0] + "|\n" for line in verdict_table(content).splitlines())
     parts += [table, failures(content) + caveat_list(content) + remark_list(content)]

@@ -49,7 +49,7 @@ COLOURS = mpl.colormaps["viridis"](np.linspace(0.92, 0.0, len(SHOWN)))
 
 def draw(outcome: Outcome, store: Store, path: Path) -> None:
     """Height over time, and distance from the truth over time, for a selection of engines."""
-    truth = read(store.trajectory(outcome.truths[point_name(POINT)]))
+    truth = read(outcome.points[point_name(POINT)].file)
     runs = {run.row.engine: run for run in outcome.runs if run.parameters == POINT}
     mpl.rcParams.update({"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 9})
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), constrained_layout=True)

@@ -24,7 +24,7 @@ from proofroll.core.dataset import observe, scales
 from proofroll.core.events import Event
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Verdict, judge
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.plots import PointCurves
 from proofroll.report.page.growing import begun, write_report
@@ -33,7 +33,7 @@ from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.replay.records import Replay
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 from proofroll.truth.ball_on_surface.onset import Onset
 
@@ -63,7 +63,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
         rows=rows,
     )
     times = np.linspace(0.0, UNTIL, round(UNTIL / EVERY) + 1)
-    runs, truths = [], {}
+    runs, points = [], {}
     for speed in (3.0, 4.0):
         point = {"speed": speed}
         scene = load_scene("sphere_in_cylinder", **point)
@@ -73,8 +73,9 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             facts = EngineFacts(name, "1.0", "code", settings, "dt" if settings else None, 2)
             return Case("sphere_in_cylinder", point, digest, facts, UNTIL, EVERY)
 
-        truths[point_name(point)] = case("truth")
-        write(true, store.trajectory(truths[point_name(point)]))
+        known = case("truth")
+        points[point_name(point)] = ComparedPoint(scene, known, Result(Status.DONE, "done"), store.trajectory(known))
+        write(true, store.trajectory(known))
         sizes = scales(scene, true)
         expected = observe(scene, true)
         plans = [("matched", 1e-9, 0.2), ("default", 1e-3, 0.01), (None, 1e-7, 0.5)]
@@ -118,7 +119,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             runs.append(Run(row, point, run_case.engine, result, judgements, [], run_case, silent))
         missing = Result(Status.MISSING, "gamma is not installed here", versions={})
         runs.append(Run(rows[3], point, None, missing, [], ["gamma at this point missing"]))
-    return Outcome(comparison, runs, truths), store
+    usual, file = load_scene("sphere_in_cylinder"), read_scene_file("sphere_in_cylinder")
+    return Outcome(comparison, usual, file, runs, points), store
 
 
 @pytest.fixture(scope="session")

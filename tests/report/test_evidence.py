@@ -51,10 +51,12 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
     store, point = Store(tmp_path), {"speed": 4.0}
     name = "speed=4"
     scene = load_scene("sphere_in_cylinder", **point)
-    true = read(made[1].trajectory(outcome.truths[name]))
+    point_of_made = outcome.points[name]
+    true = read(point_of_made.file)
     times = np.linspace(0.0, 1.0, 6001)
     fine = true.interp(time=times)
-    write(fine, store.trajectory(outcome.truths[name]))
+    file = store.trajectory(point_of_made.case)
+    write(fine, file)
     run = next(run for run in outcome.runs if run.parameters == point)
     assert run.case is not None
     off = fine.copy(deep=True)
@@ -70,7 +72,7 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
         for key, curve in observe(scene, off).items()
         if key in {"gamma", "z", "N", "F2", "F3"}
     }
-    one = dataclasses.replace(outcome, runs=[run], truths={name: outcome.truths[name]})
+    one = dataclasses.replace(outcome, runs=[run], points={name: dataclasses.replace(point_of_made, file=file)})
     drawn = {item.name: item.engines[0] for item in point_curves(one, store)[0].observables}
     for key, judgement in judged.items():
         assert len(drawn[key].at or ()) < times.size / 5

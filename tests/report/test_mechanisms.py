@@ -78,7 +78,7 @@ def test_a_mechanism_is_replayed(
     compared: tuple[Outcome, Store, Path], report: Path, visit: Callable[..., AbstractContextManager[Visit]]
 ) -> None:
     """In a browser the picture moves with the time, and the values beside it are those of the stored truth."""
-    outcome, store, _ = compared
+    outcome, _, _ = compared
     with visit(report / "report.html") as opened:
         opened.page.evaluate("document.querySelector('.replay').scrollIntoView()")
         opened.page.wait_for_selector(".replay[data-ready]")
@@ -88,7 +88,7 @@ def test_a_mechanism_is_replayed(
         opened.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         assert canvas.screenshot() != before
         shown = opened.page.locator('.replay [data-part="values"]').inner_text().replace("−", "-").split()
-        true = read(store.trajectory(next(iter(outcome.truths.values()))))
+        true = read(next(iter(outcome.points.values())).file)
         assert abs(float(shown[shown.index("slider.x") + 1]) - float(true["slider.x"][-1])) < 1e-4
         assert opened.messages == []
 

@@ -18,7 +18,7 @@ from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import plain
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.plots import Bound, point_curves
 from proofroll.report.comparison.records import ReportedRun
@@ -30,7 +30,7 @@ from proofroll.report.page.records import ReportContent, ReportedTruth, report_c
 from proofroll.report.terminal.tables import closing_lines, console, verdict_table
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 from proofroll.truth.ball_on_surface.onset import Onset, onset
 
@@ -56,7 +56,7 @@ def slipping(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
     comparison = Comparison("slipping", "Slipping", "Who slips?", "sphere_in_cylinder", UNTIL, EVERY, bands=band)
     comparison = dataclasses.replace(comparison, rows=rows, points=[WELL, EDGE, FREE])
     times = np.linspace(0.0, UNTIL, round(UNTIL / EVERY) + 1)
-    runs, truths = [], {}
+    runs, points = [], {}
     for point in (WELL, EDGE, FREE):
         scene = load_scene("sphere_in_cylinder", **point)
         dataset = truth(scene, times)
@@ -84,12 +84,12 @@ def slipping(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                 judged.append(judgement("event_order", float(worse is not Verdict.AGREES), worse))
             result = Result(Status.DONE, "done", seconds_per_second=1.0, trajectory=store.trajectory(case).name)
             runs.append(Run(row, point, case.engine, result, judged, [], case))
-        truths[point_name(point)] = Case(
-            "sphere_in_cylinder", point, "d", EngineFacts("truth", "1", "c", {}), UNTIL, EVERY
-        )
-        write(dataset, store.trajectory(truths[point_name(point)]))
+        known = Case("sphere_in_cylinder", point, "d", EngineFacts("truth", "1", "c", {}), UNTIL, EVERY)
+        points[point_name(point)] = ComparedPoint(scene, known, Result(Status.DONE, "done"), store.trajectory(known))
+        write(dataset, store.trajectory(known))
     order = {id(row): index for index, row in enumerate(rows)}
-    return Outcome(comparison, sorted(runs, key=lambda run: order[id(run.row)]), truths), store
+    usual, file = load_scene("sphere_in_cylinder"), read_scene_file("sphere_in_cylinder")
+    return Outcome(comparison, usual, file, sorted(runs, key=lambda run: order[id(run.row)]), points), store
 
 
 @pytest.fixture(scope="module")

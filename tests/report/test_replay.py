@@ -379,7 +379,7 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     )
     settle(opened)
     shown = part(opened, "values").inner_text().replace("−", "-").split("\n")
-    dataset = read(made[1].trajectory(made[0].truths["speed=4"])).sel(time=0.5, method="nearest")
+    dataset = read(made[0].points["speed=4"].file).sel(time=0.5, method="nearest")
     assert abs(float(shown[shown.index("z") + 1].split()[0]) - float(dataset["z"])) < 2e-4
     assert abs(float(shown[shown.index("N") + 1].split()[0]) - float(dataset["N"])) < 2e-2
     opened.page.keyboard.press("Tab")

@@ -71,15 +71,13 @@ def report(
         outcomes: list[Outcome] = []
         if loaded:
             stage = _begin(1, total, "comparisons")
+            outcomes = outcomes_of(loaded[:1], engine or [], runner, stage)
             if len(loaded) > 1:
-                awaited = [item.title for item in loaded[1:]]
-                first = begun(
-                    outcomes_of(loaded[:1], engine or [], runner, stage), runner.store, command, awaited, left_out
-                )
+                first = begun(outcomes, runner.store, command, [item.title for item in loaded[1:]], left_out)
                 first.expect(parts, out, fresh=fresh)
                 first.write(out)
                 options.complain(f"{stage}the first is in {out / 'report.html'}")
-            outcomes = outcomes_of(loaded, engine or [], runner, stage)
+                outcomes += outcomes_of(loaded[1:], engine or [], runner, stage)
         made = begun(outcomes, runner.store, command, left_out=left_out)
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.outcome import Run
 
 GROUP = "proofroll.report_kinds"
+# Group of the scenes for which no kind names one.
+OTHER = "other scenes"
 
 
 class ReportKind(Protocol):
@@ -44,6 +46,11 @@ class ReportKind(Protocol):
     @staticmethod
     def covers(scene: Scene) -> bool:
         """Whether it knows the scene's elements."""
+
+    @staticmethod
+    def group(scene: Scene) -> str:  # noqa: ARG004 -- for those who tell several apart
+        """Group of scenes to which it belongs, in one or two words for the head of a column."""
+        return OTHER
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
@@ -86,11 +93,22 @@ class ReportKind(Protocol):
 
 
 @cache
-def report_kinds() -> tuple[type[ReportKind], ...]:
+def report_kinds() -> Mapping[str, type[ReportKind]]:
     """All that some installed package announces, by name."""
-    return tuple(kind for _, kind in loaded(GROUP))
+    return {point.name: kind for point, kind in loaded(GROUP)}
+
+
+def kind_name(scene: Scene) -> str:
+    """Name of the kind that covers the scene; empty: none does."""
+    return next((name for name, kind in report_kinds().items() if kind.covers(scene)), "")
 
 
 def kind_of(scene: Scene) -> type[ReportKind] | None:
-    """The one that covers the scene, if any."""
-    return next((kind for kind in report_kinds() if kind.covers(scene)), None)
+    """The kind that covers the scene, if any."""
+    return report_kinds().get(kind_name(scene))
+
+
+def group_of(scene: Scene) -> str:
+    """Group of scenes to which a scene belongs: a column of the matrix of engines and scenes."""
+    kind = kind_of(scene)
+    return OTHER if kind is None else kind.group(scene)

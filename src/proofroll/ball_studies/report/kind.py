@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from proofroll.ball_studies.report import onset_tables, onsets
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.report.kinds import ReportKind
 
 if TYPE_CHECKING:
@@ -30,6 +31,14 @@ class BallReport(ReportKind):
     def covers(scene: Scene) -> bool:
         """One ball on one surface."""
         return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
+
+    @staticmethod
+    def group(scene: Scene) -> str:
+        """How the ball meets the wall: by impacts, slipping, or rolling alone."""
+        needs = scene.elements[0].requires
+        if BallCapability.IMPACTS in needs:
+            return "ball, impacts"
+        return "ball, slipping" if BallCapability.BOUNDED_FRICTION in needs else "ball, rolling"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

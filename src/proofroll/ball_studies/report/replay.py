@@ -39,7 +39,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     """What the replay draws of a ball: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
-    sampled = read_some(replayed.file, [*NEEDED, *coordinates])
+    sampled = replayed.true_values([*NEEDED, *coordinates])
     times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
     true = poses(body, sampled, times)
     ghosts = [

@@ -10,11 +10,9 @@ import numpy as np
 import numpy.typing
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import scales
 from proofroll.core.observable import Observable, Role
 from proofroll.files.json_data import OPTIONAL
-from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read, read_some
+from proofroll.files.trajectory_file import read_some
 from proofroll.report.comparison.summary import runs_at
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
@@ -101,13 +99,10 @@ class PointCurves:
 def point_curves(outcome: Outcome, store: Store) -> list[PointCurves]:
     """The curves of a comparison, one entry for each point of the parameters."""
     entries = []
-    for name, case in outcome.truths.items():
-        path = store.trajectory(case)
-        if not path.is_file():
+    for name, point in outcome.points.items():
+        if point.reference is None:
             continue
-        truth = read(path)
-        scene = load_scene(outcome.comparison.scene, **case.parameters)
-        sizes = scales(scene, truth)
+        scene, truth, sizes = point.scene, point.reference.dataset, point.reference.sizes
         kind = kind_of(scene)
         further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
         known = scene.observables | further

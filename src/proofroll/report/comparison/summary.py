@@ -8,7 +8,6 @@ from typing import Any
 
 from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
-from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.records import (
     CauseAt,
     Claims,
@@ -21,6 +20,7 @@ from proofroll.report.comparison.records import (
     WorstJudgement,
     in_words,
 )
+from proofroll.report.kinds import group_of, kind_name
 from proofroll.report.labels import precision_words
 from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
@@ -34,14 +34,17 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
     comparison = outcome.comparison
     rows = by_row(outcome)
     numbers = {key: number for number, key in enumerate(rows)}
+    first = next((point.scene for point in outcome.points.values()), outcome.scene)
     return ReportedComparison(
         name=comparison.name,
         title=comparison.title,
         question=comparison.question,
         scene=comparison.scene,
+        group=group_of(first),
+        shown_by=kind_name(first),
         observables={
             name: ShownObservable(item.unit, item.shown, item.role, item.headline, item.audit)
-            for name, item in load_scene(comparison.scene, **outcome.runs[0].parameters).observables.items()
+            for name, item in first.observables.items()
         },
         until=comparison.until,
         every=comparison.every,

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import plain
-from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
 from proofroll.report.page.html import page
@@ -126,7 +125,7 @@ def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str)
 
 def _replay(outcomes: list[Outcome], store: Store) -> Replay | None:
     """The replay of the comparisons, one kind of scenes after the other."""
-    kinds = {id(item): kind_of(load_scene(item.comparison.scene)) for item in outcomes}
+    kinds = {id(item): kind_of(item.scene) for item in outcomes}
     found = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
     return joined(
         [replay_content([item for item in outcomes if kinds[id(item)] is kind], store, kind.replay()) for kind in found]

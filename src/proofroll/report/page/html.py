@@ -13,12 +13,10 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from proofroll.core import number_text
-from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
-from proofroll.files.scene_file import load_scene
 from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
-from proofroll.report.kinds import ReportKind, kind_of, report_kinds
+from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.pages import environment, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -62,7 +60,7 @@ def page(
         pictures=pictures,
         styles=[styles(comparison.rows) for comparison in content.comparisons],
         replay=replay,
-        replay_scripts=[kind.replay_script for kind in report_kinds() if kind.replay_script],
+        replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
         data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
         plotly=_plotly(),
     )
@@ -70,16 +68,8 @@ def page(
 
 def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
     """The curves with what the scene's kind of element marks on them."""
-    kind = _kind(comparison)
+    kind = report_kinds().get(comparison.shown_by)
     return curves if kind is None else kind.mark(comparison, curves)
-
-
-def _kind(comparison: ReportedComparison) -> type[ReportKind] | None:
-    """What shows more of a comparison's scene; None: nothing, or the data are of a scene that is not here."""
-    try:
-        return kind_of(load_scene(comparison.scene))
-    except InputError:
-        return None
 
 
 @functools.cache
@@ -97,7 +87,7 @@ def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
 
 def templates() -> jinja2.Environment:
     """The templates of the report, with the names that they use; each is compiled once in a process."""
-    return _templates(part_kinds() + report_kinds())
+    return _templates((*part_kinds(), *report_kinds().values()))
 
 
 @functools.cache
@@ -128,7 +118,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "again": _again,
         "told_hosts": told_hosts,
         "part_kinds": part_kinds(),
-        "kind_of": _kind,
+        "report_kinds": report_kinds(),
     }
     for kind in kinds:
         made.globals |= kind.names

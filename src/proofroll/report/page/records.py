@@ -11,14 +11,12 @@ from typing import Any
 
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
-from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
 from proofroll.report.comparison.growth import Growth, growth
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.sentences import Findings, findings
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
-from proofroll.report.page.scene_sheet import SceneSheet, scene_sheet
+from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.page.summary import three_sentences
 from proofroll.report.parts import PartEntry, part_kinds
 from proofroll.running.store import Store
@@ -143,14 +141,15 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> Repor
 def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
     """A comparison's content with its truths, what its kind of scene tells of each run, claims, costs and findings."""
     content, truths = outcome_content(outcome), _truths(outcome, store)
-    kind = kind_of(load_scene(outcome.comparison.scene))
+    kind = kind_of(outcome.scene)
     facts = kind.run_facts(truths, outcome.runs, store) if kind is not None else [None] * len(outcome.runs)
     runs = [
         dataclasses.replace(run, trajectory=run.trajectory and f"{store.folder.name}/{run.trajectory}", own=own)
         for run, own in zip(content.runs, facts, strict=True)
     ]
     content = dataclasses.replace(content, runs=runs)
-    sheet = scene_sheet(outcome.comparison.scene, [case.parameters for case in outcome.truths.values()])
+    points = outcome.points.values()
+    sheet = sheet_of(outcome.file, [item.case.parameters for item in points], [item.scene for item in points])
     evidence = ComparisonEvidence(truths, sheet, findings(content, truths, kind), growth(content, truths))
     return dataclasses.replace(content, evidence=evidence)
 
@@ -158,16 +157,11 @@ def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
 def _truths(outcome: Outcome, store: Store) -> list[ReportedTruth]:
     """For each point where the truth comes from and how well it is known."""
     found = []
-    for name, case in outcome.truths.items():
-        path, result = store.trajectory(case), store.get(case)
-        entry = ReportedTruth(
-            name,
-            case.parameters,
-            f"{store.folder.name}/{path.name}",
-            None if result is None else result.wall_seconds,
-        )
-        if path.is_file():
-            dataset, scene = read(path), load_scene(case.scene, **case.parameters)
+    for name, point in outcome.points.items():
+        trajectory = f"{store.folder.name}/{point.file.name}"
+        entry = ReportedTruth(name, point.case.parameters, trajectory, point.result.wall_seconds)
+        if point.reference is not None:
+            dataset, scene = point.reference.dataset, point.scene
             observables, kind = scene.observables, kind_of(scene)
             entry = dataclasses.replace(
                 entry,

@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.core.scene import Scene
+from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.files.scene_parameters import Parameter
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
@@ -42,16 +43,22 @@ class SceneSheet:
 
 
 def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> SceneSheet:
+    """The sheet of a scene that nobody has loaded; ``points`` are as for :func:`sheet_of`."""
+    return sheet_of(
+        read_scene_file(scene), points, [load_scene(scene, **point) for point in points] or [load_scene(scene)]
+    )
+
+
+def sheet_of(file: SceneFile, points: Sequence[dict[str, float]], scenes: Sequence[Scene]) -> SceneSheet:
     """The scene as it is compared.
 
     Args:
-        scene: name of the scene, or its folder.
+        file: the scene's.
         points: values of the parameters that differ from the scene's own, one entry for each case.
+        scenes: of these cases; without cases the scene with its own parameters.
     """
-    file = read_scene_file(scene)
-    drawn = [load_scene(scene, **point) for point in points] or [load_scene(scene)]
-    kind = kind_of(drawn[0])
-    drawings, undrawn = kind.drawings(drawn) if kind else ([], "There is no drawing for this kind of scene.")
+    kind = kind_of(scenes[0])
+    drawings, undrawn = kind.drawings(scenes) if kind else ([], "There is no drawing for this kind of scene.")
     parameters = []
     for name, parameter in file.parameters.items():
         set_to = [point.get(name) for point in points]

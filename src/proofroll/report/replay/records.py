@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.report.replay.library import thinned
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # How fast a person can let it run, over real time.
 SPEEDS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
@@ -55,17 +60,23 @@ class Replayed:
 
     Attributes:
         scene: with the parameters of the case.
-        file: the truth's trajectory.
+        true: the true motion.
+        file: in which it is stored.
         ghosts: what stands beside it.
         group: of cases to which it belongs.
         label: what it is called in its group.
     """
 
     scene: Scene
+    true: xr.Dataset
     file: Path
     ghosts: list[Ghost]
     group: str
     label: str
+
+    def true_values(self, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+        """Variables of the true motion, those that there are."""
+        return {name: self.true[name].to_numpy() for name in names if name in self.true.variables}
 
 
 @dataclass

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_some
 from proofroll.report.comparison.summary import outcome_content, runs_at
 from proofroll.report.labels import names
@@ -18,9 +17,9 @@ from proofroll.report.pages import packed
 from proofroll.report.replay.library import three
 from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayedRun, ReplayKind
 from proofroll.report.styles import styles
-from proofroll.running.case import Case, Status
+from proofroll.running.case import Status
 from proofroll.running.store import Store
-from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
 # Frames per second of the motion that no eye misses, the fewest of a replay that is slowed down, and the most that it
@@ -38,30 +37,31 @@ def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> R
     settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
     first, of each engine the ``default`` one is shown that is furthest off.
     """
-    found: dict[str, tuple[Case, list[tuple[Outcome, str]]]] = {}
+    found: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
-        for point, case in outcome.truths.items():
-            if store.trajectory(case).is_file():
-                found.setdefault(case.key, (case, []))[1].append((outcome, point))
+        for name, point in outcome.points.items():
+            if point.reference is not None:
+                found.setdefault(point.case.key, (point, []))[1].append((outcome, name))
     looks = {id(outcome): _looks(outcome) for outcome in outcomes}
     cases, numbers = [], []
-    for case, shared in found.values():
-        scene = load_scene(case.scene, **case.parameters)
-        true = read_some(store.trajectory(case), ["p_WB"])["p_WB"]
+    for point, shared in found.values():
+        assert point.reference is not None  # or it would not be among them
+        true = point.reference.dataset
         ghosts = [
             ghost
-            for outcome, point in shared
-            for ghost in _ghosts(runs_at(outcome, point, store), looks[id(outcome)], true)
+            for outcome, name in shared
+            for ghost in _ghosts(runs_at(outcome, name, store), looks[id(outcome)], true["p_WB"].to_numpy())
         ]
-        ghosts = _chosen(ghosts, kind.seen(scene))
+        ghosts = _chosen(ghosts, kind.seen(point.scene))
         # The comparison that has most to show at this point names the case.
         title = max(shared, key=lambda pair: len(runs_at(pair[0], pair[1], store)))[0].comparison.title
-        replayed = Replayed(scene, store.trajectory(case), ghosts, title, point_name(case.parameters) or scene.title)
+        label = point_name(point.case.parameters) or point.scene.title
+        replayed = Replayed(point.scene, true, point.file, ghosts, title, label)
         content, packed_numbers = case_content(replayed, kind, lambda file: f"{store.folder.name}/{file.name}")
         cases.append(content)
         numbers.append(packed_numbers)
-    plainest = [load_scene(case.scene, asks=case.asks).digest == case.scene_digest for case, _ in found.values()]
-    start = plainest.index(True) if any(plainest) else 0
+    own = {outcome.scene.digest for outcome in outcomes}
+    start = next((number for number, (point, _) in enumerate(found.values()) if point.scene.digest in own), 0)
     return Replay(three(), start, cases, numbers)
 
 

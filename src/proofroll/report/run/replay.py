@@ -58,13 +58,12 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     packed: list[str] = []
     group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
     with tempfile.TemporaryDirectory() as folder:
-        file, own = (Path(folder) / f"{name}{STORED}" for name in ("truth", "run"))
+        own = Path(folder) / f"run{STORED}"
         for (element, alone), drawer in zip(parts, drawers, strict=True):
             true_part, run_part = (part(scene, element, whole) for whole in (true, run))
-            write(true_part, file)
             write(run_part, own)
             shown = element.name if len(parts) > 1 else label or scene.title
-            replayed = Replayed(alone, file, _ghosts(own, run_part, true_part), group, shown)
+            replayed = Replayed(alone, true_part, own, _ghosts(own, run_part, true_part), group, shown)
             case, numbers = case_content(replayed, drawer, lambda _: "")
             cases.append(case)
             packed.append(numbers)
@@ -74,7 +73,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
         scene=scene,
         replay=Replay(three(), 0, cases, packed),
         said=_said(run),
-        replay_scripts=[other.replay_script for other in report_kinds() if other.replay_script],
+        replay_scripts=[other.replay_script for other in report_kinds().values() if other.replay_script],
     )
 
 

@@ -16,13 +16,13 @@ from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict, judge
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.studies.comparison.expectations import contradictions_of
-from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.outcome import ComparedPoint, LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import Plan, Planned, at_point, plan, point_name
 from proofroll.studies.judging.reference import Reference
 
@@ -33,25 +33,26 @@ if TYPE_CHECKING:
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
     """Judges the results of a plan's cases."""
     comparison = planned.comparison
+    points = {
+        name: ComparedPoint(
+            load_scene(comparison.scene, **case.parameters), case, results[case.key], runner.store.trajectory(case)
+        )
+        for name, case in planned.truths.items()
+    }
     judged: list[Run] = []
-    references: dict[str, Reference] = {}
     for run in planned.runs:
+        point = points[point_name(run.parameters)]
         if isinstance(run.facts, ProofrollError):
             judged.append(_absent(run))
             continue
         result = results[run.ladder[1.0].key]
         if result.trajectory is None or result.status != Status.DONE:
-            judged.append(_without_result(run, result))
+            judged.append(_without_result(run, point, result))
             continue
-        name = point_name(run.parameters)
-        truth = results[planned.truths[name].key]
-        if truth.status != Status.DONE:
-            judged.append(_without_truth(run, result, truth))
+        reference = point.reference if point.result.status == Status.DONE else None
+        if reference is None:
+            judged.append(_without_truth(run, point, result))
             continue
-        if name not in references:
-            scene = load_scene(comparison.scene, **run.parameters)
-            references[name] = Reference.read(scene, runner.store.trajectory(planned.truths[name]))
-        reference = references[name]
         other = reference.another_scene(result.certificate)
         if other is not None:
             judged.append(_of_another_scene(run, result, other))
@@ -62,7 +63,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             if results[case.key].status == Status.DONE
         }
         band = comparison.bands[run.row.tolerance]
-        judgements = _judgements(run, band, reference, trajectories, _lost(run, results))
+        judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         found = _run(
             run,
@@ -71,13 +72,15 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             contradictions=contradictions_of(comparison, run, judgements, missing),
             missing=missing,
             shared=reference.shared(run.facts.shares),
+            rungs=_rungs(run, results, errors),
         )
         if found.verdict == Verdict.DIFFERS:
             true, main = reference.dataset, trajectories[1.0]
             causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             found = replace(found, diagnosis=causes)
         judged.append(found)
-    return Outcome(comparison, judged, planned.truths)
+    scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    return Outcome(comparison, scene, file, judged, points)
 
 
 def compare(
@@ -107,10 +110,9 @@ def _absent(run: Planned) -> Run:
     return _run(run, Result(status, str(run.facts)))
 
 
-def _without_result(run: Planned, result: Result) -> Run:
+def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
     """A row that was refused, or failed."""
-    case = run.ladder[1.0]
-    causes = diagnosed(load_scene(case.scene, **run.parameters), result.certificate, step=case.engine.step)
+    causes = diagnosed(point.scene, result.certificate, step=run.ladder[1.0].engine.step)
     found = _run(run, result, diagnosis=causes)
     expected = run.row.expected(run.parameters)
     if found.verdict in expected:
@@ -120,12 +122,13 @@ def _without_result(run: Planned, result: Result) -> Run:
     return replace(found, contradictions=[said])
 
 
-def _without_truth(run: Planned, result: Result, truth: Result) -> Run:
+def _without_truth(run: Planned, point: ComparedPoint, result: Result) -> Run:
     """A row at a point where the truth refuses, which says nothing about the engine; or where it was lost."""
+    truth = point.result
     lasts = truth.status in LASTING
     status = Status.NO_TRUTH if lasts else truth.status
     result = replace(result, status=status, message=f"there is no truth here: {truth.message}")
-    return _run(run, result) if lasts else _without_result(run, result)
+    return _run(run, result) if lasts else _without_result(run, point, result)
 
 
 def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:
@@ -138,11 +141,13 @@ def _of_another_scene(run: Planned, result: Result, sentence: str) -> Run:
 
 def _judgements(
     run: Planned, band: Band, reference: Reference, trajectories: dict[float, xr.Dataset], lost: str
-) -> list[Judgement]:
+) -> tuple[list[Judgement], dict[float, dict[str, float]]]:
+    """The judgements of a run; and factor of each rung of its ladder -> error of each observable."""
     reference, trajectories = reference.common_span(trajectories)
     curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
-    judgements = []
+    judgements: list[Judgement] = []
+    errors: dict[float, dict[str, float]] = {factor: {} for factor in curves}
     for name, curve in main.items():
         tolerance = run.row.bound.get(name) or band.bounds.get(name)
         if tolerance is None:
@@ -169,7 +174,20 @@ def _judgements(
             precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
         )
         judgements.append(judgement)
-    return judgements
+        for factor, found in curves.items():
+            if name in found:
+                errors[factor][name] = largest_difference(found[name], true)
+    return judgements, errors
+
+
+def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[str, float]]) -> list[LadderRun]:
+    """The ladder without the run itself."""
+    found = []
+    for factor, case in run.ladder.items():
+        facts = case.engine
+        if factor != 1 and facts.resolution is not None:
+            found.append(LadderRun(facts.settings[facts.resolution], results[case.key], errors.get(factor, {})))
+    return found
 
 
 def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) -> Limit | None:

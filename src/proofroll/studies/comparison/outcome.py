@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
 
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.diagnosis.of_scene import Diagnosis
+from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files.scene_file import SceneFile
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.studies.judging.reference import Reference
 
 SEVERITY = list(Verdict)
 
@@ -31,6 +36,43 @@ def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Ver
 
 
 @dataclass(frozen=True)
+class ComparedPoint:
+    """One point of the parameters: the scene there and its truth; whoever reports of it loads nothing again.
+
+    Attributes:
+        scene: with its numbers.
+        case: of the truth.
+        result: how the truth's run ended.
+        file: the truth's trajectory, if it has one.
+    """
+
+    scene: Scene
+    case: Case
+    result: Result
+    file: Path
+
+    @cached_property
+    def reference(self) -> Reference | None:
+        """The truth, read when it is first asked for; None: there is none."""
+        return Reference.read(self.scene, self.file) if self.file.is_file() else None
+
+
+@dataclass(frozen=True)
+class LadderRun:
+    """A further run of a row's ladder, with another step or tolerance.
+
+    Attributes:
+        value: of the step [s] or tolerance.
+        result: how it ended.
+        errors: largest distance from the truth at the samples, by observable; empty without a trajectory.
+    """
+
+    value: float
+    result: Result
+    errors: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Run:
     """One row of the comparison at one point of its parameters.
 
@@ -45,6 +87,7 @@ class Run:
         missing: observables that the claim's tolerances judge and the run does not give.
         shared: which route of the truth rests on the same equations, as a clause; empty if none does.
         diagnosis: causes of a difference that are proven.
+        rungs: the other runs of its ladder.
     """
 
     row: Row
@@ -57,6 +100,7 @@ class Run:
     missing: list[str] = field(default_factory=list)
     shared: str = ""
     diagnosis: list[Diagnosis] = field(default_factory=list)
+    rungs: list[LadderRun] = field(default_factory=list)
 
     @property
     def verdict(self) -> Verdict:
@@ -68,12 +112,21 @@ class Run:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All that a comparison found."""
+    """All that a comparison found.
+
+    Attributes:
+        comparison: what was asked.
+        scene: with its own parameters.
+        file: the scene's, for its words.
+        runs: with their judgements.
+        points: by :func:`proofroll.studies.planning.point_name`.
+    """
 
     comparison: Comparison
+    scene: Scene
+    file: SceneFile
     runs: list[Run]
-    truths: dict[str, Case]
-    """The truth's case by :func:`point_name`."""
+    points: dict[str, ComparedPoint]
 
     @property
     def contradictions(self) -> list[str]:

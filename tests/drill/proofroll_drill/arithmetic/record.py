@@ -44,7 +44,7 @@ def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
 
 def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
     """``decisions`` and ``limits`` of each run; ``truths``: what they decide, and in which files their numbers lie."""
-    points = {name: f"point {number}" for number, name in enumerate(outcome.truths)}  # an edge is a found number
+    points = {name: f"point {number}" for number, name in enumerate(outcome.points)}  # an edge is a found number
     decisions: dict[str, Any] = {}
     limits: dict[str, Any] = {}
     for run in outcome.runs:
@@ -58,12 +58,10 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
             if item.limit_error is not None
         }
     truths = {}
-    for name, case in outcome.truths.items():
-        path = store.trajectory(case)
-        if path.exists():
-            scene, dataset = load_scene(case.scene, **case.parameters), read(path)
-            said = {"ill_posed": bool(dataset.attrs.get("ill_posed")), "events": _events(scene, dataset)}
-            truths[points[name]] = {"decisions": said, "file": path.name}
+    for name, point in outcome.points.items():
+        if point.reference is not None:
+            said = {"ill_posed": point.reference.ill_posed, "events": _events(point.scene, point.reference.dataset)}
+            truths[points[name]] = {"decisions": said, "file": point.file.name}
     return {"decisions": decisions, "limits": limits, "truths": truths}
 
 

@@ -363,7 +363,7 @@ def test_neighbouring_points_have_truths_of_their_own(
     comparison = claim([dataclasses.replace(ROW, engine="oracle")], speeds)
     outcome = compare(comparison, Runner(Store(tmp_path), jobs=1))
     assert [run.parameters["speed"] for run in outcome.runs] == speeds
-    assert len({case.key for case in outcome.truths.values()}) == 2
+    assert len({point.case.key for point in outcome.points.values()}) == 2
     assert [run.verdict for run in outcome.runs] == [Verdict.AGREES] * 2
     # The other point's truth is further away than the tolerance.
     assert 1e-6 / 0.2 * comparison.until > TIGHT["gamma"].absolute(1.0)

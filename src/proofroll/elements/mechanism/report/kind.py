@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.capabilities import ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.report.kinds import ReportKind
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from proofroll.report.pen import Picture
     from proofroll.report.replay.records import ReplayKind
 
+_LAWS = {MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.REBOUNDS}
 # Curves of forces, and of torques, of one case.
 _MOST = 8
 # What changes by less than this part of the widest range is a straight line in its figure.
@@ -38,6 +40,16 @@ class MechanismReport(ReportKind):
     def covers(scene: Scene) -> bool:
         """One mechanism alone."""
         return len(scene.elements) == 1 and isinstance(scene.elements[0], MechanismElement)
+
+    @staticmethod
+    def group(scene: Scene) -> str:
+        """What is hardest in it: laws of joints that switch, loops, springs and drives, or none of them."""
+        needs = covered(scene).requires
+        if needs & _LAWS:
+            return "joint laws"
+        if needs & ALL_LOOPS:
+            return "loops"
+        return "springs and drives" if needs & FORCES else "trees"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

@@ -51,7 +51,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
-    true = read_some(replayed.file, [*_MOTION, *names, *(name for name, _ in readings)])
+    true = replayed.true_values([*_MOTION, *names, *(name for name, _ in readings)])
     fastest = float(np.linalg.norm(true["w_WB"], axis=-1).max())
     times = frame_times(float(true["time"][-1]), fastest)
     placed = _placed(element, true, times)
