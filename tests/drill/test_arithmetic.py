@@ -18,6 +18,7 @@ from proofroll_drill.arithmetic import matrix as the_matrix
 from proofroll_drill.arithmetic.differences import beyond_bars, differences
 from proofroll_drill.arithmetic.kinds import PYTHONS, REPOSITORY, Arithmetic, kinds, took_effect
 from proofroll_drill.arithmetic.matrix import Tried, comparison_files, matrix
+from proofroll_drill.arithmetic.record import WRONG, until_wrong
 
 # A ball that rolls, one that slips and sticks, one on a curved wall; a body in space, a tree, a loop.
 SCENES = ("sphere_in_cylinder", "inclined_plane", "bowl", "heavy_top", "four_bar")
@@ -80,6 +81,21 @@ def test_a_decision_that_differs_is_told(changes: dict[str, Any], tmp_path: Path
     assert (found.kind, found.comparison, found.what) == ("zen", "claim", place)
     assert found.found == str(instead["ball"] if what == "events" else instead)
     assert found.reference != found.found
+
+
+@pytest.mark.parametrize(
+    ("found", "kept"),
+    [
+        (["slip", "stick"], ["slip", "stick"]),
+        (["slip"], ["slip"]),
+        (["slip", "lift_off", "impact", "lift_off"], ["slip", WRONG]),
+        (["slip", "stick", "slip", "stick"], ["slip", "stick", WRONG]),
+        (["lift_off"] * 8, [WRONG]),
+    ],
+)
+def test_what_follows_a_wrong_event_is_no_decision(found: list[str], kept: list[str]) -> None:
+    """An engine whose events are not the truth's may chatter on as round-off has it; where they part counts."""
+    assert until_wrong(found, ["slip", "stick"]) == kept
 
 
 def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:

@@ -213,8 +213,8 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
         finding = LimitFinding.WITHIN
     elif leaves and not limit.saturated and (limit.shown or error - drifted > tolerance):
         finding = LimitFinding.ANOTHER
-    shown = limit.shown or limit.error_bar <= round_off
-    wrong = shown and finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * bar + limit.beside + round_off
+    shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
+    wrong = shown and finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * (bar + round_off) + limit.beside
     told = "no order" if order is None else f"order {order:.3g}"
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
     if not np.isfinite(error):

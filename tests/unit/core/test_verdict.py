@@ -206,6 +206,13 @@ def test_a_ladder_is_never_too_clean() -> None:
         assert found.remarks == (), "round-off of a curve is no other limit"
 
 
+def test_round_off_decides_about_no_remark() -> None:
+    """A limit off by round-off has ten times as much room; beyond it, whether scatter grew or fell says nothing."""
+    for off, bar, shown, count in ((1e-12, 1e-15, True, 0), (1e-11, 1e-15, True, 1), (1e-10, 1e-12, False, 1)):
+        found = verdict_of(0.0, Limit(TRUE + off, bar, math.nan, shown), bar=1e-15)
+        assert (found.verdict, len(found.remarks)) == (Verdict.AGREES, count)
+
+
 def test_a_limit_within_tolerance_is_convergence() -> None:
     """A limit off by 7e-5 N under a tolerance of 0.41 N converges; that it is not quite the truth is remarked."""
     found = verdict_of(1.0, Limit(TRUE + 7e-5, 1e-6, 2.0), tolerance=0.41)

@@ -8,10 +8,9 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.ball_on_surface.route import End, Leg, Motion, Route, World
+from proofroll.truth.ball_on_surface.route import End, Leg, Motion, Path, Route, World
 from proofroll.truth.crossing import first_rise
 
 # A ball that leaves the wall is looked for on it from this part of its pace on; its gap has grown from zero till then.
@@ -21,6 +20,10 @@ _LEFT = 1e-3
 # Parts of the speed of a fall by the radius: bounces slower than the first are over, and only those faster than the
 # second, a hundredth of the radius high, are told as events; slower than the third a contact point stands still.
 _LOW, _SEEN, _STANDS = 1e-6, 0.14, 1e-12
+# Way over the radius of curvature up to which the gap is taken along it: places are rounded by as much as the last
+# bounces are high. Points and weights of Gauss on (0, 1) for the mean normal.
+_NEAR = 0.01
+_POINTS, _WEIGHTS = (1 + np.polynomial.legendre.leggauss(3)[0]) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
 
 
 def pressed(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
@@ -58,10 +61,9 @@ def airborne(
     world: World,
     time: float,
     until: float,
-    legs: list[Leg],
-    events: list[tuple[EventKind, float]],
+    path: Path,
 ) -> Landed | float | None:
-    """Flights and impacts from ``time`` on, added to the legs and events, until the ball stays on the wall.
+    """Flights and impacts from ``time`` on, added to the path, until the ball stays on the wall.
 
     A ball that leaves each impact with e times its speed bounces infinitely often in a finite time: below a speed that
     does not matter (:data:`_LOW`) its last impact takes all of it, which gives the wall the same impulse as all the
@@ -74,7 +76,7 @@ def airborne(
     natural = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity))
     while True:
         lands, motion = _flight(body, world, time, until)
-        legs.append(Leg(time, until if lands is None else lands, False, route.start(), End.TIME, motion))
+        path.legs.append(Leg(time, until if lands is None else lands, False, route.start(), End.TIME, motion))
         if lands is None or e is None:
             return lands
         if body.wall_rate is not None:
@@ -89,7 +91,7 @@ def airborne(
         if e * approach > _LOW * natural or weight < 0:
             world = (p, *route.impact(body, p, v, w, e, e_t))
             if e * approach > _SEEN * natural:
-                events.append(("bounce", time))
+                path.events.append(("bounce", time))
             continue
         bounced = np.isinf(body.contact.mu_static) and e_t == 1 and 0 < e < 1
         if bounced and _slip(body, v, w, e1) is not None:
@@ -99,9 +101,16 @@ def airborne(
                 "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
             )
         v, w = route.impact(body, p, v, w, 0.0, 0.0)
-        settled = time + 2 * e * approach / ((1 - e) * weight) if e else time
-        events.append(("settle", settled))
+        rest = 2 * e * approach / ((1 - e) * weight) if e else 0.0
+        settled = time + rest
+        path.events.append(("settle", settled))
+        path.blurs[settled] = rest**2 * (natural + np.linalg.norm(v)) * _bend(body, p)  # the weight changes meanwhile
         return Landed(time, settled, (p, v, w), _slip(body, v, w, e1))
+
+
+def _bend(body: RollingBall, p_WB: FloatArray) -> float:
+    """Largest curvature of the centre's surface [1/m]."""
+    return float(np.linalg.norm(body.surface.normal_gradient(p_WB), 2))
 
 
 def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> FloatArray | None:
@@ -117,20 +126,27 @@ def _flight(body: RollingBall, world: World, time: float, until: float) -> tuple
     """Free fall from ``time`` [s] with constant spin: when the ball is on the wall again (None: not until the end)."""
     p, v, w = world
 
-    def motion(times: FloatArray) -> BallMotion:
+    def way(times: FloatArray) -> FloatArray:
         t = (times - time)[:, None]
-        p_WB, v_WB = p + t * v + 0.5 * t**2 * body.gravity, v + t * body.gravity
+        return np.asarray(t * v + 0.5 * t**2 * body.gravity)
+
+    def motion(times: FloatArray) -> BallMotion:
+        p_WB, v_WB = p + way(times), v + (times - time)[:, None] * body.gravity
         return BallMotion(p_WB, v_WB, np.broadcast_to(w, p_WB.shape), np.zeros_like(p_WB), "free flight")
 
     def sunk(times: FloatArray) -> FloatArray:
-        return -body.surface.gap(motion(times).p_WB)
+        whole = way(times)
+        near = np.linalg.norm(whole, axis=-1) * bend < _NEAR
+        d = np.where(near[:, None], whole, 0.0)
+        mean = np.tensordot(_WEIGHTS, body.surface.normal(p + _POINTS[:, None, None] * d), 1)
+        return np.where(near, (mean * d).sum(-1) - (0.0 if time else body.gap0), -body.surface.gap(p + whole))
 
     e1, pull = body.surface.normal(p), float(np.linalg.norm(body.gravity))
+    bend = _bend(body, p)
     leaving = -float(v @ e1)
     pace = _LEFT * body.ball.radius / (np.sqrt(body.ball.radius * pull) + np.linalg.norm(v) or 1.0)
     if leaving > _LOW * np.sqrt(body.ball.radius * pull):
         # It is in the air for longer than it takes to lose that speed; 0.7, lest a look end where it lands on a plane.
-        bend = float(np.linalg.norm(body.surface.normal_gradient(p), 2))
         pace = 0.7 * leaving / (pull + bend * float(v @ v))
     lands, start = None, time + float(pace)
     while lands is None and start < until:  # the gap is a smooth function of the time since: ever longer looks suffice

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, auto
 from typing import ClassVar
 
@@ -131,11 +131,13 @@ class Path:
         legs: one after another from time 0.
         events: kind and time [s] of each change.
         lands: when a ball that has left the wall is back on it [s], where the path ends; None: not until the end.
+        blurs: how far off events at a time [s] may be that both routes find in one way [s].
     """
 
-    legs: list[Leg]
-    events: list[tuple[EventKind, float]]
+    legs: list[Leg] = field(default_factory=list)
+    events: list[tuple[EventKind, float]] = field(default_factory=list)
     lands: float | None = None
+    blurs: dict[float, float] = field(default_factory=dict)
 
     def motion(self, times: FloatArray, route: str) -> BallMotion:
         """Motion at rising ``times`` [s]; a time of an event belongs to the later leg."""

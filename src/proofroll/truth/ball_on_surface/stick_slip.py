@@ -76,7 +76,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
         why = f"a relative {MOVE:g} of friction, resistance, restitution or gravity changes it"
     events = []
     for (kind, time), (_, other) in zip(first[:number], second, strict=False):
-        wide = SAFETY * (abs(time - other) + _FLOOR * time)
+        wide = SAFETY * (abs(time - other) + _FLOOR * time + paths[0].blurs.get(time, 0.0))
         events.append(Event(kind, time, max(time - wide, 0.0), time + wide))
     result, check = (
         _dataset(scene, times, path, route.name, quadrature)

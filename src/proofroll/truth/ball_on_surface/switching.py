@@ -6,11 +6,12 @@ decided what comes next. Nothing limits the number of legs: only the end of time
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, setting_off, stands, stays
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
@@ -37,9 +38,9 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
         Refused: the ball slips to and fro ever faster.
         Diverged: a route makes no progress.
     """
-    legs: list[Leg] = []
+    path = Path()
+    legs, events = path.legs, path.events
     reversals = 0
-    events: list[tuple[EventKind, float]] = []
     time, begins, state = 0.0, 0.0, route.start()
     if not body.gap0 and stands(body, route.world(state)[1]):
         if stays(body, route.world(state)[0]):
@@ -53,9 +54,9 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
     sticking: bool | None = None  # it has just begun to touch the wall
     while True:
         if flight is not None:
-            came = airborne(body, route, flight, time, until, legs, events)
+            came = airborne(body, route, flight, time, until, path)
             if not isinstance(came, Landed):
-                return Path(legs, events, came)
+                return replace(path, lands=came)
             time, begins, slip, state = came.time, came.settled, came.slip, touching(route, came)
             flight, sticking = None, None
         if sticking is None:
@@ -69,7 +70,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
             raise Diverged(f"the truth makes no progress at {time:g} s, where sticking and slipping alternate at once")
         time, state = leg.end, leg.state
         if leg.why is End.TIME:
-            return Path(legs, events)
+            return path
         if leg.why is End.LIFTOFF:
             events.append(("lift_off", time))
             last = leg.motion(np.array([time]))  # with the slip that a state does not tell
@@ -79,7 +80,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
             if not sticking:
                 events.append(("stick", max(time, begins)))
             legs.append(_rest(body, route, route.nudged(state, np.zeros(3)), time, until))
-            return Path(legs, events)
+            return path
         if leg.why is End.HALT:
             state = route.nudged(state, setting_off(body, route.world(state)[0]))
         hastens = len(legs) > 1 and leg.end - leg.start < (1 - _SHORTER) * (legs[-2].end - legs[-2].start)

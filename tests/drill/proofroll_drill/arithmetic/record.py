@@ -15,6 +15,7 @@ from proofroll.core.dataset import part
 from proofroll.core.errors import ProofrollError
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
+from proofroll.core.verdict import Judgement, round_off_of
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -25,6 +26,8 @@ from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import point_name
+
+WRONG = "one that the truth does not have"
 
 
 def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
@@ -53,9 +56,7 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
         key = f"{run.row.engine} {points[point_name(run.parameters)]} #{number}"
         decisions[key] = _decisions(run, outcome, store)
         limits[key] = {
-            item.observable: [item.limit_error, (item.limit_error_bar or 0.0) + item.truth_error_bar]
-            for item in run.judgements
-            if item.limit_error is not None
+            item.observable: [item.limit_error, _bar(item)] for item in run.judgements if item.limit_error is not None
         }
     truths = {}
     for name, point in outcome.points.items():
@@ -69,7 +70,10 @@ def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
     events: Any = None
     if run.case is not None and run.result.status == Status.DONE and run.result.trajectory is not None:
         scene = load_scene(outcome.comparison.scene, **run.parameters)
-        events = _events(scene, read(store.trajectory(run.case)))
+        path = store.trajectory(outcome.truths[point_name(run.parameters)])
+        true = _events(scene, read(path)) if path.exists() else {}
+        found = _events(scene, read(store.trajectory(run.case)))
+        events = {name: until_wrong(kinds, true.get(name, kinds)) for name, kinds in found.items()}
     return {
         "status": run.result.status,
         "verdict": run.verdict,
@@ -82,11 +86,25 @@ def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
     }
 
 
+def _bar(item: Judgement) -> float:
+    """Of a limit, with the round-off that no verdict hangs on."""
+    return (item.limit_error_bar or 0.0) + item.truth_error_bar + round_off_of("double", item.scale)
+
+
 def _events(scene: Scene, dataset: Any) -> dict[str, list[str]]:
     found = {}
     for element in scene.elements:
         found[element.name] = [event.kind for event in events_of(part(scene, element, dataset))]
     return found
+
+
+def until_wrong(found: list[str], true: list[str]) -> list[str]:
+    """Events of an engine up to the first that the truth does not have, which stands as :data:`WRONG`.
+
+    After a wrong event a run is another motion, whose chatter may hang on round-off; no decision does.
+    """
+    same = next((k for k, pair in enumerate(zip(found, true, strict=False)) if len(set(pair)) > 1), len(true))
+    return found[:same] + [WRONG] * (len(found) > same)
 
 
 if __name__ == "__main__":
