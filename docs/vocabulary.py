@@ -17,6 +17,7 @@ from proofroll.core.gravity import Gravity
 from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
+from proofroll.elements.mechanism.contacts import geometry as contacts
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
@@ -55,6 +56,8 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
         Table("[[loops]]", mechanisms.Loop),
         Table("[[springs]]", mechanisms.Spring),
         Table("[[points]]", mechanisms.Point),
+        Table("[[geometries]]", contacts.Geometry),
+        Table("[[pairs]]", contacts.Pair),
     ),
     "A comparison: `comparisons/*.toml` without `study`": (
         Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out")),

@@ -33,6 +33,9 @@ class MechanismCapability(StrEnum):
     ARMATURE = "inertia of drives"
     STOPS = "stops of joints"
     REBOUNDS = "rebounds from stops (restitution)"
+    CONTACT = "contact between bodies"
+    CONTACT_FRICTION = "friction of contacts between bodies"
+    CONTACT_REBOUNDS = "rebounds of bodies from each other (restitution)"
 
 
 ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)
@@ -59,6 +62,12 @@ def required(mechanism: Mechanism) -> frozenset[str]:
             needs.add(capability.STOPS)
         if joint.restitution:
             needs.add(capability.REBOUNDS)
+    for pair in mechanism.pairs:
+        needs.add(capability.CONTACT)
+        if pair.friction:
+            needs.add(capability.CONTACT_FRICTION)
+        if pair.restitution:
+            needs.add(capability.CONTACT_REBOUNDS)
     return frozenset(needs)
 
 

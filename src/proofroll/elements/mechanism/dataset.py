@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
 from proofroll.core.turns import doubt
+from proofroll.elements.mechanism.contacts.observables import followed, given_forces
 from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.placed import TURN, Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
@@ -40,7 +41,8 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
 
     p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
     wrench = np.array([[reactions(element, s, name) for name in ("joint_force", "joint_torque")] for s in samples])
-    return columns(element, Placed(element.mechanism, times, p, v, w, stacked("q_WB", 4, count)), wrench)
+    placed = Placed(element.mechanism, times, p, v, w, stacked("q_WB", 4, count))
+    return columns(element, placed, wrench, given_forces(element.mechanism, samples))
 
 
 def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> FloatArray:
@@ -61,15 +63,17 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
     return values.reshape(shape)
 
 
-def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Columns:
-    """Everything that follows from the motion of the bodies and the forces and moments, (time, 2, joints + loops, 3).
+def columns(element: MechanismElement, placed: Placed, wrench: FloatArray, pressed: FloatArray) -> Columns:
+    """All variables of a run, from where the bodies are and the forces and moments on them.
 
+    ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
     world axes, NaN where the attribute ``absent`` says why; ``forces``, ``torques``: the
-    determinate components of all; ``energy`` [J], ``drift`` [m], and
-    ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
+    determinate components of all; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
+    ``slip.<pair>`` [m/s]; ``energy`` [J], ``drift`` [m], and ``energy_error`` [J], or ``energy_change`` [J] of what is
+    driven or damped.
     """
     mechanism, determinate = element.mechanism, element.analysis.determinate
     placed = replace(placed, q_WB=_continuous(placed.q_WB, element.start.q_WB[0]))
@@ -106,6 +110,8 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
         if np.any(known):
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
+    if mechanism.contacts:
+        _put_contacts(placed, pressed, put)
     energy = placed.energy()
     wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
     unsure = {UNCERTAIN: wound[0]} if wound else {}
@@ -115,6 +121,24 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray) -> Co
     put(gained, energy - energy[0], "J", "energy now minus energy at the start", **unsure)
     put("drift", placed.drift(), "m", "how far joints and loops are open")
     return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
+
+
+def _put_contacts(placed: Placed, pressed: FloatArray, put: Callable[..., None]) -> None:
+    """Gaps, slip and forces of contacts, each by its name and all together."""
+    found = followed(placed)
+    for index, contact in enumerate(placed.mechanism.contacts):
+        for axis, letter in enumerate("xyz"):
+            component = pressed[:, index, axis]
+            absent = UNSAID if np.all(np.isnan(component)) else ""
+            meaning = f"force of {contact.name} on {contact.body_a}"
+            put(f"force.{contact.name}.{letter}", component, "N", meaning, absent=absent)
+        put(f"gap.{contact.name}", found.gap[:, index], "m", f"distance of what {contact.name} may touch")
+        put(f"slip.{contact.name}", found.slip[:, index], "m/s", f"speed of slip of {contact.name}")
+    put("gaps", found.gap, "m", "distances between what may touch", "contact")
+    put("slips", found.slip, "m/s", "speeds of slip of what may touch", "contact")
+    normal = np.sum(pressed * found.normal, axis=-1)
+    put("normal_forces", normal, "N", "normal forces between what may touch", "contact")
+    put("contact_forces", pressed, "N", "forces between what may touch", "contact", "xyz")
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:

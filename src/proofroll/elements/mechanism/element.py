@@ -19,6 +19,8 @@ from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
+from proofroll.elements.mechanism.contacts.observables import contact_observables
+from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint import TURNING
@@ -48,7 +50,7 @@ _AXES = "xyz"
 
 @dataclass(frozen=True)
 class MechanismElement:
-    """Bodies that joints, loops and springs connect. See :class:`proofroll.core.element.Element`.
+    """Bodies that joints, loops, springs and contacts connect. See :class:`proofroll.core.element.Element`.
 
     Attributes:
         mechanism: its data.
@@ -112,10 +114,11 @@ class MechanismElement:
 
     @cached_property
     def length(self) -> float:
-        """Largest distance between joints, centres of mass and tracked points at the start [m]."""
+        """Largest distance between joints, centres of mass, tracked points and contacts at the start [m]."""
         joints = [self.start.point(joint.child, joint.child_position) for joint in self.mechanism.joints]
         masses = [self.start.point(body.name, body.com) for body in self.mechanism.bodies]
-        places = np.concatenate([*joints, *masses, *self.start.points.swapaxes(0, 1)])
+        touching = [each.place[None] for each in touches(self.mechanism, self._solution.motion)]
+        places = np.concatenate([*joints, *masses, *self.start.points.swapaxes(0, 1), *touching])
         return float(np.max(np.linalg.norm(places[:, None] - places[None], axis=-1))) or 1.0
 
     @property
@@ -159,7 +162,9 @@ class MechanismElement:
     def conservative(self) -> bool:
         """Whether nothing in it drives or damps."""
         laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.mechanism.joints]
-        return not any(any(law) for law in laws) and not any(spring.damping for spring in self.mechanism.springs)
+        lossy = any(pair.friction or pair.restitution < 1 for pair in self.mechanism.pairs)
+        damped = any(spring.damping for spring in self.mechanism.springs)
+        return not lossy and not damped and not any(any(law) for law in laws)
 
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
@@ -197,6 +202,7 @@ class MechanismElement:
         if np.any(self.analysis.determinate[:, 3:]):
             meaning = "determinate components of the moments on children at their joints"
             found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=force * self.length))
+        found += contact_observables(self.mechanism, a, speed, force)
         if self.conservative:
             meaning = "energy now minus energy at the start"
             floor = force * self.length

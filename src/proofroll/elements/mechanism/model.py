@@ -17,6 +17,7 @@ from proofroll.core.arrays import slices
 from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry, Pair, contacts_of
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
@@ -42,7 +43,7 @@ class Mechanism:
     Attributes:
         bodies: in the order of the scene; arrays over bodies have this order.
         joints: sorted depth-first from the world, whatever order is given; q and v have this order.
-        loops, springs, points: in the order of the scene.
+        loops, springs, points, geometries, pairs: in the order of the scene.
         gravity: acceleration in the world's axes, m/s².
         unmodelled: what else its source has, in a few words each; every route and engine refuses it.
     """
@@ -54,21 +55,30 @@ class Mechanism:
     points: tuple[Point, ...] = ()
     gravity: Vector = (0.0, 0.0, -9.81)
     unmodelled: tuple[str, ...] = ()
+    geometries: tuple[Geometry, ...] = ()
+    pairs: tuple[Pair, ...] = ()
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "loops", "springs", "points"):
+        for key in ("bodies", "joints", "loops", "springs", "points", "geometries", "pairs"):
             checks.assign(self, **{key: tuple(getattr(self, key))})
             _check_unique(key, getattr(self, key))
         checks.assign(self, unmodelled=tuple(self.unmodelled))
         _check_unique("loops", self.joints + self.loops)  # results name both alike
         names = sorted({WORLD, *(body.name for body in self.bodies)})
-        for item in self.joints + self.loops + self.springs + self.points:
-            for key in ("parent", "child", "body_a", "body_b", "body"):
-                field = f"{type(item).__name__.lower()}s.{item.name}.{key}"
-                require_known(field, getattr(item, key, WORLD), names, "there is no such body; choose from")
+        for kind in ("joints", "loops", "springs", "points", "geometries"):
+            for item in getattr(self, kind):
+                for key in ("parent", "child", "body_a", "body_b", "body"):
+                    field = f"{kind}.{item.name}.{key}"
+                    require_known(field, getattr(item, key, WORLD), names, "there is no such body; choose from")
         checks.assign(self, joints=_depth_first(self.bodies, self.joints))
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
         _check_masses(self.bodies, self.joints)
+        _check_unique("pairs", (*self.joints, *self.loops, *self.contacts))  # their forces are named alike
+
+    @cached_property
+    def contacts(self) -> tuple[BodyContact, ...]:
+        """Every place where two bodies may touch; arrays over contacts have this order."""
+        return contacts_of(self.geometries, self.pairs)
 
     @cached_property
     def body_index(self) -> dict[str, int]:

@@ -15,11 +15,21 @@ from proofroll.core.numbers import Numbers
 from proofroll.core.validation import strict, units_of_kind, validated
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.contacts.start import check_contacts
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 
-KINDS: dict[str, type[Any]] = {"bodies": Body, "joints": Joint, "loops": Loop, "springs": Spring, "points": Point}
+KINDS: dict[str, type[Any]] = {
+    "bodies": Body,
+    "joints": Joint,
+    "loops": Loop,
+    "springs": Spring,
+    "points": Point,
+    "geometries": Geometry,
+    "pairs": Pair,
+}
 strict(*KINDS.values())
 _MOST = 10_000  # repetitions: beyond it, a slip of the pen
 
@@ -28,7 +38,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     """The mechanism of a scene file, its loops closed, able to move.
 
     Args:
-        content: the tables bodies, joints, loops, springs, points and repeat, and the list of texts unmodelled.
+        content: the tables of :data:`KINDS`, repeat, and the list of texts unmodelled.
         gravity: acceleration in the world's axes [m/s²].
         numbers: the parameters.
 
@@ -47,6 +57,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     parts = {kind: tuple(items) for kind, items in made.items()}
     mechanism = assembled(Mechanism(gravity=gravity, unmodelled=_texts(content, "unmodelled"), **parts))
     check_start(mechanism)
+    check_contacts(mechanism)
     return mechanism
 
 

@@ -28,10 +28,13 @@ class MechanismSample(Sample):
     Attributes:
         joint_force, joint_torque: on the child of each joint, then on body_b of each loop, at the joint, world axes
             [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
+        contact_force: on the body of the first geometry of each contact, world axes [N], shape (contacts, 3); zero
+            where nothing touches, NaN where the engine cannot say.
     """
 
     joint_force: Array | None = None
     joint_torque: Array | None = None
+    contact_force: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,8 @@ class MechanismTruth:
         found = truth_of(element.mechanism, times)
         record = found.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-        dataset = columns(element, record.placed(element.mechanism), wrench).dataset()
+        pressed = np.zeros((len(times), len(element.mechanism.contacts), 3))
+        dataset = columns(element, record.placed(element.mechanism), wrench, pressed).dataset()
         points = [point.name for point in element.mechanism.points]
         for name, variable in dataset.data_vars.items():
             field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)

@@ -44,6 +44,8 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Refused: fewer than two routes cover the mechanism; the text says why.
     """
     times = np.asarray(times, dtype=float)
+    if mechanism.contacts:
+        raise Refused("no route of the truth follows contact between bodies")
     equations = JointCoordinates(mechanism)
     if not equations.switched or mechanism.unmodelled:
         return find_truth(mechanism, times)

@@ -28,7 +28,8 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
     stops = {"limits": (-1.0, 1.0)}
     assert required(wheel(**stops)) == {MechanismCapability.REVOLUTE, MechanismCapability.STOPS}
     assert MechanismCapability.REBOUNDS in required(wheel(**stops, restitution=0.5))
-    assert {"JOINT_SPRINGS", "JOINT_FRICTION", "ARMATURE", "REDUNDANT", "STOPS", "REBOUNDS"} == {
+    of_contact = {"CONTACT", "CONTACT_FRICTION", "CONTACT_REBOUNDS"}
+    assert of_contact | {"JOINT_SPRINGS", "JOINT_FRICTION", "ARMATURE", "REDUNDANT", "STOPS", "REBOUNDS"} == {
         item.name for item in set(MechanismCapability) - every
     }
 

@@ -1,0 +1,1 @@
+"""Contact between bodies: what touches, by which law, where and how."""

@@ -1,0 +1,194 @@
+"""Shapes of bodies that may touch, and the pairs of them that do."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from proofroll.core.arrays import read_only
+from proofroll.core.errors import InputError, require_known
+from proofroll.elements.mechanism import checks, rotations
+from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Vector, Z
+from proofroll.elements.mechanism.contacts.shapes import (
+    CircleShape,
+    ConvexShape,
+    EllipsoidShape,
+    HalfSpace,
+    SphereShape,
+)
+from proofroll.elements.mechanism.rotations import Array
+
+GeometryKind = Literal["sphere", "ellipsoid", "circle", "plane", "box"]
+# What each kind of geometry is described by, besides its place.
+_KEYS: Mapping[str, tuple[str, ...]] = {
+    "sphere": ("radius",),
+    "ellipsoid": ("axes", "orientation"),
+    "circle": ("radius", "normal"),
+    "plane": ("normal",),
+    "box": ("size", "orientation"),
+}
+_RULES = "only a plane with a sphere, ellipsoid, circle or box, and two spheres, have a rule; choose such a pair"
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """A shape fixed to a body.
+
+    Attributes:
+        name: unique among geometries.
+        body: that it is fixed to, or ``world``.
+        kind: a box touches with its eight vertices.
+        position: of its centre, or of any point of a plane, in the body's frame [m].
+        orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
+        radius: of a sphere or circle; a sphere of radius 0 is a vertex [m].
+        axes: semi-axes of an ellipsoid [m].
+        normal: of a plane, out of the material, or of a circle's disc, in the body's frame; none given: z.
+        size: edges of a box [m].
+    """
+
+    name: str
+    body: str
+    kind: GeometryKind
+    position: Vector = field(default=ZERO, metadata=METRES)
+    orientation: Vector = field(default=ZERO, metadata=RADIANS)
+    radius: float | None = field(default=None, metadata=METRES)
+    axes: Vector | None = field(default=None, metadata=METRES)
+    normal: Vector = field(default=Z, metadata=RATIO)
+    size: Vector | None = field(default=None, metadata=METRES)
+
+    def __post_init__(self) -> None:
+        place = f"geometries.{checks.name(self.name, 'geometries')}"
+        require_known(f"{place}.kind", self.kind, _KEYS)
+        checks.assign(self, position=checks.vector(f"{place}.position", self.position))
+        checks.assign(self, orientation=checks.vector(f"{place}.orientation", self.orientation))
+        checks.assign(self, normal=checks.axis(f"{place}.normal", self.normal))
+        usual = {"orientation": ZERO, "normal": Z}
+        for key in ("radius", "axes", "size", "orientation", "normal"):
+            value, asked = getattr(self, key), key in _KEYS[self.kind]
+            if not asked and value != usual.get(key):
+                raise InputError(f"{place}.{key}", value, f"a {self.kind} has none; it has {_said(self.kind)}")
+            if asked and value is None:
+                raise InputError(f"{place}.{key}", "nothing", f"a {self.kind} needs it; add it")
+        if self.radius is not None:
+            radius = checks.number(f"{place}.radius", self.radius, at_least=0)
+            if self.kind == "circle" and not radius:
+                raise InputError(f"{place}.radius", radius, "a circle has a radius above 0; a vertex is a sphere")
+            checks.assign(self, radius=radius)
+        for key in ("axes", "size"):
+            if getattr(self, key) is not None:
+                found = checks.vector(f"{place}.{key}", getattr(self, key))
+                if min(found) <= 0:
+                    raise InputError(f"{place}.{key}", found, "each must be above 0")
+                checks.assign(self, **{key: found})
+
+    @cached_property
+    def frame(self) -> Array:
+        """Axes in the body's frame, as columns; of a plane and of a circle z is the normal."""
+        if self.kind in {"plane", "circle"}:
+            return read_only(rotations.frame_of_axis(self.normal))
+        return read_only(rotations.from_rpy(self.orientation))
+
+    @cached_property
+    def shapes(self) -> tuple[ConvexShape | HalfSpace, ...]:
+        """What touches, in the body's frame: one shape, or the vertices of a box."""
+        centre = np.array(self.position)
+        if self.kind == "plane":
+            return (HalfSpace(centre, np.array(self.normal)),)
+        if self.kind == "box":
+            corners = itertools.product((-0.5, 0.5), repeat=3)
+            return tuple(SphereShape(centre + self.frame @ (np.array(self.size) * corner), 0.0) for corner in corners)
+        if self.kind == "circle":
+            return (CircleShape(centre, self.radius or 0.0, np.array(self.normal)),)
+        if self.kind == "ellipsoid":
+            return (EllipsoidShape(centre, np.array(self.axes), self.frame),)
+        return (SphereShape(centre, self.radius or 0.0),)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two geometries that may touch, and the law of their contact; no others touch.
+
+    Attributes:
+        name: unique among pairs.
+        geometries: names of the two; forces are those on the body of the first.
+        friction: of Coulomb, sticking and slipping alike.
+        restitution: normal speed after an impact over that before it, from 0 to 1.
+    """
+
+    name: str
+    geometries: tuple[str, str]
+    friction: float = field(metadata=RATIO)
+    restitution: float = field(default=0.0, metadata=RATIO)
+
+    def __post_init__(self) -> None:
+        place = f"pairs.{checks.name(self.name, 'pairs')}"
+        if len(self.geometries) != 2:
+            raise InputError(f"{place}.geometries", self.geometries, "give the names of two")
+        checks.assign(self, geometries=tuple(self.geometries))
+        for key in ("friction", "restitution"):
+            checks.assign(self, **{key: checks.number(f"{place}.{key}", getattr(self, key), at_least=0)})
+        if self.restitution > 1:
+            advice = "no impact returns more than it takes; give 0 to 1"
+            raise InputError(f"{place}.restitution", self.restitution, advice)
+
+
+@dataclass(frozen=True)
+class BodyContact:
+    """One place where two bodies may touch: of a pair, or of one vertex of a box in it.
+
+    Attributes:
+        name: of the pair; a box adds ``.1`` to ``.8``.
+        body_a, body_b: of the first and the second geometry.
+        shape_a, shape_b: in the frames of these; one of them may be a plane.
+        friction, restitution: of the pair.
+    """
+
+    name: str
+    body_a: str
+    body_b: str
+    shape_a: ConvexShape | HalfSpace
+    shape_b: ConvexShape | HalfSpace
+    friction: float
+    restitution: float
+
+
+def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[BodyContact, ...]:
+    """The contacts of all pairs, in their order.
+
+    Raises:
+        InputError: a pair that cannot touch, or is listed twice.
+    """
+    known = {geometry.name: geometry for geometry in geometries}
+    found: list[BodyContact] = []
+    listed: dict[frozenset[str], str] = {}
+    for pair in pairs:
+        place = f"pairs.{pair.name}.geometries"
+        for name in pair.geometries:
+            require_known(place, name, known, "there is no such geometry; choose from")
+        a, b = (known[name] for name in pair.geometries)
+        if a.body == b.body:
+            owner = "the world" if a.body == WORLD else f"the body {a.body}"
+            raise InputError(place, pair.geometries, f"both belong to {owner}, which cannot touch itself")
+        if frozenset(pair.geometries) in listed:
+            advice = f"these are the pair {listed[frozenset(pair.geometries)]} already; remove one"
+            raise InputError(place, pair.geometries, advice)
+        listed[frozenset(pair.geometries)] = pair.name
+        kinds = {a.kind, b.kind}
+        if kinds == {"plane"} or not ("plane" in kinds or kinds == {"sphere"}):
+            raise InputError(place, pair.geometries, _RULES)
+        if kinds == {"sphere"} and not (a.radius or b.radius):
+            raise InputError(place, pair.geometries, "two points have no direction between them; give one a radius")
+        touching = list(itertools.product(a.shapes, b.shapes))
+        for number, (one, other) in enumerate(touching, 1):
+            name = pair.name if len(touching) == 1 else f"{pair.name}.{number}"
+            found.append(BodyContact(name, a.body, b.body, one, other, pair.friction, pair.restitution))
+    return tuple(found)
+
+
+def _said(kind: str) -> str:
+    return " and ".join(_KEYS[kind])

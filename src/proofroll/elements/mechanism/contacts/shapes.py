@@ -1,0 +1,77 @@
+"""Convex shapes by their support function: the farthest point in a direction, and how it moves with the direction.
+
+All is in the frame of the body that a shape is fixed to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from proofroll.elements.mechanism.rotations import Array
+
+
+class ConvexShape(Protocol):
+    """A convex shape."""
+
+    @property
+    def centre(self) -> Array:
+        """Its middle [m], shape (3,)."""
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """Farthest point in a unit direction [m], shape (3,), and its derivative by the direction, shape (3, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SphereShape:
+    """A sphere; of radius 0 a vertex."""
+
+    centre: Array
+    radius: float
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """See :class:`ConvexShape`."""
+        return self.centre + self.radius * d, self.radius * np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class EllipsoidShape:
+    """Semi-axes along the columns of a frame."""
+
+    centre: Array
+    axes: Array
+    frame: Array
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """See :class:`ConvexShape`; with Q = F diag(axes²) Fᵀ the point is Q d/√(d·Q d)."""
+        Q = (self.frame * self.axes**2) @ self.frame.T
+        along = Q @ d
+        h = np.sqrt(d @ along)
+        return self.centre + along / h, Q / h - np.outer(along, along) / h**3
+
+
+@dataclass(frozen=True, eq=False)
+class CircleShape:
+    """A flat disc with a sharp edge; lying flat it has no single farthest point."""
+
+    centre: Array
+    radius: float
+    normal: Array
+
+    def support(self, d: Array) -> tuple[Array, Array]:
+        """See :class:`ConvexShape`."""
+        across = d - (d @ self.normal) * self.normal
+        length = float(np.linalg.norm(across))
+        e = across / length if length else across
+        flat = np.eye(3) - np.outer(self.normal, self.normal) - np.outer(e, e)
+        return self.centre + self.radius * e, self.radius * flat / max(length, np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, eq=False)
+class HalfSpace:
+    """The half space behind a point [m] and a unit normal."""
+
+    point: Array
+    normal: Array

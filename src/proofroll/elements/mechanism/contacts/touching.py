@@ -1,0 +1,85 @@
+"""Where and how two bodies touch: gap, normal, the place of contact, and the rates of these."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.shapes import ConvexShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.rotations import Array, cross
+
+
+class Moving(NamedTuple):
+    """A body at one instant: origin of its frame, rotation, velocity of the origin, angular velocity, world axes."""
+
+    p: Array
+    R: Array
+    v: Array
+    w: Array
+
+    def velocity(self, place: Array) -> Array:
+        """Of its material at a place in the world [m/s]."""
+        return self.v + cross(self.w, place - self.p)
+
+
+class Touching(NamedTuple):
+    """A contact at one instant, world axes.
+
+    Attributes:
+        gap: distance of the shapes, negative where they overlap [m].
+        normal: unit vector from b to a; a force along it pushes a away.
+        normal_rate: its time derivative [1/s].
+        place: where they touch or would, on the shape that is no plane, on a of two spheres [m].
+        place_rate: how fast that place moves, over both bodies [m/s].
+        slide: velocity of the material of a there against that of b [m/s]; along the normal it is the gap's rate.
+    """
+
+    gap: float
+    normal: Array
+    normal_rate: Array
+    place: Array
+    place_rate: Array
+    slide: Array
+
+
+def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
+    """How the shapes of a contact lie and move, wherever the bodies are."""
+    if isinstance(contact.shape_b, HalfSpace):
+        assert not isinstance(contact.shape_a, HalfSpace)  # two planes are no contact
+        gap, n, n_rate, place, rate = _on_plane(contact.shape_a, a, contact.shape_b, b)
+    elif isinstance(contact.shape_a, HalfSpace):
+        gap, n, n_rate, place, rate = _on_plane(contact.shape_b, b, contact.shape_a, a)
+        n, n_rate = -n, -n_rate
+    else:
+        assert isinstance(contact.shape_a, SphereShape)
+        assert isinstance(contact.shape_b, SphereShape)
+        gap, n, n_rate, place, rate = _two_spheres(contact.shape_a, a, contact.shape_b, b)
+    return Touching(gap, n, n_rate, place, rate, a.velocity(place) - b.velocity(place))
+
+
+_Lying = tuple[float, Array, Array, Array, Array]
+
+
+def _on_plane(shape: ConvexShape, own: Moving, plane: HalfSpace, other: Moving) -> _Lying:
+    """A convex shape over a plane; the normal is the plane's."""
+    n = other.R @ plane.normal
+    n_rate = cross(other.w, n)
+    point, by_direction = shape.support(-(own.R.T @ n))
+    arm = own.R @ point
+    turning = cross(own.w, n) - n_rate  # of the direction, as the body sees it
+    place = own.p + arm
+    rate = own.v + cross(own.w, arm) + own.R @ (by_direction @ (own.R.T @ turning))
+    gap = float(n @ (place - other.p - other.R @ plane.point))
+    return gap, n, n_rate, place, rate
+
+
+def _two_spheres(one: SphereShape, a: Moving, two: SphereShape, b: Moving) -> _Lying:
+    centre_a, centre_b = a.p + a.R @ one.centre, b.p + b.R @ two.centre
+    d, d_rate = centre_a - centre_b, a.velocity(centre_a) - b.velocity(centre_b)
+    length = float(np.linalg.norm(d))
+    n = d / length
+    n_rate = (d_rate - n * (n @ d_rate)) / length
+    place, rate = centre_a - one.radius * n, a.velocity(centre_a) - one.radius * n_rate
+    return length - one.radius - two.radius, n, n_rate, place, rate

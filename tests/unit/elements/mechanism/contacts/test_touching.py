@@ -1,0 +1,75 @@
+"""Contact kinematics against what their definition says."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.shapes import CircleShape, EllipsoidShape, HalfSpace, SphereShape
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+
+STEP = 1e-5  # s; central differences leave 1e-10 of it, round-off 1e-11
+
+
+def moved(body: Moving, time: float) -> Moving:
+    """The body after a time with constant velocities."""
+    R = Rotation.from_rotvec(body.w * time).as_matrix() @ body.R
+    return Moving(body.p + body.v * time, R, body.v, body.w)
+
+
+def some_body(rng: np.random.Generator) -> Moving:
+    """A body anywhere."""
+    return Moving(
+        rng.normal(size=3), Rotation.random(random_state=7).as_matrix(), rng.normal(size=3), rng.normal(size=3)
+    )
+
+
+def some_shape(kind: str, rng: np.random.Generator) -> Any:
+    """A shape anywhere on its body."""
+    centre, axes = rng.normal(size=3), rng.uniform(0.1, 1.0, 3)
+    frame = Rotation.random(random_state=3).as_matrix()
+    return {
+        "ball": lambda: SphereShape(centre, 0.3),
+        "vertex": lambda: SphereShape(centre, 0.0),
+        "ellipsoid": lambda: EllipsoidShape(centre, axes, frame),
+        "disc": lambda: CircleShape(centre, 0.3, frame[:, 2].copy()),
+        "plane": lambda: HalfSpace(centre, frame[:, 1].copy()),
+    }[kind]()
+
+
+@pytest.mark.parametrize(
+    "pair", ["ball plane", "plane ball", "vertex plane", "ellipsoid plane", "disc plane", "plane disc", "ball ball"]
+)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_rates_are_derivatives(pair: str, seed: int) -> None:
+    """The rates of gap, normal and place are their differences over a short time, wherever two bodies are."""
+    rng = np.random.default_rng(seed)
+    one, two = (some_shape(kind, rng) for kind in pair.split())
+    contact = BodyContact("c", "a", "b", one, two, 0.0, 0.0)
+    a, b = some_body(rng), some_body(rng)
+    before, now, after = (touch(contact, moved(a, t), moved(b, t)) for t in (-STEP, 0.0, STEP))
+
+    def rate(name: str) -> Any:
+        return (getattr(after, name) - getattr(before, name)) / (2 * STEP)
+
+    assert rate("gap") == pytest.approx(float(now.normal @ now.slide), abs=1e-7)
+    assert np.abs(rate("normal") - now.normal_rate).max() < 1e-7
+    assert np.abs(rate("place") - now.place_rate).max() < 1e-7
+
+
+def test_an_ellipsoid_is_as_far_from_a_plane_as_its_nearest_point() -> None:
+    """No point of the surface is nearer to the plane than the place of contact."""
+    rng = np.random.default_rng(5)
+    shape, plane = some_shape("ellipsoid", rng), some_shape("plane", rng)
+    a, b = some_body(rng), some_body(rng)
+    found: Touching = touch(BodyContact("c", "a", "b", shape, plane, 0.0, 0.0), a, b)
+    unit = rng.normal(size=(20000, 3))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    surface = a.p + (shape.centre + (unit * shape.axes) @ shape.frame.T) @ a.R.T
+    n, through = b.R @ plane.normal, b.p + b.R @ plane.point
+    heights = (surface - through) @ n
+    assert found.gap <= heights.min()
+    assert found.gap == pytest.approx(heights.min(), abs=1e-2)
+    assert float(n @ (found.place - through)) == pytest.approx(found.gap, abs=1e-14)
