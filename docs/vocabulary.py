@@ -60,7 +60,7 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
         Table("[[pairs]]", contacts.Pair),
     ),
     "A comparison: `comparisons/*.toml` without `study`": (
-        Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out")),
+        Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget")),
         Table("[[rows]]", comparison.Row, ("except_at",)),
         Table("[[rows.except_at]]", comparison.ExceptAt),
     ),

@@ -13,6 +13,7 @@ from proofroll.cli import options
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
+    from proofroll.running.case import Case, Result
     from proofroll.running.runner import Runner
     from proofroll.running.worker_pool import Workers
     from proofroll.studies.comparison.outcome import Outcome
@@ -29,12 +30,13 @@ def compare(
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
+    budget: options.Budget = None,
     as_json: options.Json = False,
 ) -> None:
     """Hold the engines of a comparison file against the truth; exit 1 if a verdict contradicts the file.
 
-    Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set is for
-    these.
+    Of a scene or a robot file every formulation that can represent it is run, and nothing is claimed. --set and
+    --budget are for these: what 60 s of processor time do not suffice for is left out and named.
     """
     from proofroll.report.comparison.summary import outcome_content
     from proofroll.report.terminal.tables import verdict_parts
@@ -42,7 +44,7 @@ def compare(
 
     workers = Workers()
     with options.spinner(comparison):
-        loaded = asked(comparison, options.assignments(settings), workers)
+        loaded = asked(comparison, options.assignments(settings), workers, budget, scheduler)
     tell_left_out([loaded], engine or [])
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
     content = outcome_content(outcomes[0])
@@ -50,20 +52,33 @@ def compare(
     raise typer.Exit(exit_code(outcomes))
 
 
-def asked(name: str, parameters: Mapping[str, str], workers: Workers) -> Comparison:
-    """The comparison of this name, or that of a scene about which no file says anything.
+def asked(
+    name: str, parameters: Mapping[str, str], workers: Workers, budget: float | None, scheduler: str | None
+) -> Comparison:
+    """The comparison of this name, or that of a scene about which no file says anything, within a budget.
+
+    Args:
+        name: of a comparison or a scene.
+        parameters: of a scene, those that differ from the defaults.
+        workers: in which engines are asked.
+        budget: processor time of all runs of a scene [s]; None: the usual one, but on a cluster, which has none.
+        scheduler: of the cluster.
 
     Raises:
-        InputError: there is neither, or parameters are set of a comparison, which has its own.
+        InputError: there is neither, or something was given for a scene and this is a comparison, which has its own.
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import load_comparison
     from proofroll.files.scene_file import means_scene
 
     if means_scene(name):
-        from proofroll.studies.comparison.default_comparison import compared
+        from proofroll.studies.comparison.default_comparison import BUDGET, compared
 
-        return compared(name, parameters, workers)
+        if budget and scheduler:
+            raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
+        return compared(name, parameters, workers, None if scheduler else budget or BUDGET)
+    if budget:
+        raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene instead")
     if parameters:
         raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
     return load_comparison(name)
@@ -84,14 +99,22 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
 
 def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stage: str = "") -> list[Outcome]:
     """Runs all comparisons with one progress bar; ``stage`` is put before what it says."""
-    from proofroll.studies.comparison.compare import evaluate
+    from proofroll.studies.comparison.compare import evaluate, run_plan
     from proofroll.studies.comparison.planning import plan
 
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
+    within = [item for item in plans if item.comparison.budget]
+    results: dict[str, Result] = {}
     with options.progress_bar(f"{stage}cases", total=len(cases)) as advance:
-        results = runner.run(cases.values(), lambda case, _: advance(f"{stage}{case.engine.name}"))
+
+        def told(case: Case, _: Result) -> None:
+            advance(f"{stage}{case.engine.name}")
+
+        for item in within:
+            results |= run_plan(item, runner, told)
+        results |= runner.run((case for key, case in cases.items() if key not in results), told)
     if runner.damaged:
         options.complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
     return [evaluate(item, results, runner) for item in plans]

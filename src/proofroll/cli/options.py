@@ -57,6 +57,10 @@ SceneName = Annotated[
     str,
     typer.Argument(help="A scene: its name, a folder with a scene.toml, or a robot file.", autocompletion=scenes_like),
 ]
+Budget = Annotated[
+    float | None,
+    typer.Option("--budget", min=1, help="Processor-seconds for a scene or robot file, by default 60."),
+]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 
 

@@ -34,6 +34,7 @@ def report(
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
+    budget: options.Budget = None,
     as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -42,7 +43,8 @@ def report(
     but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names.
     The files are there after the first comparison, and are written again after all of them and after each further
     study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
-    says so, and the report names the command that makes it whole. --set is for scenes and robot files.
+    says so, and the report names the command that makes it whole. --set and --budget are for scenes and robot files:
+    what 60 s of processor time do not suffice for is left out and named.
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
@@ -58,7 +60,7 @@ def report(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
         )
     left_out = [] if studies else further_comparison_names()
-    loaded = [asked(name, assigned, workers) for name in names]
+    loaded = [asked(name, assigned, workers, budget, scheduler) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
     options.require_pages()
@@ -66,7 +68,7 @@ def report(
     tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))
     total = len(keys) + bool(loaded)
-    command = _command(studies or [], engine or [], settings or [], out)
+    command = _command(studies or [], engine or [], settings or [], budget, out)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         outcomes: list[Outcome] = []
         if loaded:
@@ -92,13 +94,14 @@ def report(
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
 
 
-def _command(studies: list[str], engines: list[str], settings: list[str], out: Path) -> str:
+def _command(studies: list[str], engines: list[str], settings: list[str], budget: float | None, out: Path) -> str:
     """The command that makes the report again."""
     words = ["proofroll", "report", *studies]
     for name in engines:
         words += ["--engine", name]
     for setting in settings:
         words += ["--set", setting]
+    words += ["--budget", f"{budget:g}"] if budget else []
     return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 

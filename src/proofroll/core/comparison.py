@@ -137,6 +137,7 @@ class Comparison:
         order: place in a report, the smallest first; those without come last, by name.
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
         left_out: how many combinations have been left out for that.
+        budget: processor time that all cases may take together, what is beyond it being left out [s]; None: any.
     """
 
     name: str
@@ -154,6 +155,7 @@ class Comparison:
     order: float = math.inf
     brief: dict[str, list[float]] = field(default_factory=dict)
     left_out: int = 0
+    budget: float | None = None
 
     def briefly(self) -> Comparison:
         """The comparison at the combinations that a report without names has."""

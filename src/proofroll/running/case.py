@@ -30,6 +30,7 @@ class Status(StrEnum):
     MISSING = "missing"
     CRASHED = "crashed"
     TIMEOUT = "timeout"
+    LEFT_OUT = "left out"  # the processor time of a study did not suffice (TimeBudget)
 
 
 # A crash, a hang or a missing engine may be gone next time; these are the engine's answer and stay.

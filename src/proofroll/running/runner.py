@@ -19,6 +19,7 @@ from proofroll.running.asking import lent_workers
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.store import Store
+from proofroll.running.time_budget import TimeBudget
 from proofroll.running.waiting_cases import WaitingCases
 from proofroll.running.worker_pool import Workers
 
@@ -63,27 +64,41 @@ class Runner:
         self._busy: set[Worker] = set()
         self._stopping = threading.Event()
 
-    def run(self, cases: Iterable[Case], progress: Callable[[Case, Result], None] | None = None) -> dict[str, Result]:
-        """Results by key of the case. ``progress`` is called in this thread as each arrives."""
+    def run(
+        self,
+        cases: Iterable[Case],
+        progress: Callable[[Case, Result], None] | None = None,
+        budget: TimeBudget | None = None,
+    ) -> dict[str, Result]:
+        """Results by key of the case; what the ``budget`` does not suffice for is left out.
+
+        ``progress`` is called in this thread as each arrives.
+        """
 
         def told(case: Case, result: Result) -> tuple[()]:
             if progress:
                 progress(case, result)
             return ()
 
-        return self.follow(cases, told)
+        return self.follow(cases, told, budget)
 
-    def follow(self, cases: Iterable[Case], then: Callable[[Case, Result], Iterable[Case]]) -> dict[str, Result]:
+    def follow(
+        self,
+        cases: Iterable[Case],
+        then: Callable[[Case, Result], Iterable[Case]],
+        budget: TimeBudget | None = None,
+    ) -> dict[str, Result]:
         """Like :meth:`run`, but each result may ask for further cases, which are begun at once.
 
         Args:
             cases: with which it begins.
             then: called in this thread as each result arrives; returns cases that have not been asked for yet.
+            budget: processor time of cases in workers here; a cluster has none.
         """
         results: dict[str, Result] = {}
         asked: set[str] = set()
         arrived: _Arrived = queue.SimpleQueue()
-        shared = WaitingCases()
+        shared = WaitingCases(budget)
         running = 0
         ready: deque[tuple[Case, Result]] = deque()
 
@@ -151,12 +166,24 @@ class Runner:
         if self.cluster is not None:
             self.cluster.stop()
 
+    def _next(self, waiting: WaitingCases, engine: str | None, arrived: _Arrived) -> tuple[Case, float] | None:
+        """The next case and how long it may take [s]; None: there is none, or it all stops."""
+        while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
+            if not (budget := waiting.budget):
+                return case, case.time_limit
+            if limit := budget.begin(case.key, self.jobs):
+                return case, min(case.time_limit, limit)
+            budget.end(case.key, 0.0)
+            arrived.put((case, Result(Status.LEFT_OUT, budget.sentence)))
+        return None
+
     def _serve(self, waiting: WaitingCases, arrived: _Arrived) -> None:
         """Serves cases one after another, in a new worker for another engine and after each crash."""
         worker: Worker | None = None
         engine: str | None = None
         try:
-            while not self._stopping.is_set() and (case := waiting.take(engine)) is not None:
+            while (taken := self._next(waiting, engine, arrived)) is not None:
+                case, limit = taken
                 if worker is not None and engine is not None and case.engine.name != engine:
                     self._busy.discard(worker)
                     self.workers.keep(engine, worker)
@@ -167,12 +194,14 @@ class Runner:
                         worker = self.workers.take(engine)
                     except (InputError, Missing, WorkerDied) as error:  # another interpreter, gone since it was asked
                         status = error.status if isinstance(error, WorkerDied) else Status.MISSING
+                        if waiting.budget:
+                            waiting.budget.end(case.key, None)
                         arrived.put((case, ended(case, status, error)))
                         continue
                     self._busy.add(worker)
                     if self._stopping.is_set():  # whoever stops us may not have seen this worker
                         break
-                if not self._arrive(arrived, case, partial(_ask, worker, case)):
+                if not self._arrive(arrived, case, partial(_counted, waiting.budget, worker, case, limit)):
                     self._drop(worker)
                     worker = None
         except Exception as error:
@@ -220,10 +249,10 @@ class Runner:
         worker.close()
 
 
-def _ask(worker: Worker, case: Case, out: Path) -> Result:
+def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
     request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out.absolute())}  # an engine may change folder
     try:
-        found = Result.from_dict(worker.request(request, case.time_limit))
+        found = Result.from_dict(worker.request(request, limit))
         name = plain_name(case.engine.name)
         ran = found.versions.get(name)
         if ran != case.engine.version:
@@ -232,6 +261,23 @@ def _ask(worker: Worker, case: Case, out: Path) -> Result:
         return dataclasses.replace(found, spent=found.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
+
+
+def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float, out: Path) -> Result:
+    """What comes of a case; a budget learns what it took, and a case that would have taken more is left out."""
+    if budget is None:
+        return _ask(worker, case, limit, out)
+    seconds = None
+    try:
+        found = _ask(worker, case, limit, out)
+        seconds = sum(found.processor.values()) or None
+        return found
+    except WorkerDied as error:
+        if error.status is Status.TIMEOUT and limit < case.time_limit:
+            raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
+        raise
+    finally:
+        budget.end(case.key, seconds)
 
 
 def ended(case: Case, status: Status, error: ProofrollError) -> Result:
@@ -243,6 +289,6 @@ def run_one(case: Case, out: Path, workers: Workers | None = None) -> Result:
     """Runs a single case, its trajectory going to ``out``, with nothing stored or reused."""
     try:
         with lent_workers(workers) as lent, lent.lend(case.engine.name) as worker:
-            return _ask(worker, case, out)
+            return _ask(worker, case, case.time_limit, out)
     except WorkerDied as error:
         return ended(case, error.status, error)

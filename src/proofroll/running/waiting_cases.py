@@ -6,12 +6,18 @@ import threading
 from collections import deque
 
 from proofroll.running.case import Case
+from proofroll.running.time_budget import TimeBudget
 
 
 class WaitingCases:
-    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case."""
+    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case.
 
-    def __init__(self) -> None:
+    Args:
+        budget: of the processor time of the cases, or None.
+    """
+
+    def __init__(self, budget: TimeBudget | None = None) -> None:
+        self.budget = budget
         self._changed = threading.Condition()
         self._by_engine: dict[str, deque[Case]] = {}
         self._begun: set[str] = set()
@@ -19,6 +25,8 @@ class WaitingCases:
 
     def add(self, case: Case) -> None:
         """Puts a case at the end."""
+        if self.budget:
+            self.budget.wait()
         with self._changed:
             self._by_engine.setdefault(case.engine.name, deque()).append(case)
             self._changed.notify()

@@ -10,6 +10,7 @@ import pytest
 from mixed_scene import BALL_AND_PENDULUM
 
 from proofroll.files.comparison_file import load_comparison
+from proofroll.running.time_budget import TimeBudget
 
 
 @pytest.mark.own_workers
@@ -70,3 +71,38 @@ def test_why_nobody_can_is_said_engine_by_engine(
     assert code == 2
     said = "jointed has no formulation for ball (rolling without slip); rolling has no formulation for mechanism"
     assert f"can represent all of the scene: {said} (revolute joints)" in err
+
+
+def test_a_first_look_stays_within_its_budget(
+    tmp_path: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Truth and runs come first; what is left out is named with the option that brings it, and nothing is stored."""
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["reduced"])
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.1)
+    begun: list[str] = []
+
+    def short(_: TimeBudget, case: str, __: int) -> float:
+        begun.append(case)
+        return 0.0 if len(begun) > 2 else 60.0
+
+    with monkeypatch.context() as patch:
+        patch.setattr("proofroll.running.time_budget.TimeBudget.begin", short)
+        patch.setattr("proofroll.running.time_budget.TimeBudget.end", lambda *_: None)
+        code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--jobs", "1")
+    assert code == 0, err
+    assert "Left out, for 60 s of processor time did not suffice: reduced[formulation=" in out
+    assert "--budget 600" in out.replace("\n", " ")
+    code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--json", "--budget", "50")
+    content = json.loads(out)
+    assert (content["budget"], content["beyond_budget"]) == (50, [])
+    assert {row["verdict"] for row in content["rows"]} == {"agrees"}
+
+
+def test_a_budget_is_for_scenes(command_line: Callable[..., tuple[int, str, str]]) -> None:
+    """A comparison file runs all that it asks for, and a cluster has no budget: both are said."""
+    code, _, err = command_line("compare", "bricard", "--budget", "10")
+    assert code == 2
+    assert "a comparison file runs all that it asks for" in err
+    code, _, err = command_line("compare", "pendulum", "--budget", "10", "--scheduler", "local:1")
+    assert code == 2
+    assert "what runs on a cluster has none" in err

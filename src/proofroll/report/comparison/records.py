@@ -196,6 +196,8 @@ class ReportedComparison:
     rows: list[ReportedRow]
     runs: list[ReportedRun]
     hosts: dict[str, int]
+    budget: float | None = None
+    beyond_budget: list[str] = field(default_factory=list)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 
     def runs_of(self, row: int) -> list[ReportedRun]:

@@ -60,6 +60,8 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         rows=[_row(runs) for runs in rows.values()],
         runs=[_run(run, numbers[id(run.row)]) for run in outcome.runs],
         hosts=hosts(run.result for run in outcome.runs),
+        budget=comparison.budget,
+        beyond_budget=outcome.beyond_budget,
     )
 
 

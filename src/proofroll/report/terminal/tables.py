@@ -124,7 +124,18 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
-    return [*lines, *caveat_lines(content.rows), *told_hosts(content.hosts)]
+    return [*lines, *budget_lines(content), *caveat_lines(content.rows), *told_hosts(content.hosts)]
+
+
+def budget_lines(content: ReportedComparison) -> list[str]:
+    """What the processor time did not suffice for, and how to get it."""
+    left = content.beyond_budget
+    if not left or content.budget is None:
+        return []
+    more = f" and {len(left) - 1} more" if len(left) > 1 else ""
+    said = f"Left out, for {content.budget:g} s of processor time did not suffice: {left[0]}{more}."
+    again = "" if left[0].startswith("the truth") else "The same command goes on with what is left; "
+    return [f"{said} {again}--budget {10 * content.budget:g} gives it more time."]
 
 
 def part_lines(content: ReportContent) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from proofroll.files.trajectory_file import read
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
+from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import ComparedPoint, LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import Plan, Planned, at_point, plan, point_name
@@ -80,7 +81,31 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             found = replace(found, diagnosis=causes)
         judged.append(found)
     scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
-    return Outcome(comparison, scene, file, judged, points)
+    return Outcome(comparison, scene, file, judged, points, _beyond_budget(planned, results))
+
+
+def run_plan(
+    planned: Plan, runner: Runner, progress: Callable[[Case, Result], None] | None = None
+) -> dict[str, Result]:
+    """Results of a plan's cases by key; within a budget what is worth most comes first."""
+    seconds = planned.comparison.budget
+    if seconds is None:
+        return runner.run(planned.cases, progress)
+    budget = TimeBudget(seconds)
+    found: dict[str, Result] = {}
+    for cases in planned.stages:
+        found |= runner.run(cases, progress, budget)
+    return found
+
+
+def _beyond_budget(planned: Plan, results: Mapping[str, Result]) -> list[str]:
+    """Cases that were left out, as text."""
+    cases = [(f"the truth{at_point(case.parameters)}", case) for case in planned.truths.values()]
+    cases += [
+        (f"{run.row.engine}{at_point(run.parameters)}", case) for run in planned.runs for case in run.ladder.values()
+    ]
+    left = [(name, case.engine) for name, case in cases if results[case.key].status is Status.LEFT_OUT]
+    return [f"{name}, {e.resolution} {e.settings[e.resolution]:g}" if e.resolution else name for name, e in left]
 
 
 def compare(
@@ -91,7 +116,7 @@ def compare(
 ) -> Outcome:
     """Plans, runs and judges a comparison."""
     planned = plan(comparison, engines, runner.workers)
-    return evaluate(planned, runner.run(planned.cases, progress), runner)
+    return evaluate(planned, run_plan(planned, runner, progress), runner)
 
 
 def _run(planned: Planned, result: Result, **found: Any) -> Run:

@@ -21,16 +21,20 @@ from proofroll.studies.stability.axes import Axis, AxisTerm
 
 _UNTIL, _SAMPLES = 1.0, 50
 _STEP = 4e-3  # s: samples lie whole numbers of it apart, which a ladder of steps down to 1e-3 s divides
+BUDGET = 60.0  # processor-seconds that a person waits for who asks nothing in particular
 _CLOSE = "close"
 _BECAUSE = "nobody has said what to expect of this scene"
 # Along an axis a parameter is taken to these parts of its default, where its bounds allow.
 _PARTS = (0.1, 1.0, 10.0)
 
 
-def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None = None) -> Comparison:
+def compared(
+    name: str, parameters: Mapping[str, Any], workers: Workers | None = None, budget: float | None = BUDGET
+) -> Comparison:
     """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
 
-    ``parameters`` are those that differ from the defaults; engines are asked in one of ``workers``, if they are given.
+    ``parameters`` are those that differ from the defaults; engines are asked in one of ``workers``, if they are given;
+    ``budget`` is the processor time of all runs [s], None: any.
 
     Raises:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
@@ -52,6 +56,7 @@ def compared(name: str, parameters: Mapping[str, Any], workers: Workers | None =
         vary={key: [scene.parameters[key]] for key in parameters},
         bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene))},
         rows=rows,
+        budget=budget,
     )
 
 

@@ -24,6 +24,7 @@ _UNJUDGED = {
     Status.REFUSED: Verdict.REFUSED,
     Status.ANOTHER_SCENE: Verdict.ANOTHER_SCENE,
     Status.NO_TRUTH: Verdict.NOT_JUDGED,
+    Status.LEFT_OUT: Verdict.NOT_JUDGED,
 }
 
 
@@ -120,6 +121,7 @@ class Outcome:
         file: the scene's, for its words.
         runs: with their judgements.
         points: by :func:`proofroll.studies.planning.point_name`.
+        beyond_budget: cases that the processor time did not suffice for, as text.
     """
 
     comparison: Comparison
@@ -127,6 +129,7 @@ class Outcome:
     file: SceneFile
     runs: list[Run]
     points: dict[str, ComparedPoint]
+    beyond_budget: list[str] = field(default_factory=list)
 
     @property
     def contradictions(self) -> list[str]:

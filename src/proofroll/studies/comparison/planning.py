@@ -57,7 +57,14 @@ class Plan:
     @property
     def cases(self) -> list[Case]:
         """Every case once or more; the runner runs equal ones once."""
-        return [*self.truths.values(), *(case for run in self.runs for case in run.ladder.values())]
+        return [case for stage in self.stages for case in stage]
+
+    @property
+    def stages(self) -> list[list[Case]]:
+        """The cases by what they are worth where not all can be run: truths, runs, then steps of their ladders."""
+        runs = [case for run in self.runs for factor, case in run.ladder.items() if factor == 1]
+        steps = [case for run in self.runs for factor, case in run.ladder.items() if factor != 1]
+        return [[*self.truths.values()], runs, steps]
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:

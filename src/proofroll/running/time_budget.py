@@ -1,0 +1,55 @@
+"""Processor time that the cases of one study may take together, for studies that would rather leave something out."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+# Part of the seconds that cases get; the rest is for reading and judging what came of them.
+_OF_CASES = 0.9
+# A case with less time than it takes to start a process is not begun [s].
+_LEAST = 0.5
+
+
+class TimeBudget:
+    """Processor time of the cases of one study; what it does not suffice for is left out.
+
+    Each case may take an equal share of what is left, among those that run side by side, so that all together never
+    take more, however long each of them does.
+
+    Args:
+        seconds: of processor time, that of this process included [s].
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self._own, self._others = time.process_time(), 0.0
+        self._begun: dict[str, float] = {}
+        self._unfinished = 0
+        self._lock = threading.Lock()
+
+    @property
+    def sentence(self) -> str:
+        """Why a case is left out."""
+        return f"the {self.seconds:g} s of processor time for a first look did not suffice"
+
+    def wait(self) -> None:
+        """Another case waits to be begun."""
+        with self._lock:
+            self._unfinished += 1
+
+    def begin(self, case: str, abreast: int) -> float:
+        """Seconds that a case may take beside at most ``abreast`` - 1 others; 0: it is not to be begun."""
+        with self._lock:
+            now = time.monotonic()
+            used = self._others + time.process_time() - self._own + sum(now - begun for begun in self._begun.values())
+            share = (_OF_CASES * self.seconds - used) / max(1, min(abreast, self._unfinished))
+            self._begun[case] = now
+            return share if share > _LEAST else 0.0
+
+    def end(self, case: str, seconds: float | None) -> None:
+        """A case has ended, after so many seconds of its processor; None: as long as it was under way."""
+        with self._lock:
+            begun = self._begun.pop(case)
+            self._others += time.monotonic() - begun if seconds is None else seconds
+            self._unfinished -= 1
