@@ -1,4 +1,4 @@
-"""What an adapter costs: its ``advance`` against a bare loop, in turns in one process, over the same time grid."""
+"""Cost of an adapter: its ``advance`` against a bare loop, in turns in one process, over the same time grid."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class AdapterRow:
 
     @property
     def within_goal(self) -> bool | None:
-        """Whether the ratio is at most the goal; None if there is none."""
+        """True if the ratio is at most the goal; None if there is none."""
         return None if self.ratio is None else self.ratio.value <= GOAL
 
 

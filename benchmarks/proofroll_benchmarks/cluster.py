@@ -1,4 +1,4 @@
-"""What a cluster costs besides its cases: many that compute nothing, planned, sent and stored as any others."""
+"""Cost of a cluster besides its cases: many that compute nothing, planned, sent and stored as any others."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MB = 1e6
 
 
 def idle(_: Asked, content: dict[str, Any], __: Mapping[str, bytes]) -> tuple[dict[str, Any], None]:
-    """What a worker does for a case here: it waits, and has no processor to share."""
+    """Work on a case here: a wait, without a processor to share."""
     time.sleep(content["engine"]["settings"]["seconds"])
     result = Result(Status.REFUSED, "it computes nothing", versions={"idle": "1"}, host=socket.gethostname())
     return dataclasses.asdict(result), None

@@ -1,4 +1,4 @@
-"""What the reference bench measures in its own process: compiled models, and the numeric projection method."""
+"""Measurements of the reference bench in its own process: compiled models, and the numeric projection method."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When rolling without slip first needs more friction than there is, by compiled Taylor series with an event.
+"""First time at which rolling without slip needs more friction than there is, by Taylor series with an event.
 
 The event is a root of the needed friction's own Taylor polynomial in a step. All its roots in the step are isolated
 (by Descartes' rule of signs on ever smaller parts), also the pair under a crest that rises past μ and falls again
@@ -34,7 +34,7 @@ _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
 
 
 def first_slip(scene: Scene, until: float, model: Model = "reduced") -> float | None:
-    """When the ball first slips [s]; None: not until ``until`` [s].
+    """Time of the ball's first slip [s]; None: not until ``until`` [s].
 
     Args:
         scene: a ball in a cylinder along whose axis gravity points.
@@ -79,7 +79,7 @@ class FirstSlip:
         self.x = self._start
 
     def run(self, until: float) -> float | None:
-        """When the ball first slips [s]; None: not until ``until`` [s].
+        """Time of the ball's first slip [s]; None: not until ``until`` [s].
 
         Raises:
             Diverged: the state is not finite.
@@ -130,7 +130,7 @@ def _projected_start(body: RollingBall, formulation: projection.Formulation) -> 
 
 
 def slips_at_once(margin: FloatArray) -> Any:
-    """Whether the ball slips at time 0, from what :func:`margins` gives, shape (3,) or (3, n)."""
+    """True if the ball slips at time 0, from the margins of :func:`margins`, shape (3,) or (3, n)."""
     excess, rate, available = margin
     reached = np.abs(excess) <= REACHED * available
     return np.where(reached, rate > 0, excess > 0)

@@ -37,7 +37,7 @@ _HOLDING = 1e10
 
 
 def first_slips(scene: Scene, until: float, v2: npt.ArrayLike, mu: npt.ArrayLike, f: npt.ArrayLike) -> FloatArray:
-    """When balls that differ from the scene's first slip [s], shape (n,); NaN: not until ``until`` [s].
+    """First slips of balls that differ from the scene's [s], shape (n,); NaN: not until ``until`` [s].
 
     The start is rolling without slip at the scene's point of the cylinder. A single time is as accurate as that of
     :func:`proofroll_benchmarks.first_slip.first_slip`.

@@ -49,7 +49,7 @@ _FINALISTS = 3
 
 
 def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
-    """Everything that is measured, ready for JSON; ``progress`` is told what is done next.
+    """All measurements, ready for JSON; ``progress`` is called with the next step.
 
     Raises:
         Refused: heyoka is missing.
@@ -153,7 +153,7 @@ def _row(name: str, error: float, timing: Timing, **more: Any) -> dict[str, Any]
 
 
 def _ratio(name: str, slow: str | None, fast: str, timings: Mapping[str, Timing]) -> dict[str, Any]:
-    """How many times faster, with interval; without numbers where one of the two does not hold its bound."""
+    """Speed-up, with interval; without numbers where one of the two does not hold its bound."""
     goal = {"goal": GOALS[name], "slow": slow, "fast": fast}
     if slow is None or slow not in timings or fast not in timings:
         return {"value": None, "low": None, "high": None, **goal, "met": False}

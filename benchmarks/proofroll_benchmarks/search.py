@@ -38,7 +38,7 @@ class Configuration:
     Attributes:
         case: engine, settings and samples.
         error: largest error of z at the samples [m].
-        seconds: of the run that told the error, for a first ranking [s].
+        seconds: of the run that gave the error, for a first ranking [s].
         contact: whether the ball is held by the engine's contact model.
     """
 
@@ -102,7 +102,7 @@ def search(
 
 
 def _coarser(one: Configuration, other: Configuration) -> bool:
-    """Whether the one of two that hold the bound does so with less work; the wall seconds of a run are too noisy."""
+    """True if the first of two that hold the bound does less work; the wall seconds of a run are too noisy."""
     return _resolution(one.case.engine) > _resolution(other.case.engine)
 
 
@@ -145,7 +145,7 @@ def _kinds() -> Iterator[tuple[EngineFacts, bool]]:
 
 
 def _without(terms: Sequence[Term], formulation: str, settings: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
-    """For each of the engine's own terms that the settings may have: what leaves it out."""
+    """Settings that leave out each of the engine's own terms that the settings may have."""
     for term in terms:
         if formulation in term.formulations and any(settings[key] != value for key, value in term.off.items()):
             yield term.off

@@ -1,4 +1,4 @@
-"""What a whole study costs beside its engines: all of them, each with cases that last a second or more."""
+"""Cost of a whole study beside its engines: all of them, each with cases that last a second or more."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def bench_study(
     """Runs the cases in a store of its own, and says where wall time × workers went.
 
     The settings are resolved within the measured time, as in every study, and cases that did not last are shown but
-    judged with the others: what a study costs is judged as a whole. Wall time is what others on the machine make of it:
-    the load average of the minute before is told with it.
+    judged with the others: what a study costs is judged as a whole. Wall time depends on other work of the machine:
+    the load average of the minute before stands beside it.
     """
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else None  # before anything of ours runs
     cases = study_cases(engines, seconds)
@@ -119,7 +119,7 @@ def account(spent: Sequence[Mapping[str, float]], available: float, resolved: fl
 
 
 def by_processor(spent: Sequence[Mapping[str, float]], parent: float) -> dict[str, Any]:
-    """As :func:`account`, of the processor seconds that the study took, whoever else computes on the machine.
+    """Account as :func:`account`, of the processor seconds that the study took, whatever else the machine computes.
 
     Waiting costs none. What a machine with as many idle cores as workers would take lies between this and that.
 

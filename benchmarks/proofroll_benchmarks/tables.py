@@ -20,7 +20,7 @@ _MEANING = {
 
 
 def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
-    """What was run, how many times faster it is, and whether that is what was wanted."""
+    """Tables of the runs, their speed-ups, and the goals."""
     slip = content["first_slip"]["seconds"]
     columns = numeric("error [m]", "time [ms]", "interval", "built in [s]")
     runs = plain_table(*unbroken(""), *columns, title=f"To the first slip at {slip:.6f} s")
@@ -51,7 +51,7 @@ def _measured(found: dict[str, Any]) -> tuple[str, str, str, str]:
 
 
 def study_tables(found: dict[str, Any]) -> Iterator[Table]:
-    """Where wall time × workers went, and every case."""
+    """Tables of the use of wall time × workers, and of every case."""
     title = f"{found['wall_seconds']:.1f} s with {found['jobs']} workers: {found['outside']:.0%} outside the engines"
     shares = plain_table(*unbroken("wall time × workers"), *numeric("part", "of processor time"), title=title)
     parts = found["shares"], found["processor"]["shares"]
@@ -73,7 +73,7 @@ def study_tables(found: dict[str, Any]) -> Iterator[Table]:
 
 
 def study_lines(found: dict[str, Any]) -> Iterator[str]:
-    """What process start costs, how busy the machine was, and the goal."""
+    """Lines on the cost of process starts, the load of the machine, and the goal."""
     starts = ", ".join(f"{name} {number(seconds)} s" for name, seconds in found["first_answer"].items())
     yield f"from the start of a process to its first answer: {starts}"
     processor = found["processor"]
@@ -102,7 +102,7 @@ def adapter_table(found: dict[str, Any]) -> Table:
 
 
 def cluster_lines(found: dict[str, Any]) -> Iterator[str]:
-    """What a cluster costs besides its cases, in sentences."""
+    """Sentences on the cost of a cluster besides its cases."""
     cases = found["cases"]
     yield (
         f"{cases} cases on {found['threads']} threads: {found['wall']:.1f} s, of which {found['processor']:.1f} s of "

@@ -1,4 +1,4 @@
-"""Which multibody engine, formulation and time step can you trust for this scene?
+"""Cross-validation of multibody engines: which engine, formulation and time step to trust for a scene.
 
 The public names, loaded when they are first used, so that importing proofroll stays light.
 """

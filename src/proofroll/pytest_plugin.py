@@ -1,4 +1,4 @@
-"""What pytest gets from this package: a fixture, of which nothing is loaded before a test asks for it."""
+"""Fixture for pytest; it loads nothing before a test asks for it."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def truths(kind: Arithmetic, folder: Path) -> Path:
 
 @pytest.mark.slow
 def test_numbers_of_the_truth_hang_on_no_processor(tmp_path: Path) -> None:
-    """Under other kernels and instructions they differ by round-off, and by no more than their error bars."""
+    """Numbers of the truth differ under other kernels and instructions by round-off, within their error bars."""
     reference = truths(BY_NAME["reference"], tmp_path / "reference")
     some = False
     for kind in (BY_NAME["prescott"], BY_NAME["no-avx2"]):
@@ -106,7 +106,7 @@ def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:
 
 
 def test_limits_may_differ_within_their_bars(tmp_path: Path) -> None:
-    """Beyond the sum of both bars they are told."""
+    """Limits count as different beyond the sum of both bars."""
     assert not [
         one
         for one in differences("zen", tmp_path, tmp_path, (record(), record(limit=1.15e-9)))
@@ -174,7 +174,7 @@ def test_no_result_of_another_arithmetic_is_used(tmp_path: Path) -> None:
 
 
 def test_tests_that_fail_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """So is a run of tests that came to none; both are no success."""
+    """Failed tests are named; a run of pytest without tests is no success either."""
     said = {"out": "FAILED tests/test_it.py::test_it - assert 1 < 0\n1 failed in 1.0s\n"}
 
     def ran(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
@@ -191,14 +191,14 @@ def test_tests_that_fail_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
 
 
 def test_every_comparison_is_in_the_matrix() -> None:
-    """Those of this repository, of the folders below, and of articles."""
+    """Every comparison of this repository, of the folders below, and of articles is in the matrix."""
     found = {Path(name).stem for name in comparison_files()}
     assert {"paper", "stick_slip", "accuracy", "turntable", "andrews_squeezer"} <= found
     assert {path.stem for path in REPOSITORY.glob("comparisons/*/*.toml")} <= found
 
 
 def test_declared_pythons_are_those_of_the_matrix() -> None:
-    """What ``pyproject.toml`` declares is what the matrix and the continuous integration run."""
+    """Pythons declared in ``pyproject.toml`` are those of the matrix and of the continuous integration."""
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     prefix = "Programming Language :: Python :: "
     assert tuple(item.removeprefix(prefix) for item in project["classifiers"] if item.startswith(prefix)) == PYTHONS

@@ -26,7 +26,7 @@ REACTIONS = (
 
 @pytest.mark.parametrize("kind", TOPS)
 def test_a_number_that_is_read_back_is_the_cause(kind: type[Mutant]) -> None:
-    """Where the certificate names the number that was built otherwise, that number is told, and nothing else is."""
+    """A number that was built otherwise and is named by the certificate is the only cause."""
     found = tried(kind)
     assert found.named
     assert found.said.startswith("the engine's model has")
@@ -41,7 +41,7 @@ def test_reactions_that_are_told_wrongly_at_time_0_are_named(kind: type[Mutant])
 
 
 class SilentBall(Mutant):
-    """One per cent of inertia too much, of which the engine says nothing."""
+    """Ball with one per cent of inertia too much, which the engine does not report."""
 
     fault = "inertia 1.01 times, and nothing is said of it"
     scene = ("inclined_plane", {})
@@ -61,7 +61,7 @@ class SilentBall(Mutant):
 
 
 def test_three_free_numbers_do_not_explain_two() -> None:
-    """A ball whose friction and first steps show a little more inertia is not told that gravity points elsewhere."""
+    """A ball whose friction and first steps show a little more inertia is not accused of another gravity."""
     found = tried(SilentBall)
     assert found.detected
     assert not found.said

@@ -150,7 +150,7 @@ def test_a_safeguard_that_is_taken_out(
 
 
 def _end_what_is_left(here: Site) -> None:
-    """Ends the processes of a drill that outlived whoever started them."""
+    """Ends the processes of a drill that outlived their parents."""
     own = {os.getpid(), *descendants(os.getpid())}
     for place in Path("/proc").glob("[0-9]*/environ"):
         with contextlib.suppress(OSError):
@@ -159,7 +159,7 @@ def _end_what_is_left(here: Site) -> None:
 
 
 def test_a_fault_that_catches_the_drill_itself() -> None:
-    """What hangs or raises in a drill is a row that is not contained, and the others go on."""
+    """A drill that hangs or raises is a row that is not contained, and the others go on."""
     never = threading.Event()
     row = within("hangs", never.wait, 0.1)  # type: ignore[arg-type]  # it gives no row
     assert (row.contained, row.hung, row.problem) == (False, True, "the drill itself hung for 0.1 s")
@@ -190,7 +190,7 @@ def judged(**changes: object) -> Drilled:
 
 
 def test_a_sound_row() -> None:
-    """Where nothing is wrong the fault is contained and everything is counted."""
+    """A fault without any problem is contained and everything is counted."""
     assert judged() == Drilled("fault", True, "it ended", 2, 2, 2, 2, 1, 1, "")
 
 
@@ -217,7 +217,7 @@ def test_what_is_not_contained(changes: dict[str, object], problem: str) -> None
 
 
 def test_table_for_a_person() -> None:
-    """On the terminal each fault is a row with what was said, and one that is not contained says why."""
+    """Every fault is a row on the terminal with its outcome, and one that is not contained has the reason."""
     from rich.console import Console
 
     out = io.StringIO()

@@ -35,7 +35,7 @@ def _drilled() -> dict[str, object]:
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_mutant_is_detected_and_most_are_named() -> None:
-    """At least thirty engines with one fault each: all are detected, nine of ten are told their cause."""
+    """At least thirty engines with one fault each: all are detected, nine of ten have their cause named."""
     found = _drilled()
     rows = found["mutants"]
     assert isinstance(rows, list)
@@ -115,7 +115,7 @@ def test_every_hypothesis_says_its_grounds() -> None:
 
 
 def test_a_factor_near_one_accuses_nobody() -> None:
-    """What a coarse step makes of inertia is within a hundredth; mistakes are known factors, or further off."""
+    """A coarse step changes inertia by less than a hundredth; mistakes are known factors, or further off."""
     assert [telling(factor) for factor in (0.99752, 1.00249, 0.0, 0.5, 1.05)] == [False, False, True, True, True]
 
 

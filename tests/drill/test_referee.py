@@ -40,7 +40,7 @@ def test_both_routes_start_where_the_joints_definition_says(seed: int) -> None:
 
 
 def test_random_mechanisms_have_every_kind_of_joint_and_planar_bodies() -> None:
-    """Those that start above leave no kind out; planar ones are planar to the second route, loops are loops."""
+    """Kinds that start above leave none out; planar ones are planar to the second route, loops are loops."""
     found = {style: [random_mechanism(seed)[1] for seed in STARTS if seed % 4 == k] for k, style in enumerate(STYLES)}
     assert {joint.kind for each in found["tree"] for joint in each.joints} == FACTS.keys()
     assert len({each.loops[0].kind for each in found["loop"]}) >= 4

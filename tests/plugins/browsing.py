@@ -26,7 +26,7 @@ class Visit:
     Attributes:
         page: playwright's page.
         requested: every address that was asked for; the page's own is the first.
-        messages: every line on the console, every error that nobody caught, and every dialog.
+        messages: every line on the console, every uncaught error, and every dialog.
     """
 
     page: Any

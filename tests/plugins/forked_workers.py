@@ -47,7 +47,7 @@ _SET_CHILD_SUBREAPER = 36  # <linux/prctl.h>
 
 
 class Forked:
-    """What of :class:`subprocess.Popen` a worker's parent uses, of a process that was forked."""
+    """Forked process, with the part of :class:`subprocess.Popen` that a worker's parent uses."""
 
     def __init__(self, pid: int, stdin: Any) -> None:
         self.pid, self.stdin = pid, stdin
@@ -134,7 +134,7 @@ class Forks:
 
 
 def _adopt(yes: int) -> None:
-    """Whether a process whose parent has ended becomes a child of this one."""
+    """Makes processes whose parent has ended children of this one (1), or not (0)."""
     ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, yes, 0, 0, 0)
 
 
@@ -161,7 +161,7 @@ def _serve(line: socket.socket) -> None:
 
 
 def _as_if_started(line: socket.socket, request: dict[str, Any], stdin: int, log: int) -> None:
-    """What the system and Python do before the first line of a worker."""
+    """Steps of the system and of Python before the first line of a worker."""
     os.setsid()
     while os.getppid() != request["parent"]:
         os.kill(request["parent"], 0)  # raises where who asked has ended, so that this ends as well

@@ -43,7 +43,7 @@ def timed(seconds: float) -> dict[str, Any]:
 
 
 def invented_study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
-    """What is kept of an invented trade-off."""
+    """Record of an invented trade-off."""
     values: dict[str, Any] = {
         "scene": "sphere_in_cylinder", "parameters": {}, "until": 2.0, "every": 0.05, "quantity": "z",
         "quantities": {"z": MeasuredQuantity("m", 0.1, 1e-13, "z", column=True)}, "absent": {}, "budgets": [],

@@ -29,7 +29,7 @@ class LadderedSettings(TinySettings):
 
 
 class Laddered(Tiny):
-    """The midpoint rule, to which things can be added that nobody needs."""
+    """The midpoint rule, with terms to add that it does not need."""
 
     name: ClassVar[str] = "laddered"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": ROLLS, "heavier": ROLLS}

@@ -84,7 +84,7 @@ _KEPT: dict[tuple[str, str, Any], _Kept] = {}
 
 @dataclass(frozen=True)
 class Moment:
-    """What a lie has to go by.
+    """Material of a lie: samples, models and time.
 
     Attributes:
         t: time that is asked for [s].
@@ -103,7 +103,7 @@ class Moment:
 
     @property
     def turns(self) -> Rotation:
-        """Of the bodies."""
+        """Orientations of the bodies."""
         return Rotation.from_quat(self.right.q_WB, scalar_first=True)
 
     @property
@@ -114,18 +114,18 @@ class Moment:
 
 @dataclass(frozen=True)
 class Lie:
-    """What is said that is not so.
+    """Lie of an engine about its motion.
 
     Attributes:
         name: in a few words.
-        scenes: kinds of motion about which it is told.
-        said: words of which the verdict must have one; empty: it is far below the tolerance, and nothing is said.
+        scenes: kinds of motion that it is about.
+        said: words; the verdict must have one of them; empty: it is far below the tolerance and passes.
         sample: what of a sample is replaced, by name; or another sample.
-        causes: words of which each cause that is told must have one; empty: none may be told.
+        causes: words; each named cause must have one of them; empty: none may be named.
         begins: when samples begin to lie [s]; by default after all that the certificate looks at.
         model: what is built instead of the scene.
-        built: what is said of it, of what there is and what there should be.
-        events: what is said of them, of the honest ones and the end of the run.
+        built: report of the model, from the built one and the honest one.
+        events: reported events, from the honest ones and the end of the run.
     """
 
     name: str

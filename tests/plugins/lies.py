@@ -1,4 +1,4 @@
-"""The table of lies: what is replaced in what an honest engine says, and the words that have to be said of it."""
+"""The table of lies: changes of an honest engine's reports, and the words that the verdict must have."""
 
 from __future__ import annotations
 

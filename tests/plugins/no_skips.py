@@ -1,4 +1,4 @@
-"""Where ``PROOFROLL_NO_SKIPS`` is set, as ``.ci/run`` does, a test that is skipped fails.
+"""Failure of skipped tests where ``PROOFROLL_NO_SKIPS`` is set, as ``.ci/run`` does.
 
 A person may lack an engine, heyoka or a browser; where all of them are installed, a skip would hide that one is not.
 A check of conformance that has nothing to look at raises ``unittest.SkipTest`` and stays one.
@@ -19,7 +19,7 @@ _EXCUSED = ("root may write anywhere", "this system lets nobody mount a small di
 
 
 def _unexcused(report: Any) -> str:
-    """Why something was skipped that should not be; empty if nothing was."""
+    """Reason of a skip that is not excused; empty if there is none."""
     if not os.environ.get(VARIABLE) or report.outcome != "skipped" or hasattr(report, "wasxfail"):
         return ""
     reason = str(report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr)
@@ -28,7 +28,7 @@ def _unexcused(report: Any) -> str:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_makereport(call: pytest.CallInfo[None]) -> Iterator[None]:
-    """Of a test, or of what it needs."""
+    """Turns the skip of a test, or of a fixture, into a failure."""
     nothing_to_see = call.excinfo is not None and call.excinfo.errisinstance(unittest.SkipTest)  # pytest replaces it
     report: Any = yield
     if not nothing_to_see and (reason := _unexcused(report)):
@@ -38,7 +38,7 @@ def pytest_runtest_makereport(call: pytest.CallInfo[None]) -> Iterator[None]:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report() -> Iterator[None]:
-    """Of a whole module, by ``importorskip`` at its head."""
+    """Turns the skip of a whole module, by ``importorskip`` at its head, into a failure."""
     report: Any = yield
     if reason := _unexcused(report):
         report.outcome, report.longrepr = "failed", reason

@@ -33,7 +33,7 @@ class Breaking(Tiny):
             cls.presets = {"midpoint": {"matched": cls.settings()}}
 
     def sample(self) -> BallSample:
-        """What it tells, right or not."""
+        """Sample as reported, right or not."""
         return self._told(super().sample())
 
     def _told(self, right: BallSample) -> BallSample:
@@ -102,7 +102,7 @@ class Orderless(Breaking, breaks="resolution_and_order_are_told"):
 
 @dataclass(frozen=True)
 class HalfSettings(TinySettings):
-    """A precision that nobody knows."""
+    """An unknown precision."""
 
     precision: ClassVar[str] = "half"
 
@@ -171,7 +171,7 @@ class Doubled(Heavy, breaks="certificate_holds"):
         Tiny.__init__(self, changed(scene, ball=dataclasses.replace(ball, mass=2 * ball.mass)), settings)
 
     def built(self) -> BallBuilt:
-        """With an excuse for everything."""
+        """Model with an excuse for everything."""
         return _excused(super().built())
 
 
@@ -183,7 +183,7 @@ class Pulled(Breaking, breaks="certificate_holds"):
         super().__init__(changed(scene, gravity=gravity), settings)
 
     def built(self) -> BallBuilt:
-        """With an excuse for everything."""
+        """Model with an excuse for everything."""
         return _excused(super().built())
 
 
@@ -209,7 +209,7 @@ class Damped(Mute, breaks="first_steps_fit_the_scene"):
     """Its velocity is damped by 4 % per second, and it does not say so."""
 
     def rates(self, x: Any) -> Any:
-        """With damping."""
+        """Rates with damping."""
         return super().rates(x) - np.array([0, 0, 0.04, 0.04, 0.04]) * x
 
 
@@ -225,7 +225,7 @@ class Unresisting(Mute, breaks="first_steps_fit_the_scene"):
     """Says that there is rolling resistance, and ignores it."""
 
     def rates(self, x: Any) -> Any:
-        """Without."""
+        """Rates without it."""
         contact = dataclasses.replace(self.body.contact, rolling_resistance=0.0)
         return reduced_rates(dataclasses.replace(self.body, contact=contact), x)[0]
 
@@ -247,7 +247,7 @@ class Beating(Breaking, breaks="moves_as_the_truth"):
 
 
 class Wasteful(Breaking, breaks="builds_only_what_is_required"):
-    """Carries rolling resistance along where nobody asked for it."""
+    """Carries rolling resistance along that was not asked for."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         super().__init__(scene, settings)
@@ -352,7 +352,7 @@ class Lazy(Breaking, breaks="samples_cost_the_same"):
         self.due = t
 
     def sample(self) -> BallSample:
-        """What was put off, and the state."""
+        """State after the steps that were put off."""
         while self.t < self.due - self.dt / 2:
             time.sleep(2e-3)
             super().advance(min(self.t + self.dt, self.due))
@@ -400,7 +400,7 @@ class FirstOrder(Breaking, breaks="order_is_as_declared"):
 
 @dataclass(frozen=True)
 class AdaptiveSettings:
-    """A tolerance that nobody looks at."""
+    """A tolerance without effect."""
 
     formulation: str = "midpoint"
     preset: str = "matched"

@@ -16,7 +16,7 @@ def bare(folder: Path) -> Path:
 
 
 def site_of(python: Path) -> Path:
-    """Where the packages of an environment lie."""
+    """Folder of the packages of an environment."""
     (found,) = python.parents[1].glob("lib/python*/site-packages")
     return found
 

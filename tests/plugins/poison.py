@@ -19,7 +19,7 @@ class Poison:
 
     Attributes:
         doses: what was given to which string.
-        said: the strings that are said of something; the others are names of entries only.
+        said: the strings that describe something; the others are names of entries only.
     """
 
     doses: dict[str, str] = field(default_factory=dict)

@@ -29,7 +29,7 @@ class SingleSettings:
 
     @property
     def order(self) -> int:
-        """Of the scheme."""
+        """Order of the scheme."""
         return 1 if self.formulation == "euler" else 4
 
 
@@ -47,7 +47,7 @@ class Single:
 
     @staticmethod
     def version() -> str:
-        """Of the engine."""
+        """Version of the engine."""
         return "1.0"
 
     @classmethod

@@ -88,12 +88,12 @@ class Spring:
         return None
 
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
-        """As they are; the pull without time 0."""
+        """Observables as they are; the pull without time 0."""
         found = {item.name: dataset[item.name].to_numpy() for item in self.observables}
         return found | {"pull": found["pull"][1:]}
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
-        """Of the start."""
+        """Scales of the start."""
         pull = self.stiffness * abs(self.x0)
         return {"x": abs(self.x0), "pull": pull, "energy_error": 0.5 * pull * abs(self.x0)}
 

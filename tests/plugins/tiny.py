@@ -105,7 +105,7 @@ class Sleepy(Tiny):
 
 
 class Grown(Tiny):
-    """An engine of which its adapter supports no version before 2.5."""
+    """An engine whose adapter supports no version before 2.5."""
 
     name: ClassVar[str] = "grown"
     oldest: ClassVar[str] = "2.5"

@@ -1,4 +1,4 @@
-"""A surface that somebody else declares: a lying half-pipe, said by a position and a distance."""
+"""A surface that somebody else declares: a lying half-pipe, given by a position and a distance."""
 
 # ruff: noqa: D102 -- what the methods mean is said in Declared
 

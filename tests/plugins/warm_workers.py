@@ -42,7 +42,7 @@ def _follow(worker: Worker) -> None:
 
 
 class WarmWorkers:
-    """Those that are idle."""
+    """Idle workers."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

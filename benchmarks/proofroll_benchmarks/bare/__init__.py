@@ -31,7 +31,7 @@ class Bare:
     """A run that is ready to start.
 
     Attributes:
-        run: goes from time 0 over these times [s], the first of which is 0, to the last; gives the ball's centre there
+        run: goes over these times [s], from the first, 0, to the last; gives the ball's centre there
             [m], shape (3,), or the origins of a mechanism's bodies, shape (bodies, 3). Called once, and timed.
         tolerance: largest distance [m] from the adapter's centre that the two loops explain.
         because: why it is not zero.
@@ -60,7 +60,7 @@ def bare_loop(engine: str) -> EntryPoint:
 
 
 def is_mechanism(scene: Scene) -> bool:
-    """Whether the scene is one of bodies and joints."""
+    """True for a scene of bodies and joints."""
     return isinstance(scene.elements[0], MechanismElement)
 
 

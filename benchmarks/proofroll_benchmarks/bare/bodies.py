@@ -113,7 +113,7 @@ class CutApart:
         return np.concatenate([v.ravel(), _turning(q, w).ravel(), u_rate[:, :3].ravel(), u_rate[:, 3:].ravel()])
 
     def normalised(self, x: FloatArray) -> FloatArray:
-        """With quaternions of unit length."""
+        """State with quaternions of unit length."""
         x = x.copy()
         q = self._parts(x)[1]
         q[:] = q / np.sqrt((q * q).sum(1))[:, None]
@@ -135,7 +135,7 @@ class CutApart:
         return self.normalised(x)
 
     def origins(self, x: FloatArray) -> FloatArray:
-        """Of the bodies' frames [m], shape (bodies, 3)."""
+        """Origins of the bodies' frames [m], shape (bodies, 3)."""
         r, q, _, _ = self._parts(x)
         return np.asarray(r - _by(_rotations(q), self.com))
 

@@ -249,7 +249,7 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
 
 
 def _watch(model: PenaltyContact, body: RollingBall, stopped: list[str]) -> Callable[[Any, float], bool]:
-    """After each step: whether the contact is lost, or holds or slips otherwise than before."""
+    """Callback after each step: true if the contact is lost, or changed between holding and slipping."""
     data, coordinates = model.data, Output.Coordinates
     zone, bounded = model.zone, math.isfinite(body.contact.mu_static)
     events: list[tuple[float, bool]] = []

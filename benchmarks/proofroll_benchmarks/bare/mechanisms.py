@@ -110,7 +110,7 @@ def projection_rows(scene: Scene, settings: Any) -> Bare:
 
 
 def dop853(solver: DOP853, times: FloatArray, accepted: Callable[[DOP853, float], None]) -> None:
-    """Steps of which one ends at each time; ``accepted`` may change the state after each of them."""
+    """Steps, one of them ending at each time; ``accepted`` may change the state after each of them."""
     for t in times[1:].tolist():
         solver.t_bound, solver.status = t, "running"
         while solver.status == "running":

@@ -96,7 +96,7 @@ class _Resistance:
         self.last, self.before, self.N_before, self.slope = 0.0, 0.0, 0.0, 0.0
 
     def start(self, memory: Any) -> None:
-        """As the evaluations at time 0 left it."""
+        """Takes the values that the evaluations at time 0 left."""
         self.last, self.before, self.N_before, self.slope = memory[:4].tolist()
 
     def apply(self, t: float, N: float, e1: tuple[float, float], v: list[float]) -> None:

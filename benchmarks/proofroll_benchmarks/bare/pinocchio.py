@@ -101,7 +101,7 @@ class _Composite:
         return math.hypot(*self.data.lambda_c.tolist()), self.m * self.c * float(v[0]) ** 2
 
     def centre(self, q: FloatArray) -> FloatArray:
-        """Of the ball [m]."""
+        """Centre of the ball [m]."""
         return np.array([self.c * math.cos(q[0]), self.c * math.sin(q[0]), q[1]])
 
 
@@ -187,7 +187,7 @@ class _FreeFlyer:
         return math.hypot(F2, F3), -minus_N
 
     def centre(self, q: FloatArray) -> FloatArray:
-        """Of the ball [m]."""
+        """Centre of the ball [m]."""
         return np.array(q[:3])
 
 

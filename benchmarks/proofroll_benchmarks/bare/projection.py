@@ -44,7 +44,7 @@ def _run(body: RollingBall, settings: Any, equations: Equations) -> Callable[[Fl
     dt = settings.dt
 
     def check(t: float, x: FloatArray) -> None:
-        """Whether the ball is where the equations hold: finite, off the singularity, and within the cone."""
+        """Checks that the equations hold: finite state, off the singularity, and within the cone."""
         if not math.isfinite(x.sum()) or (n > 2 and abs(math.sin(x[3])) < 0.01):
             raise Diverged(f"the angles are singular or not finite at {t:g} s")
         if mu < math.inf and math.hypot(*reactions.tolist()) > mu * mc * x[n] ** 2:

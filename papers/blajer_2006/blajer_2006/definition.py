@@ -1,4 +1,4 @@
-"""What a file of figures holds: runs, figures of them, and what an article states about them."""
+"""File of figures: runs, figures of them, and an article's statements about them."""
 
 from __future__ import annotations
 
@@ -93,11 +93,11 @@ class Figure:
 
 @dataclass(frozen=True)
 class Statement:
-    """What an article, or this project, says about runs: one quantity, one measure of it, and one criterion.
+    """Statement of an article, or of this project, about runs: one quantity, one measure of it, and one criterion.
 
     Attributes:
         says: for a person.
-        source: where it is said.
+        source: place of the statement.
         ours: it is this project's, and not the article's.
         runs: each must fulfil it by itself; with ``order`` they are held against each other.
         of: quantity; not for ``events``.
@@ -168,7 +168,7 @@ class Figures:
 
     @property
     def wants_orientation(self) -> bool:
-        """Whether anything asks for the Euler angles."""
+        """True if anything asks for the Euler angles."""
         drawn = {name for figure in self.figures for panel in figure.panels for name in (panel.x, *panel.y)}
         return bool((drawn | {item.of for item in self.statements}) & set(ANGLES))
 

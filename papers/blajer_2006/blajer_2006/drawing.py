@@ -130,7 +130,7 @@ def _limits(axes: Axes, panel: Panel, until: float) -> None:
 
 
 def _key(axes: Axes, panel: Panel, curves: int) -> None:
-    """What is which curve: above the axes, or inside where events are named above."""
+    """Draws the legend above the axes, or inside where events are named above."""
     if panel.events:
         axes.legend(loc="upper left" if panel.levels else "lower left")
         return

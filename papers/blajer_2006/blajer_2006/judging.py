@@ -45,7 +45,7 @@ def judged(study: FigureRuns) -> list[dict[str, Any]]:
 
 
 def rounds_to(value: float, stated: str) -> bool:
-    """Whether a number is the stated one to the digits that are written: off by half a unit of the last at most."""
+    """True if a number is the stated one to the digits that are written: off by half a unit of the last at most."""
     number = Decimal(stated)
     exponent = number.as_tuple().exponent
     assert isinstance(exponent, int)  # finite, as the file was checked for
@@ -90,7 +90,7 @@ def _stated(item: Statement) -> str:
 
 
 def _found(item: Statement, made: list[FigureRun]) -> Measured:
-    """What the runs give; None where one of them cannot say."""
+    """Measured values of the runs; None where one of them has none."""
     values = [_value(item, run) for run in made]
     if item.order:
         numbers = [value for value in values if isinstance(value, float)]
@@ -135,7 +135,7 @@ def _holds(item: Statement, found: Measured) -> bool:
 
 
 def _reasons(study: FigureRuns, item: Statement, runs: list[str]) -> Iterator[str]:
-    """Why nothing was found."""
+    """Reasons that no value was found."""
     for name in runs:
         result = study.runs[name].result
         if not study.runs[name].done:

@@ -58,7 +58,7 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
 
 
 def _halves(of: Callable[[FloatArray], float], values: FloatArray) -> tuple[float, float]:
-    """What a function makes of the first half of the curve, and of the second."""
+    """Values of a function for the first half of the curve, and for the second."""
     return float(of(values[: values.size // 2])), float(of(values[values.size // 2 :]))
 
 

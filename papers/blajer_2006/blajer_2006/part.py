@@ -43,7 +43,7 @@ class FiguresPart(Part):
 
     @staticmethod
     def line(entry: PartEntry) -> str:
-        """How many statements hold."""
+        """Count of the statements that hold."""
         return statement_tables.count(entry.study["statements"])
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's

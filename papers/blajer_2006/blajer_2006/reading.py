@@ -32,7 +32,7 @@ def load_figures(name: str) -> Figures:
 
 
 def _check(where: str, found: Figures) -> None:
-    """What types cannot say."""
+    """Checks beyond the types."""
     time_grid(found.until, found.every)
     for name, planned in found.runs.items():
         try:

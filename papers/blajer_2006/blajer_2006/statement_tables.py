@@ -17,7 +17,7 @@ _SIGNS = {True: ("✓", "green"), False: ("✗", "bold red"), None: ("–", "")}
 
 
 def count(statements: Sequence[Mapping[str, Any]]) -> str:
-    """How many statements hold, those of the article apart from this project's own."""
+    """Count of the statements that hold, those of the article apart from this project's own."""
     parts = []
     for ours, whose in ((False, "statements"), (True, "of this project's own")):
         verdicts = [item["holds"] for item in statements if item["ours"] is ours]
@@ -32,7 +32,7 @@ def titled(name: str) -> str:
 
 
 def rows(study: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What an article states and what the runs give, one line for each run."""
+    """Rows of an article's statements and the runs' values, one line for each run."""
     lines, before = [], None
     for item in study["statements"]:
         of = unit(item["unit"])
@@ -50,7 +50,7 @@ def rows(study: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def statement_table(content: dict[str, Any]) -> Table:
-    """What is stated, what was found, and whether it holds, one line for each."""
+    """Table of statements, values and verdicts, one line for each."""
     found = Column("found", justify="right", max_width=24)
     table = plain_table(
         Column("statement"), *unbroken("run"), *numeric("stated"), found, *unbroken(""), title=content["title"]

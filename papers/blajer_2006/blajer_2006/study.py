@@ -45,7 +45,7 @@ class FigureRun:
 
     @property
     def done(self) -> bool:
-        """Whether it reached its end."""
+        """True if it reached its end."""
         return self.result.status is Status.DONE and self.dataset is not None
 
     def curve(self, name: str, until: float | None = None) -> FloatArray | None:
@@ -83,7 +83,7 @@ class FigureRuns:
 
     @property
     def lost(self) -> list[str]:
-        """What the runs that did not reach their end say, a sentence each."""
+        """Sentences on the runs that did not reach their end."""
         made = [(self.engine, self.runs), (TRUTH, self.truths)] if self.truths is not self.runs else [
             (self.engine, self.runs)
         ]  # fmt: skip
@@ -133,7 +133,7 @@ def run_figures(
 
 
 def _turned(parameters: dict[str, float]) -> tuple[str, ...]:
-    """What the truth is asked for so that thousands of samples cost little."""
+    """Questions to the truth that make thousands of samples cheap."""
     # Against resistance DOP853 would end a step at each of them; the routes with the orientation are read in between.
     return (ORIENTATION,) if parameters.get("rolling_resistance") else ()
 
@@ -151,7 +151,7 @@ def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> Figur
 
 
 def study_content(study: FigureRuns) -> dict[str, Any]:
-    """Where the figures come from, as plain data."""
+    """Sources of the figures, as plain data."""
     figures = study.figures
     versions: dict[str, str] = {}
     for made in (*study.runs.values(), *study.truths.values()):

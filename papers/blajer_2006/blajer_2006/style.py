@@ -1,4 +1,4 @@
-"""How figures look: fonts, lines that differ in colour, in grey and in dashes, and labels with units."""
+"""Style of figures: fonts, lines that differ in colour, in grey and in dashes, and labels with units."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _MAP_HEIGHT = 3.6  # inch
 
 
 def figures_content(study: FigureRuns, maps: Maps) -> dict[str, Any]:
-    """All that is said beside the figures, as plain data: runs, captions, statements; ``maps`` by study."""
+    """Texts beside the figures, as plain data: runs, captions, statements; ``maps`` by study."""
     entries = []
     for figure in study.figures.figures:
         entry: dict[str, Any] = {"name": figure.name, "caption": figure.caption}
@@ -72,7 +72,7 @@ def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]
 
 
 def closing_lines(content: dict[str, Any], out: Path) -> list[str]:
-    """How many statements hold, what is lost, and where the files are."""
+    """Lines on the statements that hold, on lost runs, and on the places of the files."""
     verdicts = [item["holds"] for item in content["statements"]]
     lines = [f"{count(content['statements'])}."]
     if verdicts.count(None):

@@ -105,7 +105,7 @@ def regimes(
 
 
 def _regime_lines(content: Mapping[str, Any], out: Path) -> Iterator[str]:
-    """How many runs of each map became what, and where the maps are."""
+    """Lines with the counts of runs by regime for each map, and the place of the maps."""
     for item in content["maps"]:
         said = ", ".join(f"{count} {name}" for name, count in item["counts"].items())
         yield f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {said}."

@@ -1,4 +1,4 @@
-"""When the first slip comes: in the truth with its conditioning, and in every engine with its bracket."""
+"""First slip: in the truth with its conditioning, and in every engine with its bracket."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ def summary(study: OnsetStudy) -> str:
 
 
 def first_slip_told(first: Event | None) -> tuple[str, str]:
-    """When a ball first slips, and between which times that is known to be, for a person."""
+    """Time of the first slip, and its bracket, as texts for a person."""
     if first is None:
         return "no slip", ""
     between = f"{first.time_low:.9g} … {first.time_high:.9g}"

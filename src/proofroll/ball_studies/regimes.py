@@ -54,7 +54,7 @@ class EvenValues:
 
     @property
     def halved(self) -> EvenValues:
-        """With half as many intervals between them; two values stay two."""
+        """Axis with half as many intervals; two values stay two."""
         return replace(self, count=self.count // 2 + 1) if self.count > 1 else self
 
 
@@ -86,7 +86,7 @@ class RegimesStudy:
         return self.speed.count * self.mu_static.count * len(self.rolling_resistance)
 
     def briefly(self) -> RegimesStudy:
-        """As a report has it: a fourth of the runs, every second value of both axes."""
+        """Smaller study for a report: a fourth of the runs, every second value of both axes."""
         return replace(self, speed=self.speed.halved, mu_static=self.mu_static.halved)
 
 

@@ -80,7 +80,7 @@ def start(
     context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version and stop.")] = False,
 ) -> None:
-    """Which multibody engine, formulation and time step can you trust for a scene?"""
+    """Cross-validate multibody engines: which engine, formulation and time step can you trust for a scene?"""
     if version:
         sys.stdout.write(f"proofroll {proofroll.__version__}\n")
         raise typer.Exit(OK)
@@ -90,7 +90,7 @@ def start(
 
 
 def _told(error: typer.TyperException) -> str:
-    """What is wrong with the words of a command; of a number with the value, which typer leaves out."""
+    """Message of a usage error; with the value of a wrong number, which typer leaves out."""
     said = str(error.format_message())
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
     option = re.search(r"'([^']+)'", said)

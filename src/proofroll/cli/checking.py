@@ -1,4 +1,4 @@
-"""Whether a scene, a comparison or the file of another study is sound: it is read, and nothing is run."""
+"""Check of the file of a scene, a comparison or another study without a run."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ READERS = "proofroll.study_readers"
 
 
 def is_text_check(name: Path) -> bool:
-    """Whether a path is a scene or the file of a study, or the name of one."""
+    """True for the path or the name of a scene or of the file of a study."""
     return name.suffix in {"", ".toml"} or name.is_dir()
 
 
@@ -78,7 +78,7 @@ class SoundFile:
 
 
 def checked(name: str) -> SoundFile:
-    """What a scene, by its name or the path of its folder or ``scene.toml``, or else the file of a study holds.
+    """Content of a scene (a name, the path of its folder or of its ``scene.toml``) or of the file of a study.
 
     Raises:
         InputError: there is no such thing, or the first thing that is wrong with it.

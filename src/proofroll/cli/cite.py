@@ -1,4 +1,4 @@
-"""What to cite for a result."""
+"""Citations for a result."""
 
 from __future__ import annotations
 

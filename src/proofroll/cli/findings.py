@@ -1,4 +1,4 @@
-"""What was found out about engines, run against what is installed."""
+"""Findings about engines, run against the installed versions."""
 
 from __future__ import annotations
 

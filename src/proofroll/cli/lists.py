@@ -1,4 +1,4 @@
-"""What there is: scenes."""
+"""List of the scenes."""
 
 from __future__ import annotations
 

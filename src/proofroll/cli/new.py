@@ -102,10 +102,10 @@ def engine(
 
 
 def _fresh(name: str, path: str) -> Path:
-    """The path, of which nothing is there yet.
+    """Path of a new file or folder.
 
     Raises:
-        InputError: the name is none, or something of that name is there.
+        InputError: the name is not allowed, or the path exists.
     """
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError("name", name, "write small letters, digits and _, a letter first")

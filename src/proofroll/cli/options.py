@@ -1,4 +1,4 @@
-"""What every command needs: options, exit codes, progress and the ways to print."""
+"""Options, exit codes, progress and printing shared by all commands."""
 
 from __future__ import annotations
 

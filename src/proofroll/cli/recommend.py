@@ -44,7 +44,7 @@ def recommend(
     """Name the cheapest engine, formulation and step that holds a tolerance here, and why.
 
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
-    told apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
+    listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
     """
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff.tables import answer_lines
@@ -103,12 +103,12 @@ def _stored_study(
     *,
     measure_first: bool,
 ) -> TradeoffStudy:
-    """The stored curves, of all engines or of some with those that are asked for, or new ones if the user agrees.
+    """Stored curves of all engines, or of some that include the engines asked for; new ones if the user agrees.
 
     With ``ranges`` of parameters they must have been checked over these.
 
     Raises:
-        InputError: there are none that hold here, and nobody agreed to measure them.
+        InputError: no stored curves hold here, and the user did not agree to measure them.
     """
     from proofroll.studies.study_store import kept
     from proofroll.studies.tradeoff.recommend import covers

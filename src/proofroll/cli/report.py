@@ -120,7 +120,7 @@ def _make(made: Report, part: Part, runner: Runner, out: Path, stage: str) -> No
 
 
 def _exit_code(content: ReportContent, compared: int) -> int:
-    """As for the comparisons; a further study that failed counts as a lost engine, a false statement as a verdict."""
+    """Exit code of the report; a lost engine or a false statement of a further study counts as one of a comparison."""
     entries = content.further
     if compared == options.ENGINE or any(entry.missing or entry.lost for entry in entries):
         return options.ENGINE

@@ -109,7 +109,7 @@ def run(
 
 
 def _shorter_step(scene: str, engine: str, case: Case) -> str:
-    """Which engine with which step to try, where the scene's file names one and this run had a longer one."""
+    """Advice to use the step of the scene's file, if the run had a longer one; else empty."""
     from proofroll.core.plugins import parse_engine
     from proofroll.files.scene_file import read_scene_file
 

@@ -1,4 +1,4 @@
-"""Where engines stop being right: the stability map."""
+"""Stability map: where engines stop being right."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def tradeoff(
 def question_of(
     scene: str, settings: list[str] | None, quantities: list[str] | None, until: float | None
 ) -> tuple[TradeoffClaims | None, Question]:
-    """What is asked: the file's own question, or another about its scene, for which the file then claims nothing."""
+    """Claims and question of the file; another question about its scene has no claims."""
     from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import is_scene, load_scene
     from proofroll.studies.tradeoff.claims import claims_for, load_claims

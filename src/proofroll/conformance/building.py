@@ -32,7 +32,7 @@ def builds_or_refuses(subject: Subject) -> None:
 
 
 def provides_what_it_says(engine: Any) -> None:
-    """Of the scenes that it can represent and that need a capability it builds some, with some preset."""
+    """Check: for each capability, some preset builds some scene that needs it."""
     for formulation, provides in engine.provides.items():
         for capability in sorted(provides):
             needing = [scene for scene in scenes().values() if capability in scene.requires <= provides]
@@ -51,7 +51,7 @@ def provides_for_some_scene(engine: Any) -> None:
 
 
 def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
-    """Why no preset of a formulation builds the scene; nothing if one does."""
+    """Reason of the last preset that refuses the scene; empty if one builds it."""
     why = "it has no preset"
     for settings in engine.presets.get(formulation, {}).values():
         try:
@@ -65,14 +65,14 @@ def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
 
 
 def certificate_holds(subject: Subject) -> None:
-    """What was built is what the scene says: mass, inertia, gravity, radius, start, first accelerations and forces."""
+    """Check: the engine built the scene: mass, inertia, gravity, radius, start, first accelerations and forces."""
     difference = first_difference(certify(subject.build(), subject.scene, subject.settings))
     if difference is not None:
         raise UnlikeSceneError(subject, str(difference))
 
 
 def builds_only_what_is_required(subject: Subject) -> None:
-    """What the scene requires is in the model; what it does not is not, unless a setting or the engine says why.
+    """Check: the model holds the required terms, and no others unless a setting or the engine gives a reason.
 
     The setting is one named as what can be asked for, ``orientation=true``; the engine's reasons are
     :class:`proofroll.core.engine_abilities.CannotLeaveOut`.

@@ -69,7 +69,7 @@ def moves_as_the_truth(subject: Subject) -> None:
 
 
 def _times(step: float | None) -> FloatArray:
-    """Of the samples [s]; whole numbers of steps, if there are any."""
+    """Times of the samples [s]; whole numbers of steps, if the engine has any."""
     times = np.array([0.0, *(part * _LENGTH for part in _PARTS)])
     if step is None:
         return times
@@ -90,7 +90,7 @@ def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, F
 
 
 def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
-    """What gravity and the like make in that time [s] of each variable that is compared."""
+    """Size of each compared variable: its change by gravity and similar loads over a time [s]."""
     found: dict[str, float] = {}
     for element in scene.elements:
         start = element.first_motion

@@ -1,4 +1,4 @@
-"""What a check looks at: an engine on a scene, how two of its states compare, and why it moves otherwise."""
+"""Subject of a check: an engine on a scene, the distance of two of its states, and causes of a wrong motion."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def _made(by: Callable[[], Mapping[str, Scene]]) -> Mapping[str, Scene]:
 
 
 def lacking(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
-    """What the scene requires and the formulation does not say it provides."""
+    """Capabilities that the scene requires and the formulation does not provide."""
     provides = engine.provides.get(formulation, ()) if isinstance(engine.provides, Mapping) else ()
     return scene.requires - frozenset(provides)
 
@@ -83,7 +83,7 @@ class Subject:
         return engine
 
     def samples(self, times: FloatArray) -> list[Sample]:
-        """What the engine gives at times [s], of which the first is 0."""
+        """Samples of the engine at times [s]; the first time is 0."""
         engine = self.build()
         found = [engine.sample()]
         for t in times[1:].tolist():
@@ -99,7 +99,7 @@ class Subject:
 
     @property
     def fixed_step(self) -> bool:
-        """Whether the resolution is a step rather than a tolerance."""
+        """True if the resolution is a step rather than a tolerance."""
         return bool(self.settings.resolution == "dt")
 
     def span(self, parts: int, at_least: float = _SPAN) -> float:
@@ -116,7 +116,7 @@ class Subject:
 
     @property
     def closeness(self) -> float:
-        """How far two runs of one motion may be apart that were not made of the same steps (see :meth:`distance`).
+        """Largest distance of two runs of one motion that were made with other steps (see :meth:`distance`).
 
         With a fixed step the steps are the same; what an implicit one is solved to is hardly worse than 1e-8, while a
         step lost or doubled shows as 1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
@@ -155,7 +155,7 @@ def bits(sample: Sample) -> bytes:
 
 
 class UnlikeSceneError(AssertionError):
-    """What an engine built or did is not what the scene says; the causes are looked for where they are told."""
+    """Difference between the scene and an engine's model or motion; its causes are looked for where it is shown."""
 
     def __init__(self, subject: Subject, sentence: str) -> None:
         super().__init__(sentence)

@@ -1,1 +1,1 @@
-"""What everything speaks: scenes, the engine protocol, events, verdicts, claims."""
+"""Vocabulary shared by all packages: scenes, the engine protocol, events, verdicts, claims."""

@@ -1,4 +1,4 @@
-"""What installed packages announce by entry points."""
+"""Announcements of installed packages, by entry points."""
 
 from __future__ import annotations
 

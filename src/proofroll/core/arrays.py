@@ -1,4 +1,4 @@
-"""Types of arrays, arrays that nobody can write to, and how far two are apart."""
+"""Types of arrays, read-only arrays, and the largest difference of two arrays."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def slices(counts: Iterable[int]) -> tuple[slice, ...]:
-    """Where parts of so many numbers each lie, one after another."""
+    """Slices of consecutive parts with the given sizes."""
     ends = itertools.accumulate(counts, initial=0)
     return tuple(slice(start, end) for start, end in itertools.pairwise(ends))
 

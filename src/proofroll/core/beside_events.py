@@ -17,7 +17,7 @@ _SIDE = 3
 
 
 def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float], late: float) -> float:
-    """How far the curve may be off where each event is late.
+    """Largest error of a curve whose events are each late by a given time.
 
     At an event a curve jumps in its value, slope or curvature (places, velocities and forces where friction switches);
     a sample in between is off by the jump itself, and what follows by what the jumps make of the delay until the end.

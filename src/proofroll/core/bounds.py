@@ -1,4 +1,4 @@
-"""Bounds on the numbers of a model, checked by the model itself, whoever makes it."""
+"""Bounds on the numbers of a model, checked when it is made."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ _SHOWN = 9
 
 
 class Standing(StrEnum):
-    """How one quantity of an engine stands to the scene."""
+    """Standing of one quantity of an engine against the scene."""
 
     HOLDS = "holds"
     DIFFERS = "differs"
@@ -59,18 +59,18 @@ class Line:
 
     @property
     def standing(self) -> Standing:
-        """Whether the engine built what the scene says, as far as it tells."""
+        """Standing of the engine's number against the scene's."""
         if self.difference is None:
             return Standing.NOT_REPORTED
         return Standing.HOLDS if self.difference <= self.tolerance else Standing.DIFFERS
 
     @property
     def holds(self) -> bool:
-        """Whether nothing that the engine says speaks against it; it may also say nothing (:attr:`standing`)."""
+        """True unless the engine's number contradicts the scene; an engine may be silent (:attr:`standing`)."""
         return self.standing is not Standing.DIFFERS
 
     def as_dict(self) -> dict[str, Any]:
-        """For a result: all fields, ``holds`` and ``standing``."""
+        """All fields, ``holds`` and ``standing``, for a result."""
         return {**dataclasses.asdict(self), "holds": self.holds, "standing": self.standing.value}
 
 
@@ -185,7 +185,7 @@ def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[s
 
 
 def _single(line: Line) -> str:
-    """What a reader must know of numbers that are the scene's in single precision."""
+    """Note on numbers that are the scene's in single precision; else empty."""
     if len(line.found) != len(line.expected) or line.found == line.expected:
         return ""
     one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)

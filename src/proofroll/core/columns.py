@@ -39,11 +39,11 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True)
 class Columns:
-    """What an ``xarray.Dataset`` is made of.
+    """Content of an ``xarray.Dataset``.
 
     Attributes:
         variables: by name, those of the dimensions among them.
-        attrs: what is said of all.
+        attrs: attributes of the whole dataset.
 
     Raises:
         ValueError: variables have other lengths along one dimension, which a file would hide where one of them is 1.
@@ -65,7 +65,7 @@ class Columns:
 
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Columns:
-        """Those of a dataset."""
+        """Columns of a dataset."""
         found = dataset.variables.items()
         columns = {str(name): Variable(tuple(map(str, v.dims)), v.to_numpy(), v.attrs) for name, v in found}
         return cls(columns, {str(key): value for key, value in dataset.attrs.items()})
@@ -77,11 +77,11 @@ class Columns:
         return self.variables[name]
 
     def assign(self, **said: Any) -> Columns:
-        """With more said of all."""
+        """Copy with further attributes."""
         return Columns(self.variables, {**self.attrs, **said})
 
     def at(self, dim: str, chosen: npt.NDArray[np.bool_]) -> Columns:
-        """Those places along one dimension alone that are chosen."""
+        """Columns at the chosen places along one dimension."""
         found = {
             name: item._replace(values=np.compress(chosen, item.values, item.dims.index(dim)))
             if dim in item.dims
@@ -91,7 +91,7 @@ class Columns:
         return Columns(found, self.attrs)
 
     def dataset(self) -> xr.Dataset:
-        """As what everybody else reads."""
+        """The columns as an ``xarray.Dataset``."""
         import xarray as xr
 
         return xr.Dataset(self.variables, attrs=self.attrs)

@@ -13,7 +13,7 @@ from proofroll.core.verdict import Verdict
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far an observable may be from the truth.
+    """Largest allowed distance of an observable from the truth.
 
     Attributes:
         value: in the unit of the observable, or as a fraction of its scale.
@@ -26,7 +26,7 @@ class Tolerance:
     unit: str = "%"
 
     def absolute(self, scale: float) -> float:
-        """In the unit of the observable."""
+        """Tolerance in the unit of the observable."""
         return self.value * scale if self.relative else self.value
 
     @classmethod

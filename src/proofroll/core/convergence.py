@@ -1,4 +1,4 @@
-"""What a ladder of steps tells: the observed order, and the limit of small steps with its uncertainty."""
+"""Observed order of a ladder of steps, and its limit for small steps with the uncertainty."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def _one_law(order: float, declared: int | None, before: FloatArray, after: Floa
 
 
 def _walked(first: FloatArray, last: FloatArray) -> float:
-    """What three further changes come to on average, where these two grow in one direction; else zero.
+    """Estimated sum of three further changes, on average, if these two grow in one direction; else zero.
 
     By more than a factor of four, what halving does to h^-2, no law grows: that is a jump of one of the runs.
     """
@@ -142,7 +142,7 @@ def observed_order(first: float, last: float, steps: Sequence[float] | FloatArra
 
 
 def _removes(term: int, h: FloatArray, power: int) -> float:
-    """How often the change from one extrapolation to the next is added once more to remove a term h^term."""
+    """Factor by which the change between two extrapolations is added again to remove a term h^term."""
     before, after = (
         float(fine**term - (coarse**term - fine**term) / ((coarse / fine) ** power - 1))
         for coarse, fine in itertools.pairwise(h)

@@ -42,7 +42,7 @@ def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) ->
 
 
 def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
-    """The variables of all elements of the scene, by the elements' names; said of all is what no two say otherwise."""
+    """Variables of all elements by the elements' names; attributes on which no two elements disagree."""
     found: dict[str, Variable] = {}
     said: dict[str, Any] = {}
     for element in scene.elements:

@@ -1,4 +1,4 @@
-"""What the harness knows of the parts of a scene. Each kind of element is a plug-in, as engines are.
+"""Protocols of the parts of a scene. Each kind of element is a plug-in, as engines are.
 
 An element is a part of a scene that no force couples to the rest: a ball on a surface, a mechanism. It brings its data
 and their bounds, what a formulation must provide to represent it, its observables with their scales, the lines of its
@@ -60,7 +60,7 @@ class StepNumber:
 
 @dataclass(frozen=True)
 class FirstMotion:
-    """How the bodies of an element set off, to be held against an engine's own first steps.
+    """Start of the bodies of an element, to be held against an engine's own first steps.
 
     Attributes:
         acceleration: of the bodies at time 0 in the world [m/s²], shape (bodies, 3).
@@ -123,11 +123,11 @@ class Element(Protocol):
 
     @property
     def requires(self) -> frozenset[str]:
-        """What a formulation must provide to represent it with these numbers; each is a text for a person."""
+        """Capabilities that a formulation must provide for these numbers; each is a text for a person."""
 
     @property
     def askable(self) -> Mapping[str, str]:
-        """What may be asked for besides the motion, by name, and what a formulation must provide where it is."""
+        """Names of what a scene may ask for besides the motion, each with the capability that it needs."""
 
     @property
     def observables(self) -> tuple[Observable, ...]:
@@ -135,7 +135,7 @@ class Element(Protocol):
 
     @property
     def length(self) -> float:
-        """Size by which positions are compared [m]; never zero."""
+        """Length scale by which positions are compared [m]; never zero."""
 
     @property
     def natural_time(self) -> float:
@@ -146,7 +146,7 @@ class Element(Protocol):
 
     @property
     def first_motion(self) -> FirstMotion | None:
-        """How it sets off; None where that has no direction yet."""
+        """Start of its motion; None where that has no direction yet."""
 
     @property
     def softened(self) -> frozenset[str]:
@@ -174,7 +174,7 @@ class Element(Protocol):
         """Size of each observable in the truth, to which a relative tolerance refers."""
 
     def certify(self, built: Any, sample: Any) -> list[Line]:
-        """What the engine built and how it starts, held against the element."""
+        """Lines of the certificate: the engine's model and its start, held against the element."""
 
     @property
     def failures(self) -> Mapping[str, str]:
@@ -224,4 +224,4 @@ class ElementKind(Protocol):
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Scenes on which a short run is held against the truth: such as show a frame taken for another."""
+        """Short scenes held against the truth, which reveal confused reference frames."""

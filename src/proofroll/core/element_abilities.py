@@ -1,4 +1,4 @@
-"""What an element may have besides: each of these protocols is optional."""
+"""Optional protocols of an element."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SeenInRun:
-    """What a watch saw.
+    """Result of a watch over a run.
 
     Attributes:
         samples: how many of the samples are of the scene.
@@ -42,10 +42,10 @@ class RunWatch(Protocol):
     """Follows one run."""
 
     def over(self, sample: Any) -> bool:
-        """Whether the model is no longer that of the scene, so that the run ends here."""
+        """True if the model is no longer that of the scene, so that the run ends here."""
 
     def conclude(self, times: FloatArray, samples: Sequence[Any], located: Sequence[Event] | None) -> SeenInRun:
-        """What was seen.
+        """Result of the watch.
 
         Args:
             times: of the samples [s]; there may be fewer samples.
@@ -56,7 +56,7 @@ class RunWatch(Protocol):
 
 @runtime_checkable
 class WatchesRuns(Protocol):
-    """What an element has besides, if it has events, or if a run can leave the scene."""
+    """Ability of an element that has events, or whose runs can leave the scene."""
 
     def watch(self, asks: Sequence[str]) -> RunWatch:
         """A watch over a run that is about to begin."""
@@ -69,7 +69,7 @@ class WatchesRuns(Protocol):
 
 @runtime_checkable
 class CountsTurns(Protocol):
-    """What an element has besides, if it has angles that go on beyond a turn."""
+    """Ability of an element whose angles go on beyond a turn."""
 
     @property
     def turn_interval(self) -> float | None:
@@ -81,7 +81,7 @@ class CountsTurns(Protocol):
 
 @runtime_checkable
 class HasOptionalCapabilities(Protocol):
-    """What an element has besides, if scenes of its kind may do without some of what a formulation can provide."""
+    """Ability of an element whose scenes may do without some capability of a formulation."""
 
     @property
     def optional(self) -> frozenset[str]:
@@ -90,10 +90,10 @@ class HasOptionalCapabilities(Protocol):
 
 @runtime_checkable
 class KnowsAnotherScene(Protocol):
-    """What an element has besides, if a model of it can be of another kind though each of its numbers is allowed."""
+    """Ability of an element whose model can be of another kind though each of its numbers is allowed."""
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]], truth: xr.Dataset) -> str | None:
-        """Why the model is of another kind, as one clause; None: it is of the same.
+        """Reason that the model is of another kind, as one clause; None: it is of the same.
 
         Args:
             lines: of a stored certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
@@ -103,10 +103,10 @@ class KnowsAnotherScene(Protocol):
 
 @runtime_checkable
 class ExplainsErrors(Protocol):
-    """What an element has besides, if it can say why a bounded path is wrong."""
+    """Ability of an element that can explain a bounded error of the path."""
 
     def cause(self, dataset: xr.Dataset, error: float) -> str | None:
-        """What an ``error`` of the deciding observable, in its unit, comes from at the end of a run.
+        """Cause of an ``error`` of the deciding observable, in its unit, at the end of a run.
 
         A name that ``meanings`` has; None: nothing that the element knows of.
         """
@@ -114,7 +114,7 @@ class ExplainsErrors(Protocol):
 
 @runtime_checkable
 class WritesPrograms(Protocol):
-    """What an element has besides, if it can write a program that shows the failure of a run."""
+    """Ability of an element that can write a program to show the failure of a run."""
 
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """Source of the program, which exits with 1 if the failure shows.

@@ -59,7 +59,7 @@ class Settings(Protocol):
 
     @property
     def formulation(self) -> str:
-        """Which of the engine's models of the scene."""
+        """Name of the engine's model of the scene."""
 
     @property
     def preset(self) -> str:
@@ -115,7 +115,7 @@ class Engine(Protocol):
         """State and reactions now, as its kind of element has them. Untimed; changes nothing."""
 
     def built(self) -> Any:
-        """What was built, read back from the engine, as its kind of element has it. At time 0; changes nothing."""
+        """Model read back from the engine, in the form of its kind of element. At time 0; changes nothing."""
 
 
 # Machine epsilon of the arithmetic in which an engine may compute, by its precision.

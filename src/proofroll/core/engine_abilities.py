@@ -1,4 +1,4 @@
-"""What an engine may have besides: each of these protocols is optional."""
+"""Optional protocols of an engine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from proofroll.core.scene import Scene
 
 @runtime_checkable
 class LocatesEvents(Protocol):
-    """What an engine has besides, if it locates stick-slip events more closely than its samples tell."""
+    """Ability of an engine that locates stick-slip events more closely than its samples."""
 
     def events(self) -> Sequence[Event]:
         """The events so far, in order, each with its bracket (one step wide for a fixed step)."""
@@ -22,14 +22,14 @@ class LocatesEvents(Protocol):
 
 @runtime_checkable
 class TellsRemarks(Protocol):
-    """What an engine has besides, if there is something about a run that a person should know though it went well."""
+    """Ability of an engine that makes remarks on a run that went well."""
 
     def remarks(self) -> Sequence[str]:
         """One clause each, without a full stop; none if there is nothing to say."""
 
 
 class Level(StrEnum):
-    """How much of the scene a formulation models, from the least to the most: the rungs of the ladder."""
+    """Share of the scene that a formulation models, from the least to the most: the rungs of the ladder."""
 
     CLOSED_FORM = "closed form"
     REDUCED = "reduced equations"
@@ -61,7 +61,7 @@ class Term:
 
 @runtime_checkable
 class TellsLevels(Protocol):
-    """What an engine has besides, to be put on the ladder of models.
+    """Ability of an engine that has a place on the ladder of models.
 
     Attributes:
         levels: formulation -> its rung.
@@ -74,23 +74,23 @@ class TellsLevels(Protocol):
 
 @runtime_checkable
 class TellsCaveats(Protocol):
-    """What an engine has besides, if some of its settings are not what the engine alone would do.
+    """Ability of an engine with settings that are not what the engine alone would do.
 
     An integrator of proofroll's around an engine's terms, say: whoever reads a verdict must not blame the engine.
     """
 
     @staticmethod
     def caveat(settings: Any) -> str:
-        """What is not the engine's own with these settings: one clause without a full stop; empty: nothing."""
+        """Part of these settings that is not the engine's own: one clause without a full stop; empty: none."""
 
 
 @runtime_checkable
 class LowersOrder(Protocol):
-    """What an engine has besides, if something in a scene lowers the order of convergence of its settings."""
+    """Ability of an engine whose order of convergence drops with something in a scene."""
 
     @staticmethod
     def lowered(settings: Any) -> Mapping[str, int]:
-        """What a scene may require, in the words of ``provides`` -> the order with it, where that is the lower one."""
+        """Capability in the words of ``provides`` -> the lower order of convergence with it."""
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
@@ -106,7 +106,7 @@ def declared_order(engine: Any, settings: Any, scene: Scene) -> int | None:
 
 @runtime_checkable
 class TellsDefaults(Protocol):
-    """What an engine has besides, if it can say what it takes where nobody chooses: for comparing its versions."""
+    """Ability of an engine that tells its default values: for comparing its versions."""
 
     @staticmethod
     def defaults() -> Mapping[str, Any]:
@@ -115,7 +115,7 @@ class TellsDefaults(Protocol):
 
 @runtime_checkable
 class SupportsFrom(Protocol):
-    """What an engine has besides, if its adapter does not run on every version of it.
+    """Ability of an engine whose adapter does not run on every version of it.
 
     Attributes:
         oldest: version of the engine from which on it does; an older one is refused with both versions.
@@ -126,7 +126,7 @@ class SupportsFrom(Protocol):
 
 @runtime_checkable
 class WritesModels(Protocol):
-    """What an engine has besides, if its own tools read a file of the model that it builds."""
+    """Ability of an engine whose own tools read a file of the model."""
 
     @classmethod
     def model_file(cls, scene: Scene, settings: Any) -> str:
@@ -139,7 +139,7 @@ class WritesModels(Protocol):
 
 @runtime_checkable
 class Reproduces(Protocol):
-    """What an engine has besides, if it can write a program that shows its behaviour without proofroll."""
+    """Ability of an engine that can write a program to show its behaviour without proofroll."""
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: Any) -> str:
@@ -157,7 +157,7 @@ class Reproduces(Protocol):
 
 @runtime_checkable
 class CannotLeaveOut(Protocol):
-    """What an engine has besides, if some of its models hold what no scene asked for and no setting takes away.
+    """Ability of an engine with models that hold terms no scene asked for and no setting removes.
 
     Attributes:
         inherent: formulation -> what is always in its model -> why.
@@ -168,7 +168,7 @@ class CannotLeaveOut(Protocol):
 
 @runtime_checkable
 class SharesEquations(Protocol):
-    """What an engine has besides, if some of its formulations rest on the equations of a route of the truth.
+    """Ability of an engine with formulations that rest on the equations of a route of the truth.
 
     Attributes:
         shares: formulation -> routes (the part of a route's name before the comma or bracket). Where the truth takes
@@ -180,7 +180,7 @@ class SharesEquations(Protocol):
 
 @runtime_checkable
 class SaysWhyNot(Protocol):
-    """What an engine has besides, if it can say why a formulation does not provide something.
+    """Ability of an engine that gives reasons for what a formulation does not provide.
 
     Attributes:
         lacking: formulation -> what it does not provide -> why, as the end of a sentence.

@@ -1,4 +1,4 @@
-"""What can go wrong, each as one sentence that a person can act on."""
+"""Errors, each with one sentence that a person can act on."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class InputError(ProofrollError):
         super().__init__(f"{field} = {_shown(value)}: {advice}")
 
     def within(self, field: str, value: object) -> InputError:
-        """The same problem as that of a larger thing, of which this is a part."""
+        """The same error, of a larger thing that holds this one."""
         return InputError(field, value, str(self))
 
     def of(self, place: str) -> InputError:
@@ -53,7 +53,7 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 @contextmanager
 def told_of(place: str) -> Iterator[None]:
-    """Problems that are found in the block are told with the name of a file, see :meth:`InputError.of`."""
+    """Context manager: adds the name of a file to an InputError raised in the block, see :meth:`InputError.of`."""
     try:
         yield
     except InputError as error:
@@ -61,14 +61,14 @@ def told_of(place: str) -> Iterator[None]:
 
 
 def no_such_key(field: str, value: object, known: Iterable[str]) -> InputError:
-    """The error for a key of a file that nothing reads, with the keys that there are."""
+    """Error for an unknown key of a file, with the known keys."""
     return InputError(field, value, f"there is no such key here; the keys are {', '.join(known)}")
 
 
 def require_known(
     field: str, name: object, known: Iterable[str], advice: str = "choose one of", given: object = None
 ) -> None:
-    """Refuses a name that is not among those that there are, of which the advice is followed by the first twenty.
+    """Raises an error unless the name is known; it lists the first twenty known names.
 
     ``given`` is what was written, where that is more than the name.
 
@@ -94,7 +94,7 @@ def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str,
 
 
 def place(error: BaseException) -> str:
-    """Where in an adapter an exception arose, as ``file:line in function``; empty if it did not arise in one.
+    """Line of an adapter that raised an exception, as ``file:line in function``; empty if none did.
 
     It is the last line of the first package outside the harness: what that package calls knows no better.
     """
@@ -112,7 +112,7 @@ def _of_engine(frame: traceback.FrameSummary) -> bool:
 
 
 def lack_behind(error: BaseException) -> BaseException | None:
-    """What the machine, not the engine, lacked where that is behind an error: memory, a file, or time (Ctrl-C)."""
+    """Lack of the machine behind an error: memory, a file, or time (Ctrl-C); None: the engine failed."""
     found: BaseException | None = error
     while found is not None and not isinstance(found, (MemoryError, OSError, KeyboardInterrupt)):
         found = found.__cause__ or found.__context__

@@ -112,7 +112,7 @@ def softness(engine: Any, scene: Scene) -> float:
 def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Line]:
     """Certificate of a freshly built engine: its own account, and the acceleration of its first steps.
 
-    Numbers that only repeat the scene's are believed of nobody. An acceleration that an engine says is held to the
+    Numbers that only repeat the scene's prove nothing. An acceleration that an engine reports is held to the
     scene exactly; its steps may differ by :data:`_STIFF`, and by what is granted to a softened one.
     """
     lines = certify(engine, scene, settings)

@@ -93,7 +93,7 @@ class Integrator(Protocol):
         """
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s] by steps of which the last ends there.
+        """Moves to time t [s]; the last step ends there.
 
         Raises:
             Diverged: it gave up.

@@ -1,6 +1,6 @@
-"""How numbers that were found are written for people: errors, costs, steps that hold.
+"""Text of computed numbers for people: errors, costs, steps that hold.
 
-A number that was given, as a parameter or the length of a run, is told as it was given, by ``:g``.
+A given number, as a parameter or the length of a run, is written as it was given, by ``:g``.
 """
 
 from __future__ import annotations
@@ -37,6 +37,6 @@ def place(values: Sequence[float] | FloatArray) -> str:
 
 
 def counted(count: int, many: str) -> str:
-    """How many, with the noun that is given for many of them: ``1 velocity``, ``2 velocities``."""
+    """Count with its noun, given in the plural: ``1 velocity``, ``2 velocities``."""
     one = f"{many.removesuffix('ies')}y" if many.endswith("ies") else many.removesuffix("s")
     return f"{count} {one if count == 1 else many}"

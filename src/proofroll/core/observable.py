@@ -1,4 +1,4 @@
-"""What a kind of element declares about each of its observables, once; all that lists, judges or plots reads it."""
+"""Declaration of an observable by its kind of element; lists, plots and verdicts read it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from enum import StrEnum
 
 
 class Role(StrEnum):
-    """What an observable is, which decides how it is held against the truth."""
+    """Role of an observable, which decides how it is held against the truth."""
 
     MOTION = "motion"  # a variable of the dataset, true to its error bar
     REACTION = "reaction"  # as motion, but without time 0, where the certificate judges it
@@ -29,12 +29,12 @@ class Observable:
             tolerance must be absolute.
         headline: whether summaries show it: the motion, and the forces that a person asks for first.
         watched: whether a first look judges it though no summary shows it.
-        decides: whether a trade-off, a stability map and a recommendation go by it where nobody says by what.
+        decides: whether a trade-off, a stability map and a recommendation go by it by default.
         asked_for: whether a person may ask for a recommendation by it.
-        column: whether a trade-off shows it beside what decides, where nobody says which quantities it shows.
+        column: whether a trade-off shows it beside what decides, by default.
         audit: whether it holds the reactions that an engine reports against the motion that it made.
         hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
-        difference_of: variable of which it is a small difference, so that it has its round-off; empty: of none.
+        difference_of: variable that it is a small difference of, and whose round-off it has; empty: none.
         absent: why no run of the scene has it, and what to change; empty: runs have it.
     """
 

@@ -71,7 +71,7 @@ def release(version: str) -> tuple[int, ...]:
 
 
 def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
-    """Whether a module is not installed, or only misspelt."""
+    """Error for a missing module: not installed, or misspelt."""
     module, where = error.name or str(error), place(error)
     whole = f"imports {module} ({where})" if where else f"is announced as {point.value}"
     top = module.partition(".")[0]
@@ -92,7 +92,7 @@ def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
 
 
 def _installed(requirement: str) -> bool:
-    """Whether a distribution is there as a package's metadata requires it; of extras nobody asked for."""
+    """True if a required distribution is installed; requirements of extras count as installed."""
     name, _, condition = requirement.partition(";")
     found = re.match(r"[\w.-]+", name)
     with suppress(PackageNotFoundError):

@@ -1,4 +1,4 @@
-"""What is simulated: elements, parameters and what is asked, frozen and typed.
+"""Scene: elements, parameters and questions, frozen and typed.
 
 A scene knows nothing of engines, and nothing of what its elements are: :mod:`proofroll.core.element` says what all of
 them have. Engines compare :attr:`Scene.requires` with what their formulations provide.
@@ -34,7 +34,7 @@ class Scene:
         elements: what it is made of.
         parameters: the numbers a user can set by name, SI units.
         folder: where the scene's file and its engine-native models lie.
-        asks: what is wanted besides the motion; what nobody asks for need not be modelled.
+        asks: what is wanted besides the motion; what is not asked for need not be modelled.
 
     Raises:
         InputError: no elements, two of one name, or something is asked that no element has.
@@ -77,7 +77,7 @@ class Scene:
 
     @cached_property
     def requires(self) -> frozenset[str]:
-        """What a formulation must be able to represent; no more than the scene needs."""
+        """Capabilities that a formulation must provide; no more than the scene needs."""
         needs = {need for element in self.elements for need in element.requires}
         asked = {element.askable[name] for element in self.elements for name in self.asks if name in element.askable}
         return frozenset(needs | asked)
@@ -93,7 +93,7 @@ class Scene:
 
     @property
     def deciding(self) -> str:
-        """The observable by which a trade-off, a map and a recommendation go where nobody says by which."""
+        """Default observable for trade-off, map and recommendation."""
         return next(name for name, item in self.observables.items() if item.decides)
 
     def observable(self, name: str, field: str = "quantity") -> Observable:

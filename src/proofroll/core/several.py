@@ -55,13 +55,13 @@ class EachAlone:
         return {name: part.built() for name, part in self.parts.items()}
 
     def remarks(self) -> Sequence[str]:
-        """Those of all, and which elements are of a kind that another formulation is for."""
+        """Remarks of all parts, and the elements that were built in another formulation."""
         telling = [part for part in self.parts.values() if isinstance(part, TellsRemarks)]
         return [*self._others, *(remark for part in telling for remark in part.remarks())]
 
 
 def each_alone(scene: Scene) -> list[Scene]:
-    """For each element the scene that holds it alone, with what is asked of it."""
+    """One scene for each element, which holds it alone with what is asked of it."""
     return [
         dataclasses.replace(scene, elements=(element,), asks=tuple(filter(element.askable.get, scene.asks)))
         for element in scene.elements
@@ -69,7 +69,7 @@ def each_alone(scene: Scene) -> list[Scene]:
 
 
 def formulation_for(requires: Collection[str], formulation: str, provides: Mapping[str, Collection[str]]) -> str | None:
-    """In which formulation an element is built, if it requires this and the run of its scene is in some formulation.
+    """Formulation that builds an element in a run of the given formulation.
 
     It is that of the run, or, of a kind of element that it knows nothing of, the first one that provides all.
 
@@ -90,7 +90,7 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
 
 
 def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection[str]]) -> bool:
-    """Whether a run in this formulation has a model of each element, and of one at least in the formulation itself."""
+    """True if a run in this formulation has a model of each element, and of one at least in the formulation itself."""
     found = [formulation_for(alone.requires, formulation, provides) for alone in each_alone(scene)]
     return None not in found and formulation in found
 
@@ -176,6 +176,6 @@ def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
 
 
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
-    """What the engine located for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None."""
+    """Events located by the engine for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None."""
     part = engine.parts[element.name] if isinstance(engine, EachAlone) else engine
     return list(part.events()) if isinstance(part, LocatesEvents) else None

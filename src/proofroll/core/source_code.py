@@ -1,4 +1,4 @@
-"""Which code a result rests on, so that none outlives a change of it."""
+"""Source code that a result rests on, so that none outlives a change of it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""When the steps of an error control stall: so small against the largest, so many in a row, that nothing is reached."""
+"""Stall of an error control: many steps in a row, each tiny against the largest."""
 
 from __future__ import annotations
 

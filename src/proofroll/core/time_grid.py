@@ -21,7 +21,7 @@ _PARTS = 10
 
 
 def sampling_interval(step: float | None) -> float:
-    """Interval between samples where nobody gives one: :data:`EVERY`, or the nearest whole number of steps [s]."""
+    """Default interval between samples: :data:`EVERY`, or the nearest whole number of steps [s]."""
     if step is None or abs(EVERY / step - round(EVERY / step)) <= 1e-6 * EVERY / step:
         return EVERY
     return max(1, round(EVERY / step)) * step

@@ -27,7 +27,7 @@ class ElementTruth(Protocol):
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """Whether it knows the truth of this element."""
+        """True if the truth of this element is known to it."""
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
@@ -49,7 +49,7 @@ class ElementTruth(Protocol):
 
 @runtime_checkable
 class FindsEdges(Protocol):
-    """What a truth has besides, if it knows where the time of an event jumps as a parameter of the scene changes."""
+    """Ability of a truth to find where the time of an event jumps as a parameter of the scene changes."""
 
     @staticmethod
     def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
@@ -69,7 +69,7 @@ class FindsEdges(Protocol):
 
 @cache
 def load_truths() -> tuple[type[ElementTruth], ...]:
-    """All that some installed package announces, by name."""
+    """All truths that installed packages announce, by name."""
     return tuple(kind for _, kind in loaded(TRUTHS))
 
 

@@ -61,7 +61,7 @@ def samples_between(scene: Scene, times: FloatArray, step: float | None = None) 
 def doubt(
     time: FloatArray, angle: FloatArray, rate: FloatArray, period: float, interval: float | None
 ) -> dict[str, Any]:
-    """What is to be said of an angle whose turns were counted at these samples, as attributes; nothing: they are sure.
+    """Attributes that say why counted turns of an angle are uncertain; empty if they are sure.
 
     Args:
         time: [s], shape (time,).

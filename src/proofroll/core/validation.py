@@ -34,7 +34,7 @@ _WORDS = {
 
 
 def strict(*types: type, finite: bool = False) -> None:
-    """Makes unknown keys of these dataclasses an error, with ``finite`` also inf and NaN, as pydantic is told."""
+    """Makes unknown keys of these dataclasses an error, with ``finite`` also inf and NaN, for pydantic."""
     for kind in types:
         config = ConfigDict(extra="forbid", allow_inf_nan=not finite)
         setattr(kind, "__pydantic_config__", config)  # noqa: B010 -- the name is pydantic's
@@ -71,7 +71,7 @@ def _turned(content: Any, found: Any, place: tuple[str, ...] = ()) -> Iterator[t
 
 @cache
 def _adapter(kind: type) -> TypeAdapter[Any]:
-    """What pydantic makes of a type: once, for it costs a hundred times what a check does."""
+    """Pydantic's adapter of a type, made once: making it costs a hundred times what a check does."""
     return TypeAdapter(kind)
 
 
@@ -92,7 +92,7 @@ def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str
 
 
 def _place(location: Iterable[str | int], content: Any) -> list[str]:
-    """Where a problem lies as a file has it: pydantic puts the names of types that may stand there in between."""
+    """Place of a problem as the file has it, without the names of types that pydantic puts in between."""
     found = []
     for part in location:
         inside = isinstance(content, Mapping) and part in content
@@ -128,7 +128,7 @@ def _first_problem(
 
 
 def advice(kind: str, said: str) -> str:
-    """What pydantic says of a problem, its type and its message, in words of ours."""
+    """Advice in our words for a problem of pydantic's, from its type and its message."""
     words = said.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
     return _WORDS.get(kind.partition("_")[0], words[0].lower() + words[1:])
 

@@ -28,7 +28,7 @@ _ROUNDINGS = 1e3
 
 
 class Verdict(StrEnum):
-    """How a run stands to the truth, from best to worst."""
+    """Standing of a run against the truth, from best to worst."""
 
     AGREES = "agrees"  # within tolerance at this step, and the ladder of steps, if there is one, confirms it
     UNCONFIRMED = "unconfirmed"  # within tolerance at this step, but the ladder does not confirm the limit
@@ -43,7 +43,7 @@ class Verdict(StrEnum):
 
 
 class LimitFinding(StrEnum):
-    """What a ladder of steps says about the limit of small steps."""
+    """Finding of a ladder of steps about the limit of small steps."""
 
     NO_LADDER = "no ladder"  # only one step was run
     WITHIN = "within tolerance"  # of the truth, and known to within the tolerance
@@ -52,7 +52,7 @@ class LimitFinding(StrEnum):
 
 
 class Doubt(StrEnum):
-    """What an ill-posed question leaves to be judged."""
+    """Part of an ill-posed question that cannot be judged."""
 
     NONE = "none"  # the question is well posed
     DIFFERENCES = "differences"  # who differs is not judged
@@ -130,7 +130,7 @@ def judge(
             an error that may come of this alone is no difference.
         sampled_bar: how far its samples leave that open; no run excuses itself by more.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
-        magnitude: of the numbers of which the curve is a difference, as positions are of a gap: it has their round-off.
+        magnitude: of the numbers whose difference the curve is, as of positions for a gap: it has their round-off.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
     """
     error = largest_difference(values, true)
@@ -180,7 +180,7 @@ def round_off_of(precision: str, size: float) -> float:
 
 @dataclass(frozen=True)
 class _Ladder:
-    """What a ladder of steps tells.
+    """Summary of a ladder of steps.
 
     Attributes:
         finding: in one word.
@@ -243,7 +243,7 @@ def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Ve
 def _reason(
     verdict: Verdict, error: float, tolerance: float, bars: tuple[float, float], unit: str, rungs: _Ladder
 ) -> str:
-    """Why the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
+    """Reason of the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
     truth_error_bar, own_bar = bars
     found, allowed, bar = *_told_apart(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if truth_error_bar > tolerance:

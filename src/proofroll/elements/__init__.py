@@ -1,1 +1,1 @@
-"""What a scene can hold, one folder per kind of element."""
+"""Elements of scenes, one folder per kind."""

@@ -32,7 +32,7 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def ordinary_content(path: Path) -> bytes:
-    """What is in an ordinary file. A pipe, which would be waited for, or a device, which may have no end, is none.
+    """Content of an ordinary file; no pipe, which would block, and no device, which may have no end.
 
     Raises:
         OSError: it cannot be read, or is no ordinary file.

@@ -39,7 +39,7 @@ def further_comparison_names() -> list[str]:
 
 
 def _order(path: Path) -> float:
-    """The place that a file asks for; of a broken one its reader is told."""
+    """Place that a file asks for; a broken file has none here, and its reader reports it."""
     try:
         order = read_toml(path).get("order", math.inf)
     except InputError:
@@ -146,7 +146,7 @@ def _prepared(where: str, content: object) -> dict[str, Any]:
 
 
 def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Observable]) -> None:
-    """What types cannot say."""
+    """Checks beyond the types."""
     _check_engine(where, row)
     require_known(f"{where}.tolerance", row.tolerance, comparison.bands)
     if row.ladder != [1.0]:

@@ -1,4 +1,4 @@
-"""Where models and files of studies lie: in an installed wheel, at the top of the repository, or in other packages."""
+"""Folders of models and files of studies: in an installed wheel, at the top of the repository, or in other packages."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def _plain_record(record: Any) -> Any:
 
 
 def record(kind: type[_Record], content: object) -> _Record:
-    """The record of which :func:`plain` made this; what has no field is left out.
+    """Record from the content that :func:`plain` made of it; keys without a field are left out.
 
     Raises:
         ValueError: it is of something else.

@@ -39,7 +39,7 @@ class SceneFile:
         asks: what is wanted besides the motion, e.g. ``orientation``.
         reason: why the scene is there, for a person.
         duration: length of a run that shows what it is about [s].
-        dt: step that is short enough for engines with a fixed one [s]; told where a run with a longer one fails, and
+        dt: step that is short enough for engines with a fixed one [s]; shown where a run with a longer one fails, and
             taken by a first look.
         tables: all others, which kinds of elements read.
     """
@@ -124,12 +124,12 @@ def scene_folder(name: str) -> Path:
 
 
 def means_scene(name: str) -> bool:
-    """Whether a scene is meant by a name that a comparison may have too; the comparison is meant where both have it."""
+    """True if a name means a scene; where a comparison has the name too, it means the comparison."""
     return source_of(name) is not None or (named_file(name) is None and (is_scene(name) or Path(name).is_dir()))
 
 
 def is_scene(name: str) -> bool:
-    """Whether a scene or a file that holds one has this name; it may be broken."""
+    """True if a scene, or a file that holds one, has this name; it may be broken."""
     try:
         return source_of(name) is not None or bool(scene_folder(name))
     except InputError:
@@ -168,7 +168,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
 
 
 def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> tuple[Element, ...]:
-    """What the tables of a file hold, each read by the kind of element that it belongs to."""
+    """Elements of the tables of a file, each read by its kind of element."""
     kinds = load_element_kinds()
     known = [name for kind in kinds for name in kind.tables]
     for name in tables:
@@ -183,7 +183,7 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, whe
 
 
 def _names(asks: object) -> list[str]:
-    """What is asked for, as a list."""
+    """Names that a scene asks for, as a list."""
     if isinstance(asks, str):
         return [asks]
     if not isinstance(asks, Sequence):

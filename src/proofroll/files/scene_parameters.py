@@ -42,7 +42,7 @@ class Parameter:
 
 
 def check_parameters(parameters: Mapping[str, Parameter], units: Iterable[str], path: Path) -> None:
-    """All that can be said of a scene's parameters without their values.
+    """Checks a scene's parameters without their values.
 
     Raises:
         InputError: an unknown unit, or what a value or a bound refers to is not there.

@@ -23,7 +23,7 @@ class SceneSource(Protocol):
 
     @staticmethod
     def content(path: Path) -> Mapping[str, Any]:
-        """What a ``scene.toml`` would say of the scene: title, source, parameters, reason, duration.
+        """Content of the scene as in a ``scene.toml``: title, source, parameters, reason, duration.
 
         Raises:
             InputError: the file is broken; the first thing that is wrong with it.
@@ -43,7 +43,7 @@ class SceneSource(Protocol):
 
 
 def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
-    """Who reads the file of this name, and the file; None: it is none of another format."""
+    """Source that reads a file of another format, with its path; None: the file is not of another format."""
     path = Path(name)
     try:
         if not path.suffix or not path.is_file():

@@ -52,7 +52,7 @@ def _too_deep(path: Path) -> InputError:
 
 
 def study_of(path: Path) -> str | None:
-    """What a file is for, its ``study``; None: a comparison, or a file that cannot be read."""
+    """Study of a file; None: a comparison, or a file that cannot be read."""
     try:
         study = read_toml(path).get("study")
     except InputError:
@@ -69,7 +69,7 @@ def study_files(study: str) -> Iterator[tuple[Path, dict[str, Any]]]:
 
 
 def study_content(path: Path, study: str) -> dict[str, Any]:
-    """What a file for a study says besides that it is for it.
+    """Content of a file for a study, without the name of the study.
 
     Raises:
         InputError: it is broken, or for something else.

@@ -167,5 +167,5 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 
 def read_some(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """The values of some variables of a stored trajectory, those that there are; see :func:`read_columns`."""
+    """Values of some variables of a stored trajectory, as far as it has them; see :func:`read_columns`."""
     return {name: column.values for name, column in read_columns(path, names).variables.items()}

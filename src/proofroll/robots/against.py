@@ -158,7 +158,7 @@ def _renamed(other: Robot, matched: Mapping[str, str]) -> Robot:
 
 
 def reading_of(robot: Robot, truth: RobotTruth) -> Reading:
-    """What an engine would answer that holds a robot, evaluated by the second formulation."""
+    """Reading of an engine that holds a robot, evaluated by the second formulation."""
     states = truth.states.completed(robot)
     d, placed = body_recursion(robot, states), poses(robot, states)
     asked = states.stacked(states.acceleration, robot)
@@ -196,7 +196,7 @@ _LAWS = ("kind", "damping", "friction", "armature", "stiffness", "rest", "lower"
 
 
 def _unlike(robot: Robot, other: Robot) -> Iterator[UnlikeValue]:
-    """What joints have in one file and not, or otherwise, in the other."""
+    """Values of joints that the two files give differently."""
     theirs = {joint.name: joint for joint in other.moving}
     groups = robot.groups, other.groups
     follows = [{mimic.joint: _written(mimic) for mimic in each.mimics} for each in (robot, other)]

@@ -60,7 +60,7 @@ def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity:
 
 
 def _subspace(joint: RobotJoint, R: Array) -> Array:
-    """Which spatial velocities (rotation first) the joint gives its child, shape (states, 6, velocities)."""
+    """Motion subspace of the joint: its spatial velocities (rotation first), shape (states, 6, velocities)."""
     zero = np.zeros((3, 3))
     if joint.kind == "free":
         E = R.transpose(0, 2, 1)

@@ -44,7 +44,7 @@ def check(
     progress: Callable[[str], None] | None = None,
     workers: Workers | None = None,
 ) -> RobotCheck:
-    """What every engine makes of a file, held against what the file says.
+    """Comparison of every engine's reading of a file with the file's meaning.
 
     Args:
         path: of a URDF or MJCF.
@@ -166,7 +166,7 @@ def bar_of(truth: RobotTruth) -> float:
 
 
 def drawn(truth: RobotTruth) -> DrawnRobot:
-    """Where every body is at rest coordinates."""
+    """Drawing of a robot: every body at rest coordinates."""
     robot = truth.robot
     zero = {joint.name: np.zeros(1) for joint in robot.moving}
     upright = {joint.name: np.eye(3)[None] for joint in robot.moving}

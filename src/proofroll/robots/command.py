@@ -121,7 +121,7 @@ def robots(
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:
-    """Check the robots of comparisons/robots.toml; exit 1 if an engine does otherwise than the file expects."""
+    """Check the robots of comparisons/robots.toml; exit 1 if an engine contradicts what the file expects."""
     from proofroll.robots.gallery import gallery
     from proofroll.robots.terminal import gallery_lines
 

@@ -1,4 +1,4 @@
-"""What a file means in a format that an engine defines: asked of that engine, in a process of its own."""
+"""Meaning of a file in a format that an engine defines: asked of that engine, in a process of its own."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def expand_robot(path: str) -> dict[str, Any]:
 
 
 def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
-    """What the engine that defines MJCF answers, and which it is; or why there is no answer."""
+    """Answer of the engine that defines MJCF, with its name; or the reason that there is none."""
     for name in reader_names():
         try:
             reader = load_reader(name)

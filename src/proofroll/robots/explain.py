@@ -1,4 +1,4 @@
-"""Why an engine differs: causes that close the difference, each with what it was before and after."""
+"""Causes that close the difference of an engine, each with the difference before and after."""
 
 from __future__ import annotations
 

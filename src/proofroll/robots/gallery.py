@@ -36,7 +36,7 @@ class Entry:
         name: unique.
         package: distribution in which the file lies.
         file: end of its path there.
-        engines: engine -> causes by which it differs; ``refuses``; ``crashed``; ``open``, also beside causes: something
+        engines: engine -> causes of its differences; ``refuses``; ``crashed``; ``open``, also beside causes: something
             stays unexplained.
         base: what carries the root of a URDF.
     """
@@ -50,7 +50,7 @@ class Entry:
 
 @dataclasses.dataclass(frozen=True)
 class _File:
-    """What ``robots.toml`` says."""
+    """Content of ``robots.toml``."""
 
     robots: list[Entry]
     title: str = ""
@@ -64,7 +64,7 @@ def read_gallery(path: str | Path | None = None) -> list[Entry]:
     """The entries of the file.
 
     Raises:
-        InputError: it is broken, or names a cause that there is not.
+        InputError: it is broken, or names an unknown cause.
     """
     path = Path(path or data_folder("comparisons") / "robots.toml")
     known = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
@@ -132,7 +132,7 @@ def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -
 
 
 def outcome(row: ImporterRow) -> list[str]:
-    """What an engine does, as a gallery expects it."""
+    """Outcome of an engine, in the words of the gallery's file."""
     if not row.layers:
         return [REFUSES] if row.status == "refused" else [row.status]
     return [*dict.fromkeys(cause.id for cause in row.causes), *([OPEN] if row.unexplained else [])]

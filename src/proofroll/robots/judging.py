@@ -1,4 +1,4 @@
-"""What an engine's answer is worth: its differences, their causes, and what is held wrongly."""
+"""Judgement of an engine's answer: its differences, their causes, and the joints it holds wrongly."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ _SAME_MASS = 1e-4
 
 
 def with_the_copy(given: reading.AsWritten, row: ImporterRow) -> str:
-    """What an engine does with a file as it is, beside what it does with the copy that was compared."""
+    """Reading of the file as it is, beside the reading of the copy that was compared."""
     if given.whole is None:
         return f"refused ({given.refused})"
     if row.held is None:
@@ -98,7 +98,7 @@ def with_the_copy(given: reading.AsWritten, row: ImporterRow) -> str:
 
 
 def _recompiler(file: RobotFile, workers: Workers | None) -> Callable[[Element], Robot | None]:
-    """What a changed file would mean; None: nothing, or the format is read by us. Each is compiled once."""
+    """Function from a changed file to its robot; None: no meaning, or we read the format. Each is compiled once."""
 
     @cache
     def compiled(content: bytes) -> Robot | None:
@@ -163,7 +163,7 @@ def opened(
 def _by_definer(
     kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, defining.Compiler]]
 ) -> tuple[_Answer, defining.Compiler]:
-    """What the engine that defines a format answers.
+    """Answer of the engine that defines a format.
 
     Raises:
         InputError: it crashed or took too long.
@@ -182,7 +182,7 @@ def _by_definer(
 
 @lru_cache(maxsize=8)
 def meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
-    """What a file of this content means; MJCF is compiled in a process, which is worth remembering.
+    """Robot of a file with this content; MJCF is compiled in a process, so the result is kept.
 
     Raises:
         InputError: it has no meaning.

@@ -61,7 +61,7 @@ class RobotTruth:
 
     @cached_property
     def scales(self) -> dict[str, float]:
-        """What a difference of 1 is at each layer: its own largest value, above the round-off of others."""
+        """Scale of each layer's difference: its own largest value, above the round-off of others."""
         if self.like is not None:
             return self.like.scales
         groups = self.robot.groups.values()
@@ -80,16 +80,16 @@ class RobotTruth:
 
     @cached_property
     def singular(self) -> bool:
-        """Whether the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
+        """True if the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
         return self.dynamics.smallest < _SINGULAR
 
     @cached_property
     def inverse(self) -> Array:
-        """What gives the accelerations of the states where there are no passive forces, shape (states, n)."""
+        """Torque for the accelerations of the states without passive forces, shape (states, n)."""
         return self._without_passive(self.states.stacked(self.states.acceleration, self.robot))
 
     def torque(self, acceleration: Array) -> Array:
-        """What gives these accelerations, shape (states, n)."""
+        """Torque for these accelerations, shape (states, n)."""
         return self._without_passive(acceleration) + self.passive
 
     def _without_passive(self, acceleration: Array) -> Array:
@@ -97,10 +97,10 @@ class RobotTruth:
 
     @cached_property
     def torques(self) -> dict[str, Array]:
-        """Those that engines are asked the forward dynamics for: what gives the accelerations of the states, by joint.
+        """Torques of the forward dynamics asked of engines: they give the accelerations of the states, by joint.
 
-        Of a robot as an engine would hold it they are those of ``like``, which engines were asked for; of a joint that
-        the file does not have none.
+        For a robot as an engine would hold it they are those of ``like``, which engines were asked for; zero for
+        a joint that the file does not have.
         """
         if self.like is not None:
             count = self.states.count
@@ -132,7 +132,7 @@ def _moves_alike(robot: Robot, other: Robot) -> bool:
 
 
 def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:
-    """How far an engine is off, by layer; a layer that the engine does not offer is left out."""
+    """Relative difference of an engine by layer; a layer that the engine does not offer is left out."""
     robot, d = truth.robot, truth.dynamics
     dofs = dict(zip(reading.joints, reading.dofs, strict=True))
     followers = {mimic.joint for mimic in robot.mimics}
@@ -175,7 +175,7 @@ def first_failing(found: dict[str, float], tolerances: dict[str, float]) -> str 
 
 
 def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
-    """How the velocities of all joints follow from those of some: joints that follow them, others at rest."""
+    """Map from the velocities of some joints to those of all: followers move with them, others are at rest."""
     columns = robot.columns
     G = np.zeros((robot.dofs, 0))
     followers = {mimic.joint: mimic for mimic in robot.mimics}

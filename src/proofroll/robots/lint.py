@@ -1,4 +1,4 @@
-"""What is wrong or risky in a robot file, before any engine sees it."""
+"""Errors and risks of a robot file, before any engine sees it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _KNOWN = {
 
 
 def lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
-    """Everything that is noticed in a file and in what it means, errors first."""
+    """Findings in a file and in its meaning, errors first."""
     own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
     found = [
         LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))

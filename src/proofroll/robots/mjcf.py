@@ -64,7 +64,7 @@ def stripped(
 
 
 def _written_out(element: Element) -> float:
-    """How many elements stand where macros are written out, about."""
+    """Approximate number of elements where macros are written out."""
     inside = 1 + sum(map(_written_out, element))
     if element.tag not in _MACROS:
         return inside

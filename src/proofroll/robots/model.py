@@ -44,7 +44,7 @@ class RobotBody:
 
     @property
     def impossible(self) -> str:
-        """Why no rigid body has this inertia, by more than round-off; empty: one may."""
+        """Reason that no rigid body has this inertia, beyond round-off; empty: one may."""
         a, b, c = self.moments
         if a < -_ROUNDING * np.abs(self.inertia).max():
             return f"is not positive definite (smallest moment {a:.3g} kg m²)"
@@ -52,7 +52,7 @@ class RobotBody:
 
     @property
     def breaks_triangle(self) -> bool:
-        """Whether the largest principal moment exceeds the sum of the others by more than round-off."""
+        """True if the largest principal moment exceeds the sum of the others by more than round-off."""
         small, middle, large = self.moments
         return bool(large > (small + middle) * (1 + _ROUNDING))
 
@@ -141,7 +141,7 @@ class Robot:
 
     @cached_property
     def columns(self) -> dict[str, slice]:
-        """Which velocities belong to which joint."""
+        """Velocities of each joint, as slices."""
         places = slices(joint.dofs for joint in self.moving)
         return {joint.name: place for joint, place in zip(self.moving, places, strict=True)}
 
@@ -168,7 +168,7 @@ class Robot:
 
     @cached_property
     def groups(self) -> dict[str, RobotBody]:
-        """What each moving joint carries rigidly, as one body in the frame of the joint's child; by joint."""
+        """Bodies that each moving joint carries rigidly, as one body in the frame of the joint's child; by joint."""
         parts: dict[str, list[tuple[RobotBody, Array, Array]]] = {joint.name: [] for joint in self.moving}
         for name, (home, p, R) in self.welded.items():
             if home != WORLD:

@@ -1,4 +1,4 @@
-"""Where an engine is off the most at a layer: the joint, the state, what it holds and what is true."""
+"""Place of an engine's largest difference at a layer: the joint, the state, the engine's number and the true one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an engine adds so that its own importer of robot files can be checked.
+"""Protocol by which an engine lets its own importer of robot files be checked.
 
 A reader is a class that a package announces in the entry-point group ``proofroll.robot_readers`` under the name of its
 engine. It runs in a process of its own. What it raises while it reads is the engine's refusal, in its own words.
@@ -21,7 +21,7 @@ GROUP = "proofroll.robot_readers"
 
 @dataclasses.dataclass(frozen=True)
 class Request:
-    """What a reader is asked.
+    """Request to a reader.
 
     Attributes:
         path: of a file that names no other file.
@@ -50,7 +50,7 @@ class Request:
 
 @dataclasses.dataclass
 class Reading:
-    """What an engine made of a file; velocities as in :mod:`proofroll.robots.states`.
+    """Reading of a file by an engine; velocities as in :mod:`proofroll.robots.states`.
 
     Attributes:
         joints: moving joints in the order of velocities.
@@ -83,7 +83,7 @@ class Reading:
     remarks: tuple[str, ...] = ()
 
     def first(self, count: int) -> Reading:
-        """What was evaluated at the first states alone."""
+        """Reading at the first states alone."""
         return dataclasses.replace(
             self,
             position={joint: rows[:count] for joint, rows in self.position.items()},
@@ -98,7 +98,7 @@ class Reading:
 
 @dataclasses.dataclass(frozen=True)
 class Whole:
-    """What an engine holds of a file as it is: the number of velocities, and the mass that joints carry [kg]."""
+    """Totals of a file as an engine reads it: the number of velocities, and the mass that joints carry [kg]."""
 
     velocities: int
     mass: float

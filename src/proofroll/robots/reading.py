@@ -58,7 +58,7 @@ def load_reader(name: str) -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class ReaderAnswer:
-    """What a reader answered.
+    """Answer of a reader.
 
     Attributes:
         version: of the engine.
@@ -78,14 +78,14 @@ class ReaderAnswer:
 
 
 class AsWritten(NamedTuple):
-    """How much an engine holds of a file as it is, or why it refuses it."""
+    """Totals of a file as it is, as an engine reads it; or the reason of its refusal."""
 
     whole: Whole | None
     refused: str
 
 
 def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit: float) -> ReaderAnswer:
-    """Has a file read and evaluated in the worker.
+    """Asks the worker to read a file and to evaluate it.
 
     Raises:
         WorkerDied: the process crashed or took longer than ``time_limit`` [s].
@@ -162,7 +162,7 @@ def _require_whole(reading: Reading, states: int) -> None:
 def ask_as_written(
     worker: Worker, engine: str, request: Request, original: Path, folder: Path, time_limit: float
 ) -> AsWritten | None:
-    """Has the file itself read in the worker; None: the reader does not offer that.
+    """Asks the worker to read the file itself; None: the reader does not offer that.
 
     Raises:
         WorkerDied: the process crashed or took longer than ``time_limit`` [s].
@@ -225,7 +225,7 @@ def call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str,
 
 
 def robot_from(data: Mapping[str, Any]) -> Robot:
-    """The robot of which :func:`proofroll.files.json_data.plain` made this; its ``sources`` stay plain."""
+    """Robot from its data by :func:`proofroll.files.json_data.plain`; its ``sources`` stay plain."""
     return Robot(
         data["name"],
         {name: RobotBody(**_arrays(body)) for name, body in data["bodies"].items()},
@@ -237,7 +237,7 @@ def robot_from(data: Mapping[str, Any]) -> Robot:
 
 
 def states_from(data: Mapping[str, Any]) -> RobotStates:
-    """The states of which :func:`proofroll.files.json_data.plain` made this."""
+    """States from their data by :func:`proofroll.files.json_data.plain`."""
     return RobotStates(**{field: _arrays(by_joint) for field, by_joint in data.items()})
 
 

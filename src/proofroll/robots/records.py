@@ -1,4 +1,4 @@
-"""What a check of a robot file, and of the gallery's robots, says: as records."""
+"""Records of a check of a robot file, and of the gallery's robots."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from proofroll.robots.robot_file import LintFinding
 
 @dataclass(frozen=True)
 class HeldLayer:
-    """How far an engine is off at a layer, and whether that is within the tolerance."""
+    """Difference of an engine at a layer, and whether it is within the tolerance."""
 
     difference: float
     tolerance: float
@@ -21,13 +21,13 @@ class HeldLayer:
 
 @dataclass(frozen=True, kw_only=True)
 class ImporterRow:
-    """What one engine's importer makes of a file.
+    """Reading of a file by one engine's importer.
 
     Attributes:
         engine: as the user wrote it.
         status: ``holds``, ``explained``, ``differs``, ``refused``, ``missing``, or how its process ended.
         message: why it holds nothing; None where it holds something.
-        says: what is told with every reading of this engine.
+        says: remark on every reading of this engine.
         remarks: of its reader, on this file.
         layers: those that it offers.
         causes: of its differences.
@@ -58,7 +58,7 @@ class ImporterRow:
 
     @property
     def differs(self) -> bool:
-        """Whether it does not hold the model that the file describes, for a reason that is not accepted."""
+        """True if the engine holds a different model, or none, for a reason that is not accepted."""
         known = self.status == "explained" and (self.fed or self.accepted)
         return self.status not in {"holds", "missing"} and not known
 
@@ -70,7 +70,7 @@ class ImporterRow:
 
 @dataclass(frozen=True)
 class UsedTruth:
-    """By whose reading the file has its meaning, and the largest relative ``difference`` of the two formulations."""
+    """Source of the file's meaning, and the largest relative ``difference`` of the two formulations."""
 
     by: str
     difference: float
@@ -81,7 +81,7 @@ class UsedTruth:
 
 @dataclass(frozen=True)
 class DrawnBody:
-    """Where a body is at rest coordinates [m], and its mass [kg]."""
+    """Position of a body at rest coordinates [m], and its mass [kg]."""
 
     position: list[float]
     mass: float
@@ -89,7 +89,7 @@ class DrawnBody:
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """What a joint connects."""
+    """Kind and ends of a joint."""
 
     name: str
     kind: str
@@ -99,7 +99,7 @@ class DrawnJoint:
 
 @dataclass(frozen=True)
 class DrawnRobot:
-    """What a drawing of a robot needs."""
+    """Data for a drawing of a robot."""
 
     name: str
     joints: list[DrawnJoint]
@@ -122,7 +122,7 @@ class RobotCheck:
 
 @dataclass(frozen=True)
 class UnlikeValue:
-    """What a joint has in one file ``here`` and in another ``there``; null where a file gives none."""
+    """Value of a joint in one file ``here`` and in another ``there``; null where a file gives none."""
 
     joint: str
     quantity: str
@@ -152,7 +152,7 @@ class AgainstCheck(RobotCheck):
 
 @dataclass(frozen=True)
 class GalleryReading:
-    """What an engine ``does`` with a robot, in the words of the gallery's file."""
+    """Reading of a robot by an engine; ``does`` is its outcome in the words of the gallery's file."""
 
     engine: str
     version: str | None

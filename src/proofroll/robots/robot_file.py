@@ -21,7 +21,7 @@ BASES = ("fixed", "free")
 
 @dataclasses.dataclass(frozen=True)
 class LintFinding:
-    """What is noticed in a file.
+    """Finding in a file.
 
     Attributes:
         level: ``error`` (breaks the format or physics), ``warning`` (engines treat it differently) or ``note``.

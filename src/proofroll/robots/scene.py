@@ -165,7 +165,7 @@ def _quaternion(R: Array) -> Any:
 
 
 def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
-    """What of a robot no scene of bodies and joints has, each as a clause."""
+    """Parts of a robot that no scene of bodies and joints has, each as a clause."""
     for mimic in robot.mimics:
         yield f"joint {mimic.joint} following {mimic.other} (mimic)"
     if file.kind != "mjcf":

@@ -38,7 +38,7 @@ class RobotStates:
 
     @property
     def count(self) -> int:
-        """How many states there are."""
+        """Number of states."""
         return len(next(iter(self.velocity.values()), ()))
 
     def first(self, count: int) -> RobotStates:

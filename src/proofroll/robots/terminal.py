@@ -33,7 +33,7 @@ _COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused"
 
 
 def check_parts(content: RobotCheck) -> Iterator[Table | str]:
-    """What was read, what each engine holds, and what that means."""
+    """Text of a check: the file, each engine's reading, and the causes."""
     yield from lines(content)
     yield table(content)
     yield from verdict_lines(content)
@@ -68,7 +68,7 @@ def amount(value: float | None, digits: int = 2) -> str:
 
 
 def lines(content: RobotCheck) -> Iterator[str]:
-    """What was read, what is wrong with the file, and every engine's causes, in lines of at most 80 characters."""
+    """Lines on the file, its errors, and every engine's causes, of at most 80 characters."""
     truth = content.truth
     base = f", {content.base} base" if content.kind == "urdf" else ""
     moves, states = counted(truth.velocities, "velocities"), counted(truth.states, "states")
@@ -79,7 +79,7 @@ def lines(content: RobotCheck) -> Iterator[str]:
 
 
 def finding_lines(findings: Sequence[LintFinding]) -> Iterator[str]:
-    """What was noticed, what is the same at several places once, with their number."""
+    """Lines of findings; equal ones at several places are one line with their number."""
     places: dict[tuple[str, str], list[str]] = {}
     for finding in findings:
         places.setdefault((finding.level, finding.what), []).append(finding.where)
@@ -89,7 +89,7 @@ def finding_lines(findings: Sequence[LintFinding]) -> Iterator[str]:
 
 
 def verdict_lines(content: RobotCheck) -> Iterator[str]:
-    """What each engine does, with proof, and with the file as it is."""
+    """Lines on each engine's reading, with proof, and on the file as it is."""
     written: dict[str, list[str]] = {}
     for row in content.engines:
         if row.as_written:
@@ -104,7 +104,7 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
 
 
 def against_lines(content: AgainstCheck) -> Iterator[str]:
-    """How joints were matched, and what they have in one file and not in the other."""
+    """Lines on how joints were matched, and on values that only one file has."""
     here, there = (Path(name).name for name in (content.file, content.against))
     if here == there:
         here, there = content.file, content.against
@@ -127,7 +127,7 @@ def _value(value: float | str | None) -> str:
 
 
 def sentences(row: ImporterRow) -> Iterator[str]:
-    """What one engine does, a sentence each."""
+    """Sentences on one engine's reading."""
     name = row.named
     if row.says and row.layers:
         yield f"{name}: {row.says}"

@@ -1,4 +1,4 @@
-"""What is true of a robot at given states, by two formulations that share only the motion within one joint.
+"""Truth of a robot at given states, by two formulations that share only the motion within one joint.
 
 A, here: Jacobians in world axes, M = Σ Jᵀ I J, and h from the accelerations that remain at zero joint accelerations.
 B, :mod:`proofroll.robots.body_recursion`: recursive Newton-Euler with spatial vectors in body axes.
@@ -18,7 +18,7 @@ from proofroll.robots.states import RobotStates
 
 @dataclasses.dataclass(frozen=True)
 class Dynamics:
-    """What the equation of motion M a + h + passive = τ holds; the first axis counts states.
+    """Terms of the equation of motion M a + h + passive = τ; the first axis counts states.
 
     Attributes:
         M: mass matrix with armature, shape (states, n, n).
@@ -31,7 +31,7 @@ class Dynamics:
     h: Array
 
     def first(self, count: int) -> Dynamics:
-        """Those of the first states alone."""
+        """Terms at the first states alone."""
         return Dynamics(self.M[:count], self.g[:count], self.h[:count])
 
     @cached_property
@@ -96,7 +96,7 @@ def skew(r: Array) -> Array:
 
 @dataclasses.dataclass
 class _Motion:
-    """Of a body in world axes: Jacobians, angular velocity, accelerations at zero joint accelerations."""
+    """Motion of a body in world axes: Jacobians, angular velocity, accelerations at zero joint accelerations."""
 
     Jv: Array
     Jw: Array
@@ -130,7 +130,7 @@ def world_jacobians(robot: Robot, states: RobotStates) -> Dynamics:
 
 
 def armature(robot: Robot) -> Array:
-    """Of every velocity, shape (n,)."""
+    """Armature of every velocity, shape (n,)."""
     return np.concatenate([np.zeros(0), *(np.full(joint.dofs, joint.armature) for joint in robot.moving)])
 
 

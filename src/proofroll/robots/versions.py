@@ -34,7 +34,7 @@ class RobotVersions:
 
 
 def between(file: str, old: str, new: str) -> VersionsStudy:
-    """How two versions, ``NAME`` or ``NAME@PLACE``, hold a robot file, as the content of `proofroll versions`.
+    """Comparison of two versions, ``NAME`` or ``NAME@PLACE``, on a robot file, as content of `proofroll versions`.
 
     Raises:
         InputError, Missing: see :func:`proofroll.robots.check.check`.

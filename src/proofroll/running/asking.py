@@ -1,4 +1,4 @@
-"""What engines say of themselves and of cases, each asked in a worker process."""
+"""Descriptions of engines and facts of cases, each asked in a worker process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _waiting_for(engine: str) -> Iterator[None]:
 def _answers(
     requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = _START_UP_SECONDS
 ) -> list[dict[str, Any] | ProofrollError]:
-    """What engines answer to requests, or why they do not, in the order given; their processes start together."""
+    """Answers of engines to requests, or their errors, in the order given; their processes start together."""
     found: dict[int, dict[str, Any] | ProofrollError] = {}
 
     def ask(engine: str, lent: Workers) -> None:
@@ -53,7 +53,7 @@ def _answers(
 
 
 def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
-    """What an engine is, provides and has as presets; asked in a process of its own.
+    """Description of an engine with what it provides and its presets; asked in a process of its own.
 
     Raises:
         InputError, Missing, WorkerDied: it cannot be asked.
@@ -65,7 +65,7 @@ def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
 
 
 def described(engines: Iterable[str], workers: Workers | None = None) -> dict[str, EngineDescription | ProofrollError]:
-    """What each engine tells of itself, or why it cannot be asked."""
+    """Description of each engine, or the error in asking it."""
     names = list(dict.fromkeys(engines))
     found: dict[str, EngineDescription | ProofrollError] = {}
     for name, told in zip(names, _answers([(n, {"do": "describe", "engine": n}) for n in names], workers), strict=True):
@@ -96,7 +96,7 @@ def resolve_with_truth(
     workers: Workers | None = None,
     requires: Collection[str] = (),
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
-    """As :func:`resolve`, and what the truth says of itself.
+    """Facts as by :func:`resolve`, and the truth's.
 
     Raises:
         ProofrollError: the truth cannot be asked.
@@ -110,7 +110,7 @@ def resolve_with_truth(
 def prepare(engine: str, workers: Workers) -> None:
     """Starts an engine's process and lets it import what a run needs, while the caller has other things to do.
 
-    What is wrong with the engine is left to whoever asks it next.
+    An error of the engine is left to the next request.
     """
     with contextlib.suppress(ProofrollError):
         name = parse_engine(engine).name

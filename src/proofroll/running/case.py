@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Status(StrEnum):
-    """How a case ended."""
+    """Status of a case at its end."""
 
     DONE = "done"
     DIVERGED = "diverged"
@@ -39,7 +39,7 @@ LASTING = frozenset({Status.DONE, Status.DIVERGED, Status.REFUSED, Status.WRONG_
 
 @dataclass(frozen=True)
 class EngineDescription:
-    """What an engine tells of itself before any settings are chosen.
+    """Description of an engine before any settings are chosen.
 
     Attributes:
         name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
@@ -48,11 +48,11 @@ class EngineDescription:
         provides: formulation -> what it can represent, sorted.
         presets: formulation -> preset -> complete settings.
         summary: one line for a person.
-        levels: formulation -> rung of the ladder of models; empty where it does not tell.
+        levels: formulation -> rung of the ladder of models; empty if not declared.
         terms: what can be switched on and off.
         inherent: formulation -> what is always in its model -> why.
-        defaults: what it takes where nobody chooses.
-        oldest: version from which on its adapter supports it; empty: it does not tell.
+        defaults: its default values.
+        oldest: version from which on its adapter supports it; empty: not declared.
     """
 
     name: str
@@ -70,7 +70,7 @@ class EngineDescription:
 
 @dataclass(frozen=True)
 class EngineFacts:
-    """What an engine says of itself with some settings.
+    """Facts of an engine with some settings.
 
     Attributes:
         name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
@@ -82,7 +82,7 @@ class EngineFacts:
         lowered: what a scene may require -> the order with it, see
             :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
-        caveat: what of these settings is not the engine's own, to be said wherever it is judged; empty: nothing.
+        caveat: what of these settings is not the engine's own, shown beside its verdicts; empty: nothing.
         precision: in which it computes, see :func:`proofroll.core.engine.precision_of`.
         libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
             hash of all its packages.
@@ -112,7 +112,7 @@ class EngineFacts:
 
 @dataclass(frozen=True)
 class Case:
-    """What one run needs to know.
+    """Request of one run.
 
     Attributes:
         scene: name of the scene.
@@ -158,7 +158,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """What came of a case.
+    """Result of a case.
 
     Attributes:
         status: how it ended.

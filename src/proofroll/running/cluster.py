@@ -76,7 +76,7 @@ class Cluster:
 
     @property
     def threads(self) -> int:
-        """How many cases it runs at once, as counted a moment ago."""
+        """Number of cases it runs at once, as counted a moment ago."""
         self._most()
         return self._threads
 
@@ -161,7 +161,7 @@ class Cluster:
             return not self._stopped
 
     def _most(self) -> int:
-        """How many cases the cluster may hold."""
+        """Largest number of cases the cluster may hold."""
         if time.monotonic() - self._counted > _COUNTED:
             self._threads, self._counted = sum(self._client.nthreads().values()), time.monotonic()
         return _AHEAD * self._threads + _AT_LEAST
@@ -201,7 +201,7 @@ class Cluster:
             arrived(case, partial(_made, content, data))
 
     def _gone(self, error: Exception | None) -> ProofrollError:
-        """What ends a run, in one line."""
+        """Error that ends a run, in one line."""
         if isinstance(error, ProofrollError):
             return error
         if error is None or isinstance(error, (CancelledError, OSError)):
@@ -224,7 +224,7 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
 
 
 def _files(case: Case) -> dict[str, bytes]:
-    """What is in the folder of a scene of the user's own, or its robot file, which no other machine need have."""
+    """Files of a scene folder of the user's own, or of its robot file: no other machine need have them."""
     if (source := source_of(case.scene)) is not None:
         return {source[1].name: source[1].read_bytes()}
     folder = scene_folder(case.scene) if case.scene else Path()

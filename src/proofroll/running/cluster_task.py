@@ -1,4 +1,4 @@
-"""What a worker of a Dask cluster does: one case in the same watched process that would run it at home."""
+"""Worker of a Dask cluster: one case in the same watched process that would run it at home."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Unfit(ProofrollError):  # noqa: N818 -- a fact about a worker, which ends 
 
 @dataclasses.dataclass(frozen=True)
 class Asked:
-    """What a command wants of every Dask worker.
+    """Request of a command to every Dask worker.
 
     Attributes:
         command: a name of its own, under which its processes are kept and ended.
@@ -61,7 +61,7 @@ class Asked:
 def installed() -> dict[str, str]:
     """Versions of Python, of proofroll with a hash of its code, of every engine and of what engines and truths need.
 
-    It is told from the metadata of packages: no engine is imported.
+    It comes from the metadata of packages: no engine is imported.
     """
     engines = announced(GROUP)
     extras = {point.name for point in engines} | {"fast"}
@@ -110,11 +110,11 @@ def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) 
 
 
 def call(asked: Asked, function: Callable[[Any], Any], item: Any) -> tuple[str, Any]:
-    """What a function gives for an item, computed in a watched process; before it the machine's name.
+    """Result of a function for an item, computed in a watched process, after the machine's name.
 
     Raises:
         Unfit: as :func:`run_case`.
-        ProofrollError: the process ended, or the function said so.
+        ProofrollError: the process ended, or the function raised it.
     """
     workers = _workers_of(asked)
     text = base64.b64encode(pickle.dumps((function, item))).decode()
@@ -160,7 +160,7 @@ def _workers_of(asked: Asked) -> Workers:
 
 
 def _check(asked: Asked, case: Case, workers: Workers) -> None:
-    """Whether the case is the same here: its engine with all that decides its results, and its scene."""
+    """Checks that the case is the same here: its engine with all that decides its results, and its scene."""
     engine = case.engine
     known = asked.command, engine.name, engine.code
     if known not in _same:

@@ -38,15 +38,15 @@ def interrupt_held() -> Iterator[None]:
 
 
 def end_with(parent: int) -> None:
-    """From now on this process ends, with all that it started, soon after ``parent`` has, even while it computes."""
+    """Makes this process end, with all that it started, soon after ``parent`` has, even while it computes."""
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
 def end_with_pipe(pipe: int) -> None:
-    """From now on the system ends this process and its group as soon as nobody can write into a pipe any more.
+    """Makes the system end this process and its group when no process can write into a pipe any more.
 
     This also holds while an engine that computes in C lets no thread of Python run; only Linux can do it. ``pipe`` is
-    its end for reading; into the other nobody ever writes.
+    its end for reading; nothing is ever written into the other.
     """
     if hasattr(fcntl, "F_SETSIG"):
         with contextlib.suppress(OSError):

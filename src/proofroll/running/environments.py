@@ -60,7 +60,7 @@ class Environment:
 
 
 def root() -> Path:
-    """Where environments are kept: ``PROOFROLL_ENGINES``, or ``proofroll/engines`` below ``XDG_DATA_HOME``."""
+    """Folder of environments: ``PROOFROLL_ENGINES``, or ``proofroll/engines`` below ``XDG_DATA_HOME``."""
     chosen = os.environ.get(VARIABLE)
     if chosen:
         return Path(chosen).expanduser().absolute()
@@ -70,7 +70,7 @@ def root() -> Path:
 
 
 def remembered() -> list[Environment]:
-    """All that are remembered, by name and label."""
+    """Remembered environments, by name and label."""
     found = (_read(stamp.parent) for stamp in sorted(root().glob(f"*/*/{STAMP}")))
     return [item for item in found if item is not None]
 

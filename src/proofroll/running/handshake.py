@@ -1,4 +1,4 @@
-"""What a worker says first, so that nobody takes the numbers of another proofroll, or of another place, for its own."""
+"""First message of a worker, which keeps numbers of another proofroll, or of another place, apart."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ PROTOCOL = 2
 
 
 def hello(place: str) -> dict[str, Any]:
-    """Who this worker is. From now on it is the one for engines ``NAME@place``, and for no other."""
+    """Identity of this worker, which becomes the one for engines ``NAME@place`` alone."""
     from proofroll.running import loading
 
     loading.settle(place)
@@ -35,7 +35,7 @@ def own() -> dict[str, Any]:
 
 
 def mismatch(answer: Mapping[str, Any]) -> str:
-    """Why a worker with this answer cannot serve here; empty: it can.
+    """Reason that a worker with this answer cannot serve here; empty: it can.
 
     Its code must be the same, not only its version: it reads the scene, certifies and records.
     """
@@ -50,7 +50,7 @@ def mismatch(answer: Mapping[str, Any]) -> str:
 
 
 def libraries(engine: str) -> dict[str, str]:
-    """What besides an engine and its adapter decides the last digits of its results.
+    """Libraries besides an engine and its adapter that decide the last digits of its results.
 
     In another interpreter all its packages count, for engines bring libraries of their own; of a program it itself.
     """

@@ -1,4 +1,4 @@
-"""What an engine is, and what decides its results: its settings, its versions and the code that they rest on."""
+"""Identity of an engine: its settings, its versions and the code that its results rest on."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ASIDE = frozenset(
 
 
 def describe(engine: str) -> dict[str, Any]:
-    """What an engine is and provides, and where its formulations stand on the ladder of models."""
+    """Description of an engine, with the rungs of its formulations on the ladder of models."""
     from proofroll.core.engine_abilities import CannotLeaveOut, SupportsFrom, TellsDefaults, TellsLevels
     from proofroll.running.loading import load
 
@@ -96,7 +96,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
 
 
 def truth_version() -> str:
-    """Of proofroll, and of the libraries by which the truth is integrated."""
+    """Version of proofroll, and of the libraries that integrate the truth."""
     found = [f"proofroll {proofroll.__version__}"]
     for name in ("numpy", "scipy", "heyoka"):
         with contextlib.suppress(metadata.PackageNotFoundError):

@@ -14,7 +14,7 @@ Found = TypeVar("Found")
 
 
 def in_processes(function: Callable[[Item], Found], items: Sequence[Item], workers: int) -> Iterator[Found]:
-    """What a function gives for each item, in order, in so many processes; 1 computes in this one.
+    """Results of a function for each item, in order, from some processes; 1 computes in this one.
 
     The function and its results can be pickled. Ctrl-C ends the processes that compute.
     """
@@ -36,7 +36,7 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
 
 
 def end_with_pool() -> None:
-    """As :func:`proofroll.running.ending.end_with`, for a process of a :class:`concurrent.futures.ProcessPoolExecutor`.
+    """Variant of :func:`proofroll.running.ending.end_with` for a process of a ``ProcessPoolExecutor``.
 
     Such a process waits on a pipe that all of them hold open, and so for ever when their parent is killed.
     """

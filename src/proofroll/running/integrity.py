@@ -1,4 +1,4 @@
-"""What in a worker's process judges engines: whether an engine has put something of its own there."""
+"""Check of a worker's process: an engine must not replace the functions that judge it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where an engine ``NAME@PLACE`` runs: a worker in another Python, which has proofroll and the engine."""
+"""Engines ``NAME@PLACE``: a worker in another Python, which has proofroll and the engine."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def _install(engine: str) -> str:
 
 
 def _explained(engine: str, python: Path, error: ProofrollError) -> ProofrollError:
-    """Why a worker did not say who it is, as far as the Python itself can tell."""
+    """Error that says why a worker did not identify itself, as far as the Python itself can tell."""
     if isinstance(error, WorkerDied) and error.status == Status.TIMEOUT:
         return WorkerDied(error.status, f"{engine}: {python} did not answer within {HELLO_SECONDS:g} s")
     with contextlib.suppress(OSError, subprocess.SubprocessError, ValueError, TypeError, LookupError):

@@ -17,7 +17,7 @@ _settled = ""
 
 
 def settle(place: str) -> None:
-    """From now on this process runs engines ``NAME@place``."""
+    """Makes this process the one for engines ``NAME@place``."""
     global _settled  # noqa: PLW0603 -- a fact about the process, said once when it starts
     _settled = place
 

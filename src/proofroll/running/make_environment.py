@@ -152,7 +152,7 @@ def _made(
 
 
 def _install_by_pip(venv: Path, base: Path, wanted: Sequence[str], tell: Callable[[str], None]) -> None:
-    """By the pip of this Python, where it may serve: to install another into the environment takes seconds."""
+    """Installs by the pip of this Python, where it may serve: another in the environment takes seconds to install."""
     target = venv / "bin" / "python"
     if base == Path(sys.executable) and find_spec("pip"):
         _call([base, "-m", "venv", "--without-pip", venv])
@@ -229,7 +229,7 @@ def _wheel(item: metadata.Distribution, folder: Path) -> Path:
 
 
 def _call(command: Sequence[str | Path]) -> str:
-    """What a program prints; it ends, with all that it started, when this process is interrupted."""
+    """Output of a program; it ends, with all that it started, when this process is interrupted."""
     try:
         process = subprocess.Popen(
             command,

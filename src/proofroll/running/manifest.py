@@ -1,4 +1,4 @@
-"""What a trajectory says about how it was made."""
+"""Manifest of a trajectory: how it was made."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from proofroll.core.scene import Scene
 
 
 def versions(engine: str, version: str) -> dict[str, str]:
-    """Of the engine, of proofroll, Python, numpy and scipy."""
+    """Versions of the engine, of proofroll, Python, numpy and scipy."""
     own = {"proofroll": proofroll.__version__, "python": platform.python_version()}
     return {engine: version} | own | {name: metadata.version(name) for name in ("numpy", "scipy")}
 

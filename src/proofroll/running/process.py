@@ -144,7 +144,7 @@ class Worker:
         raise WorkerDied(Status.CRASHED, "the engine wrote into the answers of its process, which was ended")
 
     def request(self, request: Mapping[str, Any], time_limit: float) -> dict[str, Any]:
-        """As :meth:`ask`, with the errors that the worker met raised here.
+        """Answer as by :meth:`ask`; errors that the worker met are raised here.
 
         Raises:
             InputError, Missing, WorkerDied: the worker says so, or it ended.
@@ -215,7 +215,7 @@ class Worker:
             self._said = b""
 
     def _ended(self) -> bool:
-        """Whether the process has ended. It is not reaped yet, so that its group cannot become somebody else's."""
+        """True if the process has ended. It is not reaped yet, so that no other process can get its group."""
         if self._process.returncode is not None:
             return True
         if not hasattr(os, "waitid"):  # macOS before Python 3.13: there what the process started outlives it
@@ -226,7 +226,7 @@ class Worker:
             return True
 
     def _last_words(self) -> str:
-        """How the process ended, and the last line it wrote."""
+        """Way in which the process ended, and the last line it wrote."""
         self._open = [item for item in self._open if item == self._words]
         deadline = time.monotonic() + _GRACE
         while not (ended := self._ended()) and time.monotonic() < deadline:
@@ -274,7 +274,7 @@ class Worker:
 
 
 def _starved(process: int) -> float:
-    """How long [s] the process or a descendant, whichever waited longest, was ready while others had the processor.
+    """Time [s] that the process or the longest waiting descendant was ready while others had the processor.
 
     On a machine with other work a wall clock says more about that work than about an engine. The kernel counts how long
     every thread waited in the queue of a processor (``schedstat``, second number); a process that hangs asleep waits in

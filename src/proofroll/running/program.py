@@ -101,7 +101,7 @@ def _in_arrays(said: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _Built:
-    """What the program says that it built; None: nothing."""
+    """Report of the program on its model; None: nothing."""
 
     regularised: ClassVar[Mapping[str, Any]] = {}
 
@@ -127,7 +127,7 @@ class Program:
 
     @classmethod
     def version(cls) -> str:
-        """As the program says."""
+        """Version as the program gives it."""
         return str(cls.told["version"])
 
     @classmethod
@@ -166,7 +166,7 @@ class Program:
         return self._sample_type(**_in_arrays(said))
 
     def built(self) -> _Built:
-        """What the program said when it was built."""
+        """Report of the program on the model it built."""
         return self._built
 
     def __del__(self) -> None:

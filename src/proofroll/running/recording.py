@@ -32,7 +32,7 @@ _UNIT = 1e-3
 
 @dataclass(frozen=True)
 class Recording:
-    """What a run gave before it ended.
+    """Recording of a run up to its end.
 
     Attributes:
         columns: the trajectory up to the last finite sample.
@@ -134,7 +134,7 @@ _NOT_FINITE = "is not finite (NaN or overflow)"
 
 
 def noticed(message: str) -> bool:
-    """Whether a failure's sentence says that a sample was not finite: noticed here, not said by the engine."""
+    """True if a failure's sentence reports a sample that was not finite: noticed here, not by the engine."""
     return message.partition(" ")[2].startswith(_NOT_FINITE)
 
 
@@ -149,7 +149,7 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
 
 
 def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) -> None:
-    """A state that is told at time 0 is told at all times."""
+    """Requires at each time the variables of the state that the sample at time 0 has."""
     for element in scene.elements:
         before, now = sample_of(scene, element, first), sample_of(scene, element, sample)
         for name in Sample.widths:

@@ -111,7 +111,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
 
 
 def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
-    """What an engine answers, unless the machine made it say so: then there is no answer."""
+    """Result for an engine's refusal or divergence, unless the machine caused it: then there is none."""
     if lack := lack_behind(error):
         raise ProofrollError(f"{error} ({type(lack).__name__})")
     status = Status.REFUSED if isinstance(error, Refused) else Status.DIVERGED
@@ -137,7 +137,7 @@ def _run_truth(scene: Any, times: Any, besides: tuple[Any, Any], out: Path, vers
 
 
 class _TimeAccounts:
-    """Where the time of a case goes.
+    """Accounts of the time of a case, by cause.
 
     Attributes:
         seconds: wall seconds by cause [s].
@@ -153,7 +153,7 @@ class _TimeAccounts:
         self._since = time.perf_counter(), now
 
     def on(self, cause: str, **parts: tuple[float, float]) -> None:
-        """What has passed since the last call went to ``cause``, but for ``parts`` of it that had another.
+        """Books the time since the last call on ``cause``, but for ``parts`` of it with causes of their own.
 
         Each part is a pair of wall and processor seconds [s].
         """

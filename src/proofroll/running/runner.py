@@ -103,7 +103,7 @@ class Runner:
         ready: deque[tuple[Case, Result]] = deque()
 
         def ask(case: Case) -> int:
-            """How many more answers will arrive: one, or none where the answer is there already."""
+            """Number of answers that will still arrive: one, or none where the answer is there already."""
             if case.key in asked:
                 return 0
             asked.add(case.key)
@@ -216,7 +216,7 @@ class Runner:
             self.workers.keep(engine, worker)
 
     def _lacks_speed(self, case: Case, stored: Result) -> bool:
-        """Whether a stored result has no speed only because it comes from another machine: then it is run here."""
+        """True if a stored result has no speed only because it comes from another machine: then it is run here."""
         return bool(case.timed and stored.host and stored.status == Status.DONE and self.cluster is None)
 
     def _arrive(self, arrived: _Arrived, case: Case, make: Callable[[Path], Result]) -> bool:
@@ -281,7 +281,7 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
 
 
 def ended(case: Case, status: Status, error: ProofrollError) -> Result:
-    """What comes of a case that has none of the worker's own results."""
+    """Result of a case without a result of the worker."""
     return Result(status, str(error), versions={plain_name(case.engine.name): case.engine.version})
 
 

@@ -48,7 +48,7 @@ class Stopwatch:
         return float(rate) if rate is not None else None
 
     def close(self) -> None:
-        """Gives the workers back to whoever lent them, or ends them."""
+        """Gives the workers back to their lender, or ends them."""
         for name, worker in self._workers.items():
             self._lent.keep(name, worker)
         self._workers.clear()

@@ -79,7 +79,7 @@ class Store:
             yield Path(place) / self.trajectory(case).name
 
     def has(self, case: Case) -> bool:
-        """Whether there is a record of the case, sound or not."""
+        """True if there is a record of the case, sound or not."""
         return os.path.lexists(self.folder / f"{case.key}.json")
 
     def put(self, case: Case, result: Result, written: Path | None = None) -> Result:

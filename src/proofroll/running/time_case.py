@@ -1,4 +1,4 @@
-"""How fast an engine is: runs that only advance it, up to a last sample, and end where the judged run does."""
+"""Speed of an engine: runs that only advance it, up to a last sample, and end where the judged run does."""
 
 from __future__ import annotations
 

@@ -48,13 +48,13 @@ class Interval:
 
     @property
     def known(self) -> bool:
-        """Whether it is an interval of at least 95 %, rather than the range of too few values."""
+        """True if it is an interval of at least 95 %, rather than the range of too few values."""
         return self.confidence >= CONFIDENCE
 
 
 @dataclass(frozen=True)
 class Timing:
-    """What repeated measurements of one thing gave.
+    """Values of repeated measurements.
 
     Attributes:
         values: one per round, in the order of the rounds [s].
@@ -104,12 +104,12 @@ def interleaved(
 
 
 def ratio(numerator: Timing, denominator: Timing) -> Interval:
-    """How many times longer the one takes than the other, round by round; both from one call of :func:`interleaved`."""
+    """Ratio of two times, round by round; both from one call of :func:`interleaved`."""
     return _interval(np.array(numerator.values) / np.array(denominator.values))
 
 
 def named(confidence: float) -> str:
-    """What an interval with this confidence is to be called: the range of too few values is no interval of 95 %."""
+    """Name of an interval with this confidence: the range of too few values is no interval of 95 %."""
     if not confidence:
         return "measured once"
     return f"{'interval' if confidence >= CONFIDENCE else 'range'} of {100 * confidence:.3g} %"
@@ -129,7 +129,7 @@ def _interval(values: np.ndarray[Any, np.dtype[np.float64]]) -> Interval:
 
 
 def machine() -> dict[str, str]:
-    """What the machine is, as far as speed is concerned."""
+    """Facts of the machine that matter for speed."""
     return {
         "processor": _processor(),
         "cores": str(os.cpu_count()),

@@ -38,7 +38,7 @@ class WaitingCases:
             self._changed.notify_all()
 
     def take(self, engine: str | None) -> Case | None:
-        """The next case, of this engine if there is one, else of one that nobody has begun; None: it is closed.
+        """Next case, of this engine if it has one, else of one that no worker has begun; None: it is closed.
 
         Where all are begun, the one with the most cases left is shared. Where there is none, it waits for one.
         """

@@ -76,7 +76,7 @@ class Workers:
             _close(self._idle)
 
     def kill(self) -> None:
-        """Ends all workers that were made here, also those that are lent: whoever waits for one hears that it died."""
+        """Ends all workers that were made here, lent ones among them: a process that waits for one sees it died."""
         with self._lock:
             made = list(self._made)
         for worker in made:

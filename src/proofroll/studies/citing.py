@@ -49,7 +49,7 @@ class Cited:
 
     @property
     def heading(self) -> str:
-        """What it is, in a few words."""
+        """Subject of the citation, in a few words."""
         known = f" {', '.join(self.versions)}" if self.versions else ""
         return f"{self.name}{known}" if self.kind == "suite" else f"{self.kind} {self.name}{known}"
 
@@ -59,7 +59,7 @@ _Named = tuple[str, str, str]
 
 
 def cited(subjects: Iterable[str]) -> list[Cited]:
-    """What is behind results, comparisons, scenes or engines; without a scene all truths are cited.
+    """Sources behind results, comparisons, scenes or engines; without a scene all truths are cited.
 
     Args:
         subjects: files of results (``.json`` of a command, ``.nc`` or ``.npz`` of a run), comparisons, scenes, names of
@@ -114,7 +114,7 @@ def _named(subject: str) -> list[_Named]:
 
 
 def _document(path: Path) -> object:
-    """What a file of results says of itself."""
+    """Content of a file of results that names engines and scenes."""
     try:
         if path.suffix == ".json":
             return json.loads(path.read_text(encoding="utf-8"))
@@ -125,7 +125,7 @@ def _document(path: Path) -> object:
 
 
 def _walk(content: object) -> Iterator[_Named]:
-    """Every engine and scene that a document of ours names, wherever it does."""
+    """Engines and scenes that a document of ours names, at any place."""
     if isinstance(content, list):
         for item in content:
             yield from _walk(item)
@@ -173,7 +173,7 @@ def _beside(modules: Iterable[str]) -> list[str]:
 
 
 def _folder(module: str) -> Path | None:
-    """Where the nearest ``references.bib`` of a module lies: beside it, or in a package around it."""
+    """Folder of a module's nearest ``references.bib``: beside it, or in a package around it."""
     first, *rest = module.split(".")
     spec, folders = find_spec(first), []
     while spec is not None and spec.submodule_search_locations:
@@ -235,7 +235,7 @@ def _names(authors: str) -> str:
 
 
 def content(told: Iterable[Cited]) -> list[dict[str, Any]]:
-    """As plain data, for ``--json``."""
+    """Plain data for ``--json``."""
     return [
         dataclasses.asdict(item) | {"references": [{"bibtex": entry, **fields(entry)} for entry in item.references]}
         for item in told

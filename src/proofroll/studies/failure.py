@@ -1,4 +1,4 @@
-"""What went wrong in a run, by its trajectory, and whether the engine said so.
+"""Failure of a run, from its trajectory, and whether the engine reported it.
 
 Signs that only a kind of element has, as a ball off its wall, come from the elements.
 """
@@ -52,13 +52,13 @@ def meanings(scene: Scene) -> Mapping[str, str]:
 
 @dataclass(frozen=True)
 class RunOutcome:
-    """What a run gave.
+    """Outcome of a run.
 
     Attributes:
         stable: it reached the end without a sign of failure, and was not wrong by the whole range.
         accurate: and the deciding observable held 1 % of its range; where there is no truth the same as stable.
         failure: what went wrong first, if it was not accurate.
-        silent: it failed, and the engine did not say so.
+        silent: it failed, and the engine did not report it.
         error: largest error of the deciding observable in parts of its range; None if it is not known.
         time: when the failure showed [s].
         message: how the run ended.
@@ -75,7 +75,7 @@ class RunOutcome:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """What a run is measured by.
+    """Yardstick of a run.
 
     Attributes:
         scene: what was run.
@@ -93,7 +93,7 @@ class Yardstick:
 
     @classmethod
     def of(cls, scene: Scene, truth: xr.Dataset | None) -> Yardstick:
-        """From the truth, or, where there is none, from the scene alone."""
+        """Yardstick from the truth, or, where there is none, from the scene alone."""
         name = scene.deciding
         if truth is None:
             return cls(scene, None, name, None, 1.0)
@@ -102,7 +102,7 @@ class Yardstick:
 
 
 def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
-    """What a run gave: how it ended, and its trajectory as far as it went, held against the yardstick of its place."""
+    """Outcome of a run from its end and its trajectory, held against the yardstick of its place."""
     early = {
         Status.CRASHED: CRASHED,
         Status.TIMEOUT: TOO_SLOW,
@@ -148,7 +148,7 @@ def _failed(
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
-    """Of the deciding observable at each sample, of several components the largest, in parts of its range."""
+    """Error of the deciding observable at each sample, the largest component in parts of its range."""
     if yardstick.true is None:
         return None
     values = dataset[yardstick.name].to_numpy()
@@ -159,7 +159,7 @@ def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
 
 
 def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[str, float] | None:
-    """What makes the run unstable first, and when [s]; None: it is stable as far as it went."""
+    """First sign of instability, and its time [s]; None: the run is stable as far as it went."""
     times = dataset["time"].to_numpy()
     shown: dict[str, int] = {}
     scene, truth = yardstick.scene, yardstick.truth
@@ -180,7 +180,7 @@ def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None)
 
 
 def _wrong(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray, index: int) -> str:
-    """Why a bounded path is wrong at a sample: what the element of the deciding observable knows, or lost phase."""
+    """Cause of a wrong bounded path at a sample: from the element of the deciding observable, or lost phase."""
     scene = yardstick.scene
     reached = dataset.isel(time=slice(0, index + 1))
     for element in scene.elements:

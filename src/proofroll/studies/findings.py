@@ -1,4 +1,4 @@
-"""What was found out about engines: a file each under ``findings/``, with a program with the engine alone."""
+"""Findings about engines: a file each under ``findings/``, with a program with the engine alone."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class EngineFinding:
 
 
 class FindingState(StrEnum):
-    """What a program says of what is installed."""
+    """State of a finding with the installed versions."""
 
     SHOWS = "still shows"
     GONE = "gone"
@@ -86,7 +86,7 @@ def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
     """All findings, by name; of some engines alone, if any are named.
 
     Raises:
-        InputError: a file that is none, or an engine of which there is no finding.
+        InputError: a file that is no finding, or an engine without one.
     """
     found = [read_finding(path) for path in sorted(data_folder("findings").glob("*.md"))]
     wanted = list(engines)

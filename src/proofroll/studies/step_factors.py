@@ -16,7 +16,7 @@ _LADDERS = (USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
 
 
 def unfit(factors: Sequence[float], step: float, times: FloatArray) -> InputError | None:
-    """Why a ladder does not fit between the samples, or None; the last interval may be shorter than the others."""
+    """Error for a ladder that does not fit between the samples, or None; the last interval may be shorter."""
     for factor in factors:
         for start, end in (times[:2].tolist(), times[-2:].tolist()):
             try:

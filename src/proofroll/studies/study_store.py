@@ -1,6 +1,6 @@
-"""Studies that take minutes, kept as files, and believed while what they hang on is what it was.
+"""Cache of slow studies; valid while its inputs are unchanged.
 
-What decides their numbers besides the question is told without importing a single engine.
+The inputs besides the question are found without importing a single engine.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def code() -> str:
 
 @dataclass(frozen=True)
 class Measured:
-    """When, on which machine and with which versions and code a study was made."""
+    """Time, machine, versions and code of a study."""
 
     when: str
     machine: dict[str, str]
@@ -90,12 +90,12 @@ class Measured:
 
 
 def measured() -> Measured:
-    """Of a study that is being made."""
+    """Time, machine, versions and code of a study that is being made."""
     return Measured(datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"), machine(), versions(), code())
 
 
 def changes(measured: Measured) -> list[str]:
-    """What is another than when a study was measured, as short texts; empty if it still holds here."""
+    """Inputs that changed since the study was measured, as short texts; empty if it is still valid here."""
     found = []
     then, now = measured.machine, machine()
     found += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]

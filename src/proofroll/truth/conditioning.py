@@ -1,7 +1,7 @@
-"""How well a sequence of events is posed: what happens when the parameters are a little different.
+"""Conditioning of a sequence of events: its change with slightly changed parameters.
 
 Which events come, and in which order, may hang on less than round-off: a crest of the needed friction that just reaches
-the friction there is, a slip that all but stops. What arithmetic does there says nothing of the question. So the same
+the friction there is, a slip that all but stops. The arithmetic decides there, not the question. So the same
 motion is followed with its parameters moved down and up by a part :data:`MOVE`, far above round-off: the question is
 well posed where the same events come, and where they and the motion between them move evenly.
 """
@@ -33,7 +33,7 @@ Events = Sequence[tuple[str, float]]
 
 @dataclass(frozen=True)
 class Story:
-    """What happens: kind and time [s] of each event, and states at times, each relative to its scale, shape (n, k)."""
+    """Sequence of events: kind and time [s] of each, and states at times, each relative to its scale, shape (n, k)."""
 
     events: Events
     states: Callable[[FloatArray], FloatArray]

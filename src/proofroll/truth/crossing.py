@@ -1,4 +1,4 @@
-"""Where a smooth function first rises through zero: also when it does so twice within one step."""
+"""First rise of a smooth function through zero: also when it rises and falls within one step."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ _ZERO, _FOLDED = 0.0, (0.0, 1.0)
 
 
 def is_zero(a: Scalar) -> bool:
-    """Whether it is the plain float zero."""
+    """True for the plain float zero."""
     return type(a) is float and a == 0.0
 
 

@@ -1,4 +1,4 @@
-"""What can happen to the command itself: a full disk, Ctrl-C, a second run into the same folder. Real processes."""
+"""Faults around the command itself: a full disk, Ctrl-C, a second run into the same folder. Real processes."""
 
 from __future__ import annotations
 

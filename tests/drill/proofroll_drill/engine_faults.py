@@ -1,4 +1,4 @@
-"""What an engine can do to its process, and what can happen to a stored result; each in a runner of its own."""
+"""Faults of an engine in its process, and of stored results; each in a runner of its own."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def drill_engine(site: Site, sound: Path, fault: EngineFault) -> Drilled:
 
 
 def _commands(said: str) -> bool:
-    """Whether a terminal on which this is shown gets more than text."""
+    """True if a terminal that shows this gets more than text."""
     shown = io.StringIO()
     Screen(file=shown, color_system=None).print(said, markup=False)
     return not shown.getvalue().replace("\n", "").isprintable()

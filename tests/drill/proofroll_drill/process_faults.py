@@ -1,4 +1,4 @@
-"""What can happen to the process that runs cases: it dies while it stores, while it waits, while a pool computes."""
+"""Faults of the process that runs cases: it dies while it stores, while it waits, while a pool computes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def drill_storing(site: Site, sound: Path) -> Drilled:
 
 
 def drill_killed(site: Site, sound: Path) -> Drilled:
-    """What runs a case is killed while the engine hangs: it can do nothing any more for the process of the engine."""
+    """Kills the process that runs cases while the engine hangs: nothing is left to end the engine's process."""
     return _ended_by(signal.SIGKILL, site, sound, "is killed", "waits_for_its_parent", "was killed by SIGKILL")
 
 
@@ -95,7 +95,7 @@ def _ended_by(sent: signal.Signals, site: Site, sound: Path, name: str, formulat
 
 
 def drill_pool(site: Site, sound: Path) -> Drilled:
-    """What computes a map in a pool of processes is killed."""
+    """Kills a process that computes a map in a pool."""
     folder = site.folder / "pool"
     shutil.copytree(sound, folder)
     script = site.folder / "pool.py"  # a program whose processes are spawned must be a file

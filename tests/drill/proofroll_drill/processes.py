@@ -50,7 +50,7 @@ print(json.dumps({key: [result.status, result.message] for key, result in result
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process ended, and what it wrote."""
+    """End of a process, and its output."""
 
     code: int
     out: str
@@ -108,7 +108,7 @@ def end(process: subprocess.Popen[str]) -> Ended:
 
 
 def wait_until(reached: Callable[[], bool], seconds: float = LIMIT) -> bool:
-    """Whether something is reached in time."""
+    """Waits until a condition holds; False if it does not in time."""
     deadline = time.monotonic() + seconds
     while not (found := reached()) and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -116,7 +116,7 @@ def wait_until(reached: Callable[[], bool], seconds: float = LIMIT) -> bool:
 
 
 def alive(process: int) -> bool:
-    """Whether a process runs; one that only waits to be reaped does not."""
+    """True if a process runs; one that waits to be reaped does not."""
     with contextlib.suppress(OSError):
         return Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] not in "ZX"
     return False

@@ -39,7 +39,7 @@ def robot_files(folder: Path) -> list[Path]:
 def checked_files(
     folders: Sequence[Path], every: int, states: int, progress: Callable[[str], None]
 ) -> Iterator[FileOutcome]:
-    """Checks every n-th file of the folders, each of which holds all that its files name."""
+    """Checks every n-th file of the folders; each folder holds all that its files name."""
     with lent_workers(None) as workers:
         for folder in folders:
             for path in robot_files(folder)[::every]:

@@ -1,4 +1,4 @@
-"""What a drill says of one fault."""
+"""Row of a drill: the outcome of one fault."""
 
 from __future__ import annotations
 

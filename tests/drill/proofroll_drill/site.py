@@ -1,4 +1,4 @@
-"""Where a drill takes place: a temporary folder in which its engine is announced, and comparisons and cases of it."""
+"""Site of a drill: a temporary folder in which its engine is announced, with comparisons and cases of it."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ class Site:
         return runner
 
     def compare(self, claim: Path, out: Path) -> None:
-        """What ``proofroll compare`` does with a comparison file, here."""
+        """Runs ``proofroll compare`` on a comparison file, here."""
         compare(load_comparison(str(claim)), self.runner(out / "cases"))
 
     def case(self, formulation: str, speed: float, time_limit: float = _LIMIT) -> Case:
@@ -104,7 +104,7 @@ class Site:
         (self.folder / "cured" / formulation).touch()
 
     def alive(self, formulation: str) -> bool:
-        """Whether a process in which the fault happened, or a child of it, goes on living."""
+        """True if a process in which the fault happened, or a child of it, goes on living."""
         path = self.folder / f"alive-{formulation}"
         deadline = time.monotonic() + GONE
         while path.exists():
@@ -168,5 +168,5 @@ def contents(store: Path) -> dict[str, str]:
 
 
 def scraps(store: Path) -> list[str]:
-    """What lies in a folder of results without being one."""
+    """Names of files in a folder of results that are no results."""
     return [path.name for path in store.iterdir() if path.suffix not in {".json", ".npz"} or path.name.startswith(".")]

@@ -1,4 +1,4 @@
-"""What came of the faults as a table on the terminal."""
+"""Outcomes of the faults as a table on the terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What README.md says of Drake's accuracy."""
+"""Accuracy as README.md states it."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def error(scene, engine, name, until, **settings):
 
 
 def test_terms_are_exact():
-    """With Drake's mass matrix, bias and Jacobian a ball rolls as it should to round-off."""
+    """A ball on Drake's mass matrix, bias and Jacobian rolls as it should to round-off."""
     assert error("sphere_in_cylinder", "drake[formulation=terms]", "z", 0.2) < 1e-13
 
 
@@ -37,6 +37,6 @@ def test_loops_of_discrete_plants_are_of_first_order(scene, until):
 
 
 def test_a_continuous_plant_has_no_loops():
-    """What Drake has for discrete plants alone is refused, with the way out."""
+    """Loops, which Drake has for discrete plants alone, are refused, with the way out."""
     with pytest.raises(proofroll.Refused, match="take formulation=discrete"):
         proofroll.simulate(proofroll.load_scene("bricard"), "drake[formulation=continuous]", until=0.1, every=0.1)

@@ -1,4 +1,4 @@
-"""What README.md says of PyBullet's accuracy."""
+"""Accuracy as README.md states it."""
 
 import numpy as np
 import pytest

@@ -32,7 +32,7 @@ class EventCell:
 
 @dataclass(frozen=True)
 class SlipLine:
-    """Slips of the truth or of a ``run``, of which ``count`` events in all; no cells where it failed."""
+    """Slips of the truth or of a ``run``, with the ``count`` of all its events; no cells where it failed."""
 
     run: ReportedRun | None
     first: Event | None
@@ -108,7 +108,7 @@ def between(event: Event) -> str:
 
 
 def bracket(event: Event) -> str:
-    """How far an event may be from its time [s]: ``±5e-4``, or ``-1e-3 +2e-9`` where the sides are unlike."""
+    """Bracket of an event around its time [s]: ``±5e-4``, or ``-1e-3 +2e-9`` where the sides are unlike."""
     low, high = event.time - event.time_low, event.time_high - event.time
     if not (math.isfinite(low) and math.isfinite(high)):
         return "no bracket"

@@ -34,7 +34,7 @@ CURVE = "needed_friction"
 
 @dataclass(frozen=True)
 class TrueSlips:
-    """What the report says of the truth's slips: the bounds of friction, the first slip and all events."""
+    """Slips of the truth in the report: the bounds of friction, the first slip and all events."""
 
     mu_static: float | None
     mu_kinetic: float | None
@@ -82,7 +82,7 @@ def _run_facts(truth: Onset | None, run: Run, store: Store) -> RunSlips:
 
 
 def ill_posed(truths: Sequence[ReportedTruth]) -> list[str]:
-    """Where the time of the first slip hangs on less than the parameters are known to."""
+    """Sentence on first slips that are sensitive below parameter precision; empty if there are none."""
     onsets = [(truth.point, truth.own.onset) for truth in truths if truth.own is not None]
     found = [(point, onset) for point, onset in onsets if onset.verdict == "ill-posed"]
     if not found:

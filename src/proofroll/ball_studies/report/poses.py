@@ -1,7 +1,7 @@
-"""Where a ball is, how it is turned and what presses on it at the frames of a replay, from a stored trajectory.
+"""Place, orientation and forces of a ball at the frames of a replay, from a stored trajectory.
 
 Trajectories are sampled for comparison, not for the eye: between two samples a fast ball turns by half a revolution.
-The rates that lie beside the positions say what happened between them.
+The stored rates give the motion between them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Poses:
         normal: e1, from the ball towards the wall, shape (n, 3).
         press: N [N], shape (n,), or None if no force is reported.
         friction: F2 e2 + F3 e3, on the ball, in the world [N], shape (n, 3), or None.
-        state: SLIPS, STICKS or AWAY, shape (n,), or None if nobody says.
+        state: SLIPS, STICKS or AWAY, shape (n,), or None if unknown.
     """
 
     time: FloatArray
@@ -95,7 +95,7 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
 
 
 def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.uint8] | None:
-    """What the contact does at each frame, as the events tell it, which are finer in time than the samples.
+    """State of the contact at each frame, from the events, which are finer in time than the samples.
 
     Without a bound on its friction a ball that touches the wall sticks; ``flies``: it does not touch it at first.
     """

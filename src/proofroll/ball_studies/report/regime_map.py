@@ -52,7 +52,7 @@ def regime_content(maps: Sequence[xr.Dataset]) -> dict[str, Any]:
 
 
 def _outside(item: xr.Dataset) -> int | None:
-    """How many runs without resistance contradict the analytic boundaries; None where there are none."""
+    """Count of runs without resistance that contradict the analytic boundaries; None without boundaries."""
     if item.attrs["rolling_resistance"] > 0 or "mu_falls" not in item:
         return None
     mu = item["mu_static"].to_numpy()
@@ -62,7 +62,7 @@ def _outside(item: xr.Dataset) -> int | None:
 
 
 def counts(maps: Sequence[xr.Dataset]) -> list[dict[str, Any]]:
-    """What of the maps goes into a report: how many runs became what, and the analytic boundaries."""
+    """Summary of the maps for a report: counts of runs by regime, and the analytic boundaries."""
     kept = ("rolling_resistance", "until", "runs", "counts", "outside_boundaries")
     found = [{key: item[key] for key in kept} for item in regime_content(maps)["maps"]]
     for entry, item in zip(found, maps, strict=True):

@@ -37,7 +37,7 @@ class RegimesPart(Part):
 
     @staticmethod
     def line(entry: PartEntry) -> str:
-        """How many runs became what."""
+        """Counts of runs by regime."""
         maps = entry.study["maps"]
         total = {word: sum(item["counts"][word] for item in maps) for word in maps[0]["counts"]}
         return ", ".join(f"{count} {word}" for word, count in total.items())

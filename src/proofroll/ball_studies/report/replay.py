@@ -31,12 +31,12 @@ _FROM = (-1.15, 0.5)
 
 
 def seen(scene: Scene) -> float:
-    """How far a ball can be off and look right [m]."""
+    """Largest invisible error of a ball's place [m]."""
     return _SEEN * rolling_ball(scene).ball.radius
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
-    """What the replay draws of a ball: see :data:`proofroll.report.replay.records.Drawer`."""
+    """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
     sampled = replayed.true_values([*NEEDED, *coordinates])

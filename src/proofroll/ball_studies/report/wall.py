@@ -65,7 +65,7 @@ def wall(body: RollingBall, u: FloatArray) -> Wall:
 
 
 def middle(body: RollingBall, u: FloatArray) -> FloatArray:
-    """For each point of a path the one that a camera keeps in sight [m], shape (n, 3): on the axis of what comes round.
+    """Camera targets for the points of a path [m], shape (n, 3): on the axis of a closed surface.
 
     Args:
         body: the scene's ball.

@@ -1,8 +1,8 @@
-"""Why a run is not the scene's motion: hypotheses, each proven by what it leaves of the difference.
+"""Causes of a motion unlike the scene's: hypotheses, each proven by what it leaves of the difference.
 
 A kind of element brings its hypotheses (:class:`ExplainsRuns`). Each looks at a run, its truth and its certificate, and
 says what the difference would be if the engine did one thing otherwise. It is named only where that closes the
-difference; what nobody can prove is not said.
+difference; an unproven cause is not named.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _ALTERNATIVES = 2
 
 @dataclass(frozen=True)
 class Evidence:
-    """What there is to explain.
+    """Facts that a diagnosis explains: certificate, run and truth.
 
     Attributes:
         element: what was to be simulated.
@@ -61,13 +61,13 @@ class Cause:
 
     Attributes:
         id: of the hypothesis.
-        says: what the engine does, as a clause; empty: a method's own error does it as well, so that it accuses nobody,
+        says: what the engine does, as a clause; empty: a method's own error does it as well, so it is no accusation,
             and is no proof of anything else.
         quantity, unit: of the difference that it closes.
         before, after: difference without and with the hypothesis, in ``unit``.
         remedy: what an author looks at.
         fitted: how many numbers were chosen so that it closes.
-        covers: further quantities that it explains, of which no other cause is looked for.
+        covers: further quantities that it explains; no other cause is looked for.
         closes: largest part of the difference that it may leave.
         alternative: whether it explains what another cause explains as well: from outside the two look the same.
         explains: how many independent numbers of the difference it closes; None: as many as there are samples.
@@ -99,7 +99,7 @@ class Cause:
 
     @property
     def sentence(self) -> str:
-        """What it does, and the proof."""
+        """Clause about the engine, with the proof."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         before, after = number(self.before), number(self.after, 1)
         return f"{self.says} ({self.quantity} off by {before}{unit}, by {after}{unit} with that)"
@@ -120,7 +120,7 @@ class Hypothesis:
     test: Callable[[Evidence], Iterable[Cause]]
 
     def proven(self, evidence: Evidence) -> bool:
-        """Whether some cause of it is."""
+        """True if some cause of the hypothesis is proven."""
         return any(cause.proven for cause in self.test(evidence))
 
 
@@ -131,7 +131,7 @@ def hypothesis(name: str, grounds: str) -> Callable[[Callable[[Evidence], Iterab
 
 @runtime_checkable
 class ExplainsRuns(Protocol):
-    """What a kind of element (:class:`proofroll.core.element.ElementKind`) has besides, if it can explain its runs."""
+    """Ability of a kind of element (:class:`proofroll.core.element.ElementKind`): explains its runs."""
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:
@@ -165,7 +165,7 @@ def _share(one: Cause, other: Cause) -> bool:
 
 
 def _rivals(cause: Cause, first: Cause) -> bool:
-    """Whether a cause explains as much as the first one and as well, and is not only a part of it."""
+    """True if a cause explains as much as the first one and as well, and is not only a part of it."""
     as_good = cause.fitted == first.fitted and cause.left <= _AS_GOOD * first.left
     whole = cause.quantity == first.quantity or first.quantity in cause.covers
     return as_good and whole and cause.id != first.id
@@ -177,7 +177,7 @@ def _unsure(cause: Cause, other: Cause) -> bool:
 
 
 def hypotheses_of(element: Element) -> Sequence[Hypothesis]:
-    """Those of the element's kind: the one in whose package it is defined."""
+    """Hypotheses of the element's kind: the kind in whose package the element is defined."""
     from proofroll.core.plugins import load_element_kinds
 
     package = type(element).__module__.rpartition(".")[0]
@@ -188,7 +188,7 @@ def hypotheses_of(element: Element) -> Sequence[Hypothesis]:
 
 
 def above_round_off(difference: float, size: float) -> bool:
-    """Whether a difference is large enough to have a cause other than round-off."""
+    """True if a difference is too large for round-off."""
     return bool(np.isfinite(difference) and difference > _LEAST * max(size, 1e-300))
 
 

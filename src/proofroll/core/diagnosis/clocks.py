@@ -1,4 +1,4 @@
-"""Whether what is said at one time is true at another: a shift of all times, or a factor on them.
+"""Errors of reported times: a shift of all times, or a factor on them.
 
 The true curve is laid through its samples; the first and last few, beyond which it would be needed, are left out.
 """
@@ -20,7 +20,7 @@ _PACE = 0.25
 
 
 def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """What both say throughout, shape (time, numbers); None: too few samples."""
+    """Numbers that are finite in both throughout, shape (time, numbers); None: too few samples."""
     if len(time) < _FEWEST:
         return None
     flat, held = said.reshape(len(time), -1), true.reshape(len(time), -1)
@@ -29,7 +29,7 @@ def _comparable(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[F
 
 
 def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
-    """By how much what is said is late [s], and the differences without and with that; None: too few samples."""
+    """Delay of the reported values [s], and the differences without and with it; None: too few samples."""
     from scipy.interpolate import make_interp_spline
 
     found = _comparable(time, said, true)
@@ -51,7 +51,7 @@ def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, f
 
 
 def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
-    """How many times as fast time runs in what is said, and the differences without and with that; None: too few."""
+    """Factor on the speed of reported time, and the differences without and with it; None: too few samples."""
     from scipy.interpolate import make_interp_spline
 
     found = _comparable(time, said, true)

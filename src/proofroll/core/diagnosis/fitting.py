@@ -78,18 +78,18 @@ def said_factor(factor: float) -> str:
 
 
 def telling(factor: float) -> bool:
-    """Whether a factor is a mistake's, or too far from one for a method's error."""
+    """True if a factor is a known mistake, or too far from one for a method's error."""
     return known_factor(factor) is not None or abs(factor - 1) > _METHOD
 
 
 def possible(factor: float, signed: bool) -> bool:
-    """Whether a number of a scene can have this factor; only of what is ``signed`` the sign is mistaken, in whole."""
+    """True if a number of a scene can have this factor; a wrong sign is possible for ``signed`` numbers alone."""
     return factor >= 0 or (signed and known_factor(factor) is not None)
 
 
 @dataclass(frozen=True)
 class Residuals(Generic[M]):
-    """What models of an element leave of a difference.
+    """Residuals of a difference under models of an element.
 
     Attributes:
         left: what a model leaves, as one row of numbers; infinite for None, which is no model.
@@ -98,7 +98,7 @@ class Residuals(Generic[M]):
         closes: part of it that a proof may leave.
         covers: quantities that follow from the model.
         plain: the scene's own model.
-        others: models that differ from it in one number each; what they change together is all that can be told apart.
+        others: models that differ from it in one number each; their changes span all that is distinguishable.
         contradicted: whether something that the engine says, and that holds, speaks against a model.
     """
 
@@ -125,7 +125,7 @@ class Residuals(Generic[M]):
         return len(self.left(self.plain)) < 2
 
     def explained(self, model: M | None) -> int:
-        """How many independent numbers a model changes: as many as it and the other models tell apart among them."""
+        """Count of independent numbers that a model changes and that the other models can tell apart."""
         change = self.left(model) - self.left(self.plain)
         size = np.abs(change)
         if not np.all(np.isfinite(size)) or not np.any(size):
@@ -135,7 +135,7 @@ class Residuals(Generic[M]):
         return int(np.sum(values > self.closes * np.max(values)))
 
     def largest(self, model: M | None) -> float:
-        """What a model leaves at most."""
+        """Largest residual of a model."""
         return float(np.max(np.abs(self.left(model)), initial=0.0))
 
     def fit(self, model: Callable[[float], M | None], start: float) -> float:
@@ -170,7 +170,7 @@ def any_gravity(
     gravity_of: Callable[[Any], FloatArray],
     falling: Callable[[Any, FloatArray], Any],
 ) -> Hypothesis:
-    """That gravity points another way.
+    """Hypothesis: gravity points another way.
 
     Args:
         residuals: what models of an element are held against.

@@ -29,7 +29,7 @@ def differing(lines: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
 
 
 def scale_of(line: Mapping[str, Any]) -> float:
-    """What a line's difference is relative to, in its unit."""
+    """Scale of a line's difference, in its unit."""
     apart = float(np.max(np.abs(np.subtract(line["found"], line["expected"]))))
     return apart / line["difference"] if apart and line["difference"] else 1.0
 
@@ -81,7 +81,7 @@ def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothes
 
 
 def _otherwise(line: Mapping[str, Any]) -> str:
-    """A number that was built otherwise: by which factor, if it is one, and both numbers."""
+    """Text of a quantity built wrongly: its factor, if one factor explains it, and both numbers."""
     found, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
     own = {field.name: line[field.name] for field in dataclasses.fields(Line)}
     one, other = told_apart(*worst_numbers(Line(**own), _SHOWN))

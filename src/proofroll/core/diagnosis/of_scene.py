@@ -1,4 +1,4 @@
-"""Why a run of a scene does not agree: what its elements' hypotheses prove, for everybody who shows a run."""
+"""Diagnosis of a run that does not agree: causes that the hypotheses of its elements prove."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ class Diagnosis:
 
     @property
     def sentence(self) -> str:
-        """For a person."""
+        """Sentence for a person."""
         if self.cause.alternative:
             return f"or, which looks the same from outside: {self.cause.sentence}"
         return f"{self.seen}: {self.cause.sentence}" if self.seen else self.cause.sentence
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: the cause with its numbers, and the sentence."""
+        """The cause with its numbers and the sentence, for JSON."""
         return {"element": self.element, "sentence": self.sentence, **dataclasses.asdict(self.cause)}
 
 
@@ -59,8 +59,8 @@ def diagnosed(
     """The proven causes of all elements of a scene.
 
     ``lines`` are those of the stored certificate, ``run`` and ``truth`` trajectories at the same times, ``step`` is the
-    engine's [s]. Where there are judgements of observables, an element of which all is right is not looked at: what is
-    left of it are round-off and truncation, which any fault may seem to close.
+    engine's [s]. Where there are judgements of observables, an element whose observables are all right is left out:
+    the rest is round-off and truncation, which any fault may seem to close.
     """
     if run is None and all(line["holds"] for line in lines):
         return []
@@ -89,7 +89,7 @@ def diagnosed(
 
 
 def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:
-    """Which of the observables that a person asks for first agree and which do not: ``the path is right and N is not``.
+    """Headline observables that agree and those that do not: ``the path is right and N is not``.
 
     Empty unless some are right and some are not.
     """

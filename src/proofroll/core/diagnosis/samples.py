@@ -1,6 +1,6 @@
-"""Hypotheses that a right motion is told wrongly, in samples or at its start, of any element with poses and twists.
+"""Hypotheses of wrong reports of a right motion, in samples or at the start, of any element with poses and twists.
 
-Its variables are ``p_WB``, ``v_WB``, ``w_WB`` and perhaps ``q_WB``; what else is said of it, its kind tests itself.
+Its variables are ``p_WB``, ``v_WB``, ``w_WB`` and perhaps ``q_WB``; its kind tests further variables.
 """
 
 from __future__ import annotations
@@ -59,10 +59,10 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
 
 
 def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[str, ...]) -> Hypothesis:
-    """That all that is said belongs to another time than it is said to.
+    """Hypothesis: all samples are reported with a time offset, or with stretched times.
 
     Args:
-        state: of an element and a run: all that is said of the motion [m], shape (time, …).
+        state: reported motion of an element and a run [m], shape (time, …).
         covers: what it explains.
     """
 
@@ -95,7 +95,7 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
 
 
 def _alike(said: FloatArray, true: FloatArray) -> FloatArray:
-    """Weights by which each part of a state differs as much: speeds must not hide that places are off otherwise."""
+    """Weights that give each part of a state an equal largest error: speeds must not hide wrong positions."""
     off = np.abs(said - true).reshape(-1, said.shape[-1]).max(axis=0)
     largest = float(np.max(off))
     return np.where(off > _PART * largest, largest / np.maximum(off, _PART * largest), 1.0)
@@ -108,7 +108,7 @@ def reported_vectors(
     least: Callable[[Any, str], float] = lambda *_: 0.0,
     besides: Callable[[Reported, Evidence], Iterable[Cause]] = lambda *_: (),
 ) -> Hypothesis:
-    """That positions, velocities or angular velocities, one by one, are told wrongly.
+    """Hypothesis: positions, velocities or angular velocities are each reported wrongly.
 
     Args:
         units: variable -> what it is in words, and its unit.
@@ -139,7 +139,7 @@ def reported_vectors(
 
 
 def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothesis:
-    """That quaternions are in another order, of inverse rotations, or not of unit length.
+    """Hypothesis: quaternions are reported in another order, inverted, or not of unit length.
 
     ``true_ones`` gives the true ones, scalar first, shape (time, …, 4).
     """
@@ -169,13 +169,13 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
 
 
 def _turned(said: FloatArray, other: FloatArray) -> float:
-    """How far quaternions are apart, up to their signs."""
+    """Largest difference of quaternions, up to their signs."""
     signs = np.where(np.sum(said * other, axis=-1, keepdims=True) < 0, -1.0, 1.0)
     return apart(said * signs, other)
 
 
 def at_start(frames_of: Callable[[Any], Mapping[str, FloatArray]], follows: frozenset[str]) -> Hypothesis:
-    """That velocities and accelerations at time 0 have other signs, units or axes.
+    """Hypothesis: velocities and accelerations at time 0 are reported with other signs, units or axes.
 
     Args:
         frames_of: of an element at time 0, in which a vector may be given by mistake; each of shape (vectors, 3, 3).

@@ -1,7 +1,7 @@
-"""What can happen to a vector on its way from an engine into a sample: sign, unit, axes, frame, time, precision.
+"""Errors of a vector on its way from an engine into a sample: sign, unit, axes, frame, time, precision.
 
-Every test takes the true vectors, does to them what the engine may have done, and holds the result against what the
-engine said. So it needs no equations, and is proof by itself.
+Every test takes the true vectors, does to them what the engine may have done, and holds the result against the
+engine's report. So it needs no equations, and is proof by itself.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class Reported:
 
     @property
     def size(self) -> float:
-        """Of the quantity."""
+        """Size of the quantity."""
         return max(float(np.nanmax(np.abs(self.true), initial=0.0)), self.least)
 
     @property
@@ -98,9 +98,9 @@ class Reported:
         closes: float = CLOSES,
         explains: int | None = None,
     ) -> Cause:
-        """That the engine said ``explained`` instead of the truth, as far as that is determined.
+        """Cause: the engine reports ``explained`` instead of the truth, as far as the truth is determined.
 
-        What is said where it is not is left aside, and what differs there proves nothing.
+        Where the truth is not determined, the report is left out of the comparison.
         """
         partly = np.any(np.isnan(self.true), axis=-1, keepdims=True)
         aside = partly & (np.isnan(explained) | np.isnan(self.said))
@@ -214,7 +214,7 @@ def product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 def _distinct(values: FloatArray, size: float) -> int:
-    """How many of some numbers are not the same: one that comes again is one number."""
+    """Count of distinct numbers."""
     if not values.size or not size:
         return 0
     return 1 + int(np.sum(np.diff(np.sort(values, axis=None)) > _EXACT * size))

@@ -1,4 +1,4 @@
-"""What an engine built of a ball on a surface, line by line, and what of it a model may soften."""
+"""Certificate of a ball on a surface, line by line, with the caps on what a model may soften."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def _expected(body: RollingBall, built: BallBuilt) -> tuple[FloatArray, FloatArr
 
 
 def another_scene(lines: Iterable[Mapping[str, Any]], needed: float) -> str | None:
-    """Why the engine's model is of another kind than the scene, as one clause; None: it is of the same.
+    """Reason that the engine's model is of another kind than the scene, as one clause; None: it is of the same.
 
     A scene without bound on friction is built with a number for it. As long as the motion needs less friction than
     that, the number changes nothing; where it needs more, the ball slips in the engine and cannot in the scene.

@@ -51,12 +51,12 @@ def columns(
     force: FloatArray | None = None,
     q_WB: FloatArray | None = None,
 ) -> Columns:
-    """Everything that follows from the state and the contact force.
+    """Dataset of a ball: all variables that follow from the state and the contact force.
 
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] with dims (time, xyz), ``q_WB`` (time, wxyz);
     the surface's coordinates (``gamma``, unwrapped, and ``z`` on a cylinder) and their rates; ``omega1..3`` [rad/s],
     ``slip2``, ``slip3`` [m/s] and ``N``, ``F2``, ``F3`` [N] in the local frame e1, e2, e3; ``needed_friction``
-    |F|/N [1]; ``gap`` [m]; ``energy`` [J]. What the engine cannot say is absent.
+    |F|/N [1]; ``gap`` [m]; ``energy`` [J]. Variables that the engine does not report are absent.
     """
     surface = body.surface
     u = np.array(surface.locate(p_WB))

@@ -1,4 +1,4 @@
-"""What happens to a ball on a wall: it begins to slip, sticks again, leaves the wall."""
+"""Events of a ball on a wall: it begins to slip, sticks again, leaves the wall."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Watch:
         self._faint = _FAINT * body.ball.mass * natural_acceleration(body)
 
     def over(self, sample: BallSample) -> bool:
-        """Whether the wall pulls."""
+        """True if the wall pulls."""
         return self._leaves and self._press(sample) < -self._faint
 
     def conclude(self, times: FloatArray, samples: Sequence[BallSample], located: Sequence[Event] | None) -> SeenInRun:
@@ -82,7 +82,7 @@ class Watch:
 
 
 def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events: Sequence[Event]) -> bool:
-    """Whether samples say that the ball sticks where the events say that it slips, or the other way round.
+    """True if samples stick where the events say slip, or the other way round.
 
     Only samples that lie in no event's bracket are held against them, and only those before it leaves the wall.
     """
@@ -99,7 +99,7 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
 
 
 def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
-    """Events as the samples tell them: somewhere between two samples [s] of which one sticks and the other slips."""
+    """Events between two samples [s], one of them sticking and the other slipping."""
     return [
         Event("stick" if after else "slip", 0.5 * (low + high), low, high)
         for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
@@ -108,7 +108,7 @@ def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Ev
 
 
 def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event | None:
-    """When the ball leaves the wall as samples tell it, between two of them; None: it does not.
+    """Lift-off of the ball between two samples; None: it stays on the wall.
 
     It has left where the wall would have to pull, or where for a hundredth of a second it does not press.
 
@@ -130,12 +130,12 @@ def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event 
 
 
 def left_at(dataset: xr.Dataset) -> float:
-    """When the ball first leaves the wall [s]; inf: it does not."""
+    """Time at which the ball first leaves the wall [s]; inf: it does not."""
     return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
 
 
 def _on_wall(dataset: xr.Dataset, start: str) -> list[str]:
-    """Variables that there are on the wall only, of those whose names begin so."""
+    """Variables with this prefix that exist on the wall only."""
     return [start + name for name in _ON_WALL if start + name in dataset]
 
 

@@ -44,7 +44,7 @@ def off_surface(body: RollingBall) -> float:
 
 
 def largest_kinetic_energy(body: RollingBall, truth: xr.Dataset | None) -> float:
-    """Of the start, or of the whole true run [J]."""
+    """Largest kinetic energy of the start, or of the whole true run [J]."""
     m, J = body.ball.mass, body.ball.inertia
     v, w = body.v0[None, :], body.w0[None, :]
     if truth is not None:

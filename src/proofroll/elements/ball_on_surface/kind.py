@@ -1,4 +1,4 @@
-"""How a scene file holds balls on surfaces, and on which scenes engines are checked."""
+"""Tables of a ball on a surface in a scene file, and the scenes on which engines are checked."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArr
 
 
 def always_pressed(body: RollingBall) -> bool:
-    """Whether the wall presses the ball wherever its centre is and however fast: then nothing can lift it off.
+    """True if the wall presses the ball at every place and speed: then nothing can lift it off.
 
     N / m = e1 · g + v · (∂e1/∂p) v: so it is where no normal points against gravity and the wall nowhere bends away.
     Looked at around the surface's periodic coordinates; along the others it is taken to be the same everywhere. Of a
@@ -74,7 +74,7 @@ def normal_force(body: RollingBall, p_WB: FloatArray, force: FloatArray) -> Floa
 
 
 def natural_acceleration(body: RollingBall) -> float:
-    """What accelerations, and times the mass forces, are measured by at time 0: max(g, |p̈|) [m/s²], never zero.
+    """Scale of accelerations, and times the mass of forces, at time 0: max(g, |p̈|) [m/s²], never zero.
 
     The certificate's relative differences of acceleration, N, F2 and F3 refer to it.
     """
@@ -181,12 +181,12 @@ def newton_euler(
 
 
 def stands(body: RollingBall, v_WB: FloatArray) -> bool:
-    """Whether the resistance has no direction: there is one, and the centre's velocity ``v_WB`` [m/s] is zero."""
+    """True if the resistance has no direction: there is one, and the centre's velocity ``v_WB`` [m/s] is zero."""
     return body.contact.rolling_resistance > 0 and not np.any(v_WB)
 
 
 def stays(body: RollingBall, p_WB: FloatArray) -> bool:
-    """Whether a ball whose centre stands still at ``p_WB`` [m] stays: friction and resistance can both hold it."""
+    """True if friction and resistance can hold a ball whose centre stands still at ``p_WB`` [m]."""
     pull, press = _pull(body, p_WB)
     strength, contact = float(np.linalg.norm(pull)), body.contact
     # Unbounded friction holds whatever presses the ball, also nothing: inf times 0 would be NaN.

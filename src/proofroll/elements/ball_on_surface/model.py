@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.surfaces import Surface
 
 
 class BallCapability(StrEnum):
-    """What a ball on a surface may need and a formulation may provide; the value is what a person reads."""
+    """Needs of a ball on a surface that a formulation may provide; the value is a text for a person."""
 
     ROLLING = "rolling without slip"
     CURVED_SURFACE = "a curved surface"
@@ -45,7 +45,7 @@ class Ball:
     """A rigid ball whose central inertia is the same about every axis.
 
     Attributes:
-        name: by which contacts and starts name it.
+        name: used by contacts and starts.
         radius: a [m].
         mass: m [kg].
         inertia_ratio: J / (m a²); 2/5 for a homogeneous ball, 2/3 for a thin shell.
@@ -83,7 +83,7 @@ class Contact:
         mu_static: largest |F|/N while sticking [1]; inf: the ball never slips.
         mu_kinetic: |F|/N while slipping [1].
         restitution: e: part of its normal velocity with which the ball leaves the wall after an impact [1]; left out:
-            nothing is said of impacts, and a ball that would land ends what is known.
+            impacts are unknown, and the motion is known only until the ball would land.
         tangential_restitution: e_t: the contact point leaves an impact with -e_t times its velocity along the wall, as
             far as friction allows [1]; 0 stops it there, 1 turns it back whole.
     """
@@ -117,7 +117,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class InitialMotion:
-    """How a ball starts at time 0: rolling without slip, unless its spin is given.
+    """Start of a ball at time 0: rolling without slip, unless its spin is given.
 
     Attributes:
         body: name of a ball.
@@ -185,7 +185,7 @@ class RollingBall:
 
     @property
     def flies(self) -> bool:
-        """Whether the ball starts off the wall, or may leave it and land again."""
+        """True if the ball starts off the wall, or may leave it and land again."""
         return self.gap0 > 0 or self.contact.restitution is not None
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What runs and steps are measured by: natural time and first motion of a ball, dimensionless numbers of a step."""
+"""Scales of runs and steps: natural time and first motion of a ball, dimensionless numbers of a step."""
 
 from __future__ import annotations
 
@@ -97,6 +97,6 @@ def first_motion(body: RollingBall) -> FirstMotion | None:
 
 
 def _stops(velocity: FloatArray, rate: FloatArray) -> float:
-    """When a velocity vanishes at its first rate [s]; infinite where it does not shrink."""
+    """Time in which a velocity vanishes at its first rate [s]; infinite where it does not shrink."""
     shrinks = -float(velocity @ rate)
     return float(velocity @ velocity) / shrinks if shrinks > 0 else math.inf

@@ -126,7 +126,7 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
 
 
 def creep(dataset: xr.Dataset) -> float:
-    """Way slipped while sticking [m]; an interval counts if the ball sticks at both of its ends, or nobody says."""
+    """Distance slipped while sticking [m]; an interval counts if the ball sticks at both ends, or that is unknown."""
     slip, t = dataset["slip"].to_numpy(), dataset["time"].to_numpy()
     sticking = dataset["sticking"].to_numpy().astype(bool) if "sticking" in dataset else np.ones(len(t), dtype=bool)
     both = sticking[1:] & sticking[:-1]
@@ -201,7 +201,7 @@ def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
 
 def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """By how much the velocities are not the rates of the positions, in stretches as :func:`force_audit` [m/s].
+    """Differences of the velocities from the rates of the positions, in stretches as :func:`force_audit` [m/s].
 
     At every sample v against the derivative of the positions, and, where there is an orientation, the radius times ω
     against its rate; at samples off the grid (:func:`proofroll.core.time_grid.off_grid`) their velocity and spin and,
@@ -271,7 +271,7 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
 
 def _off_grid(dataset: xr.Dataset) -> tuple[dict[str, FloatArray], FloatArray]:
-    """What samples off the grid hold, and their times [s], away from the ends of a stretch."""
+    """Values and times [s] of samples off the grid, away from the ends of a stretch."""
     if BETWEEN not in dataset:
         return {}, np.zeros(0)
     t, between = dataset["time"].to_numpy(), dataset[BETWEEN].to_numpy()

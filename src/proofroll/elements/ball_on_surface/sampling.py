@@ -1,4 +1,4 @@
-"""What an engine says of a ball on a surface: its state with the reaction of the wall, and what was built."""
+"""Sample of a ball on a surface: its state with the wall's reaction; and the model read back from the engine."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class BallSample(Sample):
 
 @dataclass(frozen=True)
 class BallBuilt:
-    """What the engine really built of a ball, read back from the engine (never from the scene). None: it cannot say.
+    """Model of a ball read back from the engine (never from the scene). None: the engine cannot say.
 
     Attributes:
         mass: of the ball [kg].
@@ -65,7 +65,7 @@ class BallBuilt:
 
 
 def terms_held(*, resists: object, slips: object = False, turns: object = False) -> frozenset[str]:
-    """What a model holds besides rolling, if it does; for :attr:`BallBuilt.terms`.
+    """Terms of a model besides rolling, for :attr:`BallBuilt.terms`.
 
     Rolling resistance, friction that is bounded, and the ball's orientation.
     """

@@ -1,4 +1,4 @@
-"""What a run's own samples say between events: stretches long enough for splines, accelerations, turns."""
+"""Stretches of samples between events, long enough for splines, with accelerations and turns."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def accelerations(surface: Surface, dataset: xr.Dataset, at: FloatArray | None =
 def carried(
     start: Rotation, t: FloatArray, w_WB: FloatArray, substeps: int, spans: tuple[FloatArray, FloatArray] | None = None
 ) -> Rotation:
-    """Where the spin [rad/s], shape (time, 3), turns ``start`` from each sample to the next, or over other ``spans``.
+    """Orientations ``start`` turned by the spin [rad/s], shape (time, 3), to the next sample or over other ``spans``.
 
     The ball may turn more than once from sample to sample, so ω is integrated, by Magnus steps of fourth order
     (Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 2009, section 5.4).

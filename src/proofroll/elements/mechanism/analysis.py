@@ -1,4 +1,4 @@
-"""What the constraints of a mechanism allow: rank, redundancy, mobility, and which reactions they determine."""
+"""Analysis of a mechanism's constraints: rank, redundancy, mobility, and determinate reactions."""
 
 from __future__ import annotations
 
@@ -109,9 +109,9 @@ class RowSign:
         self._rank, self._before = rank, (np.zeros((0, 0)), np.zeros((0, 0)))
 
     def changes(self, C: Array) -> bool:
-        """Whether rank was lost between the pose before and that of these rows, (rows, velocities).
+        """True if rank was lost between the pose before and that of these rows, (rows, velocities).
 
-        Where the spaces turned too far in between, nothing is said.
+        False also where the spaces turned too far in between.
         """
         U, _, Vt = np.linalg.svd(C, full_matrices=False)
         left, right = U[:, : self._rank], Vt[: self._rank].T
@@ -123,15 +123,15 @@ class RowSign:
 
 
 def determinate(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> NDArray[np.bool_]:
-    """Which components of the wrenches of joints and then loops no null vector of Cᵀ changes, (joints + loops, 6)."""
+    """Mask of wrench components that no null vector of Cᵀ changes, joints before loops, (joints + loops, 6)."""
     found: NDArray[np.bool_] = freedom(tree, motion, rows, rank) <= _ZERO
     return found
 
 
 def freedom(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> Array:
-    """How much all null vectors of Cᵀ together change each component of the wrenches, relative to the most changed.
+    """Change of each wrench component by all null vectors of Cᵀ together, relative to the most changed.
 
-    It does not hang on which basis of the null vectors is found. Shape (joints + loops, 6).
+    It does not depend on the basis of the null vectors. Shape (joints + loops, 6).
     """
     mechanism = tree.mechanism
     squares = np.zeros((len(mechanism.joints) + len(mechanism.loops), 6))
@@ -179,12 +179,12 @@ def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, lo
 def general_place(
     start: State, rows: Callable[[State], tuple[Array, Array]], moved: Callable[[State, Array], State]
 ) -> State:
-    """A place near the start that the constraints allow and that no symmetry distinguishes: a start may be singular.
+    """Place near the start that the constraints allow and no symmetry distinguishes: a start may be singular.
 
     Args:
-        start: in whatever words.
-        rows: residuals, shape (rows,), and rows on the velocities, shape (rows, velocities), where it is told.
-        moved: where a small displacement, shape (velocities,), leads.
+        start: a state, in any representation.
+        rows: residuals, shape (rows,), and rows on the velocities, shape (rows, velocities), at a state.
+        moved: the state after a small displacement, shape (velocities,).
     """
     _, C = rows(start)
     direction = 1.0 + np.modf(np.arange(1, C.shape[1] + 1) * 0.6180339887498949)[0]  # golden ratio: no two alike

@@ -1,4 +1,4 @@
-"""What a formulation must provide to represent a mechanism, and whether it does."""
+"""Capabilities that a mechanism requires of a formulation, and the check that it provides them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.model import Mechanism
 
 
 class MechanismCapability(StrEnum):
-    """What a formulation provides; each is a text for a person."""
+    """Capability of a formulation; each is a text for a person."""
 
     FIXED = "fixed joints"
     REVOLUTE = "revolute joints"
@@ -44,7 +44,7 @@ FORCES = frozenset({MechanismCapability.SPRINGS, MechanismCapability.JOINT_SPRIN
 
 
 def required(mechanism: Mechanism) -> frozenset[str]:
-    """What a mechanism asks of a formulation; redundancy of its rows, which is found by analysis, is not among it."""
+    """Capabilities that a mechanism requires; redundancy of its rows, which is found by analysis, is not among them."""
     capability = MechanismCapability
     needs: set[str] = {*mechanism.unmodelled}
     needs |= {capability[joint.kind.upper()] for joint in mechanism.joints}

@@ -1,4 +1,4 @@
-"""What an engine built of a mechanism, line by line."""
+"""Certificate of a mechanism, line by line."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _compare_reactions(
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:
-    """What angular accelerations are measured by [rad/s²]; of a soft model by the natural one, as accelerations are."""
+    """Scale of angular accelerations [rad/s²]; of a soft model the natural one, as for accelerations."""
     found = element.first_motion
     least = (1.0 if soft else _LEAST) * found.scale / element.length
     return max(float(np.max(np.abs(found.angular_acceleration))), least)

@@ -70,7 +70,7 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray, press
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
-    world axes, NaN where the attribute ``absent`` says why; ``forces``, ``torques``: the
+    world axes, NaN with a reason in the attribute ``absent``; ``forces``, ``torques``: the
     determinate components of all; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
     ``slip.<pair>`` [m/s]; ``energy`` [J], ``drift`` [m], and ``energy_error`` [J], or ``energy_change`` [J] of what is
     driven or damped.

@@ -109,7 +109,7 @@ class MechanismElement:
 
     @cached_property
     def noise(self) -> float:
-        """What round-off makes of the first accelerations [m/s², rad/s²]."""
+        """Round-off of the first accelerations [m/s², rad/s²]."""
         return self._equations.sensitivity()[1]
 
     @cached_property
@@ -123,7 +123,7 @@ class MechanismElement:
 
     @property
     def natural_time(self) -> float:
-        """Of a pendulum of its size, else of its mass on its stiffest spring, else of a turn [s]."""
+        """Period of a pendulum of its size, else of its mass on its stiffest spring, else of a turn [s]."""
         gravity = float(np.linalg.norm(self.mechanism.gravity))
         if gravity:
             return float(2 * np.pi * np.sqrt(self.length / gravity))
@@ -160,7 +160,7 @@ class MechanismElement:
 
     @cached_property
     def conservative(self) -> bool:
-        """Whether nothing in it drives or damps."""
+        """True if nothing in it drives or damps."""
         laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.mechanism.joints]
         lossy = any(pair.friction or pair.restitution < 1 for pair in self.mechanism.pairs)
         damped = any(spring.damping for spring in self.mechanism.springs)
@@ -237,7 +237,7 @@ class MechanismElement:
 
     @cached_property
     def first_wrench(self) -> FloatArray:
-        """What each joint and loop does to its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
+        """Wrench of each joint and loop on its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
         wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
         return read_only(wrench)
 

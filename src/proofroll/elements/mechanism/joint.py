@@ -19,7 +19,7 @@ Kind = Literal["fixed", "revolute", "prismatic", "universal", "spherical", "plan
 
 
 class Facts(NamedTuple):
-    """What a kind of joint is, in the frames A (on the parent) and B (on the child) whose z is the axis.
+    """Facts of a kind of joint, in the frames A (on the parent) and B (on the child) whose z is the axis.
 
     Attributes:
         nq, nv: number of coordinates and of velocities.
@@ -235,7 +235,7 @@ def _none(values: object) -> bool:
 
 
 def child_in_parent(kind: str, q: Array) -> tuple[Array, Array]:
-    """Where the frame B of a joint of this kind stands in A: its origin, m, and its rotation."""
+    """Pose of the frame B of a joint of this kind in A: its origin, m, and its rotation."""
     origin, rotation = _O, _UNIT
     if kind == "revolute":
         rotation = rotations.about(2, q[0])

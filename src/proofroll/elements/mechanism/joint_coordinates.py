@@ -174,10 +174,10 @@ class JointCoordinates:
         return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
 
     def sensitivity(self) -> tuple[float, float]:
-        """How accelerations hang on the state at the start.
+        """Sensitivity of the accelerations to the state at the start.
 
         Returns:
-            Rate of the fastest mode [rad/s], at least 1; and what round-off of the state makes of them: its size, times
+            Rate of the fastest mode [rad/s], at least 1; and their round-off: that of the state, times
             that rate's square and the condition of the mass matrix.
         """
         q, v = self.mechanism.start()
@@ -244,7 +244,7 @@ class JointCoordinates:
         return np.concatenate([q, v])
 
     def sample(self, q: Array, v: Array, mode: Mode | None = None) -> dict[str, Any]:
-        """What a :class:`~proofroll.elements.mechanism.record.Record` holds at one time."""
+        """Fields of a :class:`~proofroll.elements.mechanism.record.Record` at one time."""
         found = self.solve(q, v, mode)
         motion, rows, mechanism = found.motion, found.rows, self.mechanism
         n = len(mechanism.bodies)
@@ -297,7 +297,7 @@ class JointCoordinates:
         return needed
 
     def _spring_forces(self, motion: BodyMotion) -> list[tuple[int, Array, Array]]:
-        """Of each end of each spring: body, place from its frame's origin and force, world axes."""
+        """Force at each end of each spring: body, place from its frame's origin and force, world axes."""
         found, index = [], self.mechanism.body_index
         for spring in self.mechanism.springs:
             a, b = index[spring.body_a], index[spring.body_b]

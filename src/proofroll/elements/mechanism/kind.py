@@ -1,4 +1,4 @@
-"""How a scene file holds a mechanism, and on which mechanisms engines are checked."""
+"""Tables of a mechanism in a scene file, and the mechanisms on which engines are checked."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class MechanismKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Those with a loop, with oblique axes, with a spinning body, with springs, and with each law of a joint."""
+        """Mechanisms with a loop, oblique axes, a spinning body, springs, and each law of a joint."""
         from proofroll.files.scene_file import load_scene
 
         found = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators")}

@@ -140,7 +140,7 @@ class Tree:
         return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, *frames)
 
     def _twists(self, sliding: Array, turning: Array, turned: Array) -> Array:
-        """What each velocity does to each body, (bodies + 1, 6, nv): columns that slide and turn it, ω × arm."""
+        """Jacobian of each body, (bodies + 1, 6, nv), from columns that slide and turn it and ω × arm."""
         J = np.empty((len(self._moves), 6, len(self._joint)))
         J[:, :3] = (sliding[:, None] + turned).transpose(1, 0, 2)
         J[:, 3:] = turning

@@ -1,4 +1,4 @@
-"""Which points close a loop, for engines whose constraints hold points together and nothing else."""
+"""Points that close a loop, for engines whose constraints hold points together and nothing else."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PARALLEL = 1e-9  # round-off of directions
 
 
 def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
-    """Where the points lie that a loop holds together: distances from its position along its axis [m].
+    """Points that a loop holds together, as distances from its position along its axis [m].
 
     In space a revolute loop needs two points; with one, the bodies turn about it freely, and no drift would tell.
     Where everything moves in parallel planes the second would hold nothing that is not held already.
@@ -24,7 +24,7 @@ def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
 
 
 def is_planar(mechanism: Mechanism) -> bool:
-    """Whether all joints and loops let the bodies move in parallel planes alone, by their axes at the start.
+    """True if all joints and loops let the bodies move in parallel planes alone, by their axes at the start.
 
     Slides must lie in that plane and turns stand on it; what has other axes is taken to be spatial, but for a loop that
     has none.

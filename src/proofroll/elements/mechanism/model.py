@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.rotations import Array
 
 
 class JointOrLoop(NamedTuple):
-    """What connects bodies a and b, the child of a joint: places [m] and frames, as columns, in their own axes."""
+    """Connection of the bodies a and b, the child of a joint: places [m] and frames, as columns, in their own axes."""
 
     name: str
     kind: str
@@ -103,7 +103,7 @@ class Mechanism:
 
     @property
     def fastened(self) -> dict[str, list[Vector]]:
-        """For each body, and for the world at the end, the points in its own frame where something is fastened [m].
+        """Fastening points of each body, and of the world at the end, in its own frame [m].
 
         A free joint fastens nothing.
         """
@@ -131,12 +131,12 @@ class Mechanism:
 
     @cached_property
     def q_slices(self) -> tuple[slice, ...]:
-        """Where each joint's coordinates lie in q."""
+        """Slice of each joint's coordinates in q."""
         return slices(joint.nq for joint in self.joints)
 
     @cached_property
     def v_slices(self) -> tuple[slice, ...]:
-        """Where each joint's velocities lie in v."""
+        """Slice of each joint's velocities in v."""
         return slices(joint.nv for joint in self.joints)
 
     def start(self) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Where everything of a mechanism is, from the poses and velocities of its bodies at many times."""
+"""Poses and velocities of everything in a mechanism, from those of its bodies at many times."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Placed:
         return np.asarray(origin + self.R_WB[:, index] @ np.asarray(position, dtype=np.float64))
 
     def velocity(self, body: str, position: Sequence[float]) -> FloatArray:
-        """Of such a point [m/s], shape (time, 3)."""
+        """Velocity of a point of a body [m/s], shape (time, 3)."""
         index = self.mechanism.body_index[body]
         if index < 0:
             return np.zeros((len(self.time), 3))
@@ -118,7 +118,7 @@ class Placed:
         return np.asarray(angle + TURN * np.round((known - angle) / TURN))
 
     def _apart(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
-        """From the joint's point on the parent to that on the child [m], and its rate as the parent sees it [m/s]."""
+        """Vector between the joint's points on parent and child [m], and its rate as seen from the parent [m/s]."""
         there = self.point(joint.child, joint.child_position)
         carried = cross(self.spin(joint.parent), there - self.point(joint.parent, ZERO))
         rate = self.velocity(joint.child, joint.child_position) - self.velocity(joint.parent, ZERO) - carried

@@ -1,4 +1,4 @@
-"""How a route of the truth walks, and what it records of a mechanism, in an order that both routes keep."""
+"""Record of a route of the truth on a mechanism, in an order that both routes keep, and its steps."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Record:
     residual: Array
 
     def placed(self, mechanism: Mechanism) -> Placed:
-        """Where everything of the mechanism is."""
+        """The recorded motion of the mechanism."""
         known_q = self.q if self.q.shape[1] else None  # a route that follows poses alone has none at first
         return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB, known_q)
 

@@ -1,4 +1,4 @@
-"""What an engine says about a mechanism besides its motion, and which mechanism a scene holds."""
+"""Sample of a mechanism besides its motion, and the mechanism of a scene."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class MechanismSample(Sample):
 
 @dataclass(frozen=True)
 class MechanismBuilt:
-    """What the engine really built, read back from the engine at time 0 (never from the scene). None: it cannot say.
+    """Model read back from the engine at time 0 (never from the scene). None: the engine cannot say.
 
     Attributes:
         mass: of the bodies [kg], shape (bodies,).
@@ -106,6 +106,6 @@ def independent_anywhere(
 
 
 def unsaid(mechanism: Mechanism) -> tuple[Array, Array]:
-    """Forces and moments of joints and loops of which nothing is known yet, shape (joints + loops, 3) each."""
+    """Forces and moments of joints and loops that are not known yet, shape (joints + loops, 3) each."""
     count = len(mechanism.joints) + len(mechanism.loops)
     return np.full((count, 3), np.nan), np.full((count, 3), np.nan)

@@ -1,4 +1,4 @@
-"""How a mechanism starts, in words for a person who wrote it."""
+"""Start of a mechanism, in words for the author of the scene."""
 
 from __future__ import annotations
 

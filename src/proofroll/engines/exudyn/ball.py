@@ -1,4 +1,4 @@
-"""What the two rigid-body formulations share: the ball, its weight and its rolling resistance."""
+"""Ball, weight and rolling resistance shared by the two rigid-body formulations."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RigidBall:
         )
 
     def built(self, ball_radius: float | None, gap: float | None) -> BallBuilt:
-        """Everything but the radius [m] and the gap [m], which joints or contact hold."""
+        """Model read back from Exudyn; the radius [m] and the gap [m], which joints or contact hold, are given."""
         body = rigid_body(self.system, self.body)
         return BallBuilt(
             mass=body["mass"],

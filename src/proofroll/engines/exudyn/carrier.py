@@ -94,7 +94,7 @@ class Carrier(ExudynModel):
         return result
 
     def _factor(self, row: RollingRow) -> float:
-        """How much of the spin makes up for a rate of the coordinate, in Exudyn."""
+        """Factor of the spin that makes up for a rate of the coordinate, in Exudyn."""
         return float(self.system.GetObject(row.item)["factor1"])
 
     def _turning(self, body: RollingBall) -> dict[Any, FloatArray]:
@@ -105,7 +105,7 @@ class Carrier(ExudynModel):
         }
 
     def numbers(self) -> dict[str, Any]:
-        """What the program of :mod:`reproducer` assigns: the carrier's start, its joint and the rolling."""
+        """Numbers for the program of :mod:`reproducer`: the carrier's start, its joint and the rolling."""
         rolling = [
             (row.generator.kind.capitalize(), list(row.generator.axis), row.axis.tolist(), self._factor(row))
             for row in self.rolling

@@ -27,7 +27,7 @@ _SLOW = 2e-3
 
 
 class Touch(NamedTuple):
-    """What happens at the contact, from a state alone.
+    """Contact forces and slip at a state.
 
     Attributes:
         N: normal force [N].

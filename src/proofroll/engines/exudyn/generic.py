@@ -115,7 +115,7 @@ class Generic(ExudynModel):
         )
 
     def numbers(self) -> dict[str, Any]:
-        """What the program of :mod:`reproducer` assigns.
+        """Numbers for the program of :mod:`reproducer`.
 
         Raises:
             Refused: the weight turns with the coordinates.
@@ -136,11 +136,11 @@ class Generic(ExudynModel):
         }
 
     def _mass_matrix(self) -> FloatArray:
-        """As Exudyn holds it."""
+        """Mass matrix as Exudyn holds it."""
         return np.array(self.system.GetObject(self.object)["massMatrix"].Convert2DenseMatrix())
 
     def _rows(self) -> FloatArray:
-        """Of rolling, on the rates, as Exudyn holds them."""
+        """Rows of rolling on the rates, as Exudyn holds them."""
         return np.array(self.system.GetObject(self.rolling)["scalingMarker1"])
 
     def sample(self) -> BallSample:
@@ -179,7 +179,7 @@ class Generic(ExudynModel):
         return Touch(*self.needed(q, q_t), slip2, slip3)
 
     def hold(self, direction: tuple[float, float] | None) -> None:
-        """From now on slips along the unit ``direction`` (e2, e3), or rolls where there is none."""
+        """Switches to slip along the unit ``direction`` (e2, e3), or to rolling for None."""
         assert self.friction is not None
         if (direction is None) != (self.friction.direction is None):
             self.system.SetObjectParameter(self.rolling, "activeConnector", direction is None)

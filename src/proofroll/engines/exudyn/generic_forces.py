@@ -69,7 +69,7 @@ def force_function(body: RollingBall, local: LocalGeometry, friction: KineticFri
 
 
 def weight_turns(body: RollingBall, local: LocalGeometry) -> bool:
-    """Whether gravity turns in the local frame as the ball goes along."""
+    """True if gravity turns in the local frame as the ball goes along."""
     axes = [np.asarray(generator.axis) for generator in local.generators if generator.kind == "rotation"]
     return bool(axes) and bool(np.any(np.abs(np.cross(axes[0], body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)))
 

@@ -208,5 +208,5 @@ def consistent_start(
 
 
 def _sentence(text: object) -> str:
-    """What Exudyn says, on one line and without the stack of Python calls that it appends."""
+    """Message of Exudyn on one line, without the stack of Python calls that it appends."""
     return " ".join(str(text).partition("\n\nAt:")[0].split())

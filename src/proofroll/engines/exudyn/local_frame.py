@@ -30,7 +30,7 @@ class LocalGeometry:
 
 
 def slides(body: RollingBall) -> bool:
-    """Whether the wall is at rest and two rigid motions slide it along itself: the coefficients may be constant."""
+    """True if the wall is at rest and two rigid motions slide it along itself: the coefficients may be constant."""
     return body.surface.generators is not None and body.wall_rate is None
 
 

@@ -54,7 +54,7 @@ def add_rigid_body(system: Any, mass: float, inertia: Sequence[float], node: Any
 
 
 def rigid_body(system: Any, number: Any) -> dict[str, Any]:
-    """What Exudyn holds of a rigid body: ``mass``, ``inertia`` as above, ``centerOfMass``."""
+    """Rigid body as Exudyn holds it: ``mass``, ``inertia`` as above, ``centerOfMass``."""
     found = system.GetObject(number)
     prefix = "" if "mass" in found else "physics"
     return {name: found[_named(prefix, name)] for name in ("mass", "inertia", "centerOfMass")}

@@ -157,7 +157,7 @@ def _matrix(six: Any) -> Array:
 
 
 def _check(mechanism: Mechanism) -> None:
-    """What the capabilities do not say.
+    """Checks limits that no capability covers.
 
     Raises:
         Refused: a body without mass, or a spring in a universal joint.

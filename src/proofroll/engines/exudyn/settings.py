@@ -13,7 +13,7 @@ from proofroll.core.errors import InputError
 
 @dataclass(frozen=True)
 class ExudynSettings:
-    """How Exudyn models the scene and integrates it. A setting that would do nothing is None.
+    """Settings of Exudyn: model of the scene and integration. A setting that would do nothing is None.
 
     Attributes:
         formulation: ``generic`` (minimal coordinates and multipliers), ``carrier`` (rigid ball on a massless carrier,

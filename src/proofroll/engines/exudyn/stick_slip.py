@@ -52,7 +52,7 @@ class SwitchedIntegration:
     """
 
     def __init__(self, model: Generic, body: RollingBall, settings: ExudynSettings) -> None:
-        """At time 0, in the state of the system's initial configuration."""
+        """Starts at time 0, in the state of the system's initial configuration."""
         self.model, self.system, self.settings = model, model.system, settings
         data = self.system.systemData
         self._q, self._q_t = data.GetODE2Coordinates, data.GetODE2Coordinates_t  # looked up once: asked at every step
@@ -112,7 +112,7 @@ class SwitchedIntegration:
         return True
 
     def _roll_on(self, t: float) -> bool:
-        """As :meth:`_watch`, while the ball rolls: no more than whether it goes on, for a step takes microseconds."""
+        """Fast form of :meth:`_watch` while the ball rolls: only whether it goes on, for a step takes microseconds."""
         if t - self.t <= self._shortest:
             return True
         q_t = self._q_t()
@@ -176,7 +176,7 @@ class SwitchedIntegration:
             self._land(now, end)
 
     def _crossing(self, beyond: ContactState, left: float) -> float:
-        """How long from now until the contact changes [s], by ``left`` [s] at the latest."""
+        """Time until the contact changes [s], by ``left`` [s] at the latest."""
         from scipy.optimize import brentq
 
         ends = {0.0: self._margin(self.state.touch), left: self._margin(beyond.touch)}
@@ -204,7 +204,7 @@ class SwitchedIntegration:
         self.sticking = kind == "stick"
 
     def _begun(self, now: float) -> bool:
-        """Whether the ball began to slip at this very time [s]."""
+        """True if the ball began to slip at this very time [s]."""
         return bool(self.events) and self.events[-1].kind == "slip" and self.events[-1].time == now
 
     def _take_back(self, now: float) -> None:

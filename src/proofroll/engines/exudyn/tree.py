@@ -153,7 +153,7 @@ class KinematicTree(ExudynModel):
         )
 
     def _accelerations(self) -> tuple[Array, Array]:
-        """Of the origins of the bodies' frames, and angular; the state stays as it is."""
+        """Accelerations of the origins of the bodies' frames, and angular ones; the state stays as it is."""
         solver, state = self.integration.solver, self.system.systemData
         solver.ComputeMassMatrix(self.system, 1.0)
         solver.ComputeODE2RHS(self.system)

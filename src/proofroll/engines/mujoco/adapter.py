@@ -100,7 +100,7 @@ class Mujoco(SteppedModel):
 
     @staticmethod
     def version() -> str:
-        """Of MuJoCo."""
+        """Version of MuJoCo."""
         return str(mujoco.__version__)
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""What the three ways to present a wall to MuJoCo have in common."""
+"""Base of the three ways to present a wall to MuJoCo."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Formulation(ABC):
 
     @property
     def resists(self) -> bool:
-        """Whether its steps do apply the torque of rolling resistance."""
+        """True if its steps apply the torque of rolling resistance."""
         return self.resistance.f > 0
 
     @abstractmethod

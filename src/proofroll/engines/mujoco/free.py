@@ -20,7 +20,7 @@ from proofroll.engines.mujoco.settings import MujocoSettings
 
 
 class Free(Formulation):
-    """The ball on a free joint; the wall a mocap body, which MuJoCo treats as fixed wherever it is put.
+    """Ball on a free joint; the wall is a mocap body, which MuJoCo treats as fixed.
 
     The plane stands for the wall only to first order: the contact rows lack J̇v (the turning of the normal).
     """
@@ -235,7 +235,7 @@ class Facets(Formulation):
 
 
 def _reach(body: RollingBall, axis: FloatArray) -> float:
-    """How far from the origin a ball that rolls without losses gets along the axis of a cylinder [m].
+    """Distance from the origin that a ball rolling without losses reaches along the axis of a cylinder [m].
 
     Rolling round at the constant rate Ω, it moves along the axis as an oscillator of ω² = r Ω² / (1 + r), r = J/(m a²),
     about the place where gravity and the torque of the initial spin about the normal balance.

@@ -31,7 +31,7 @@ def condim(mu: float, settings: MujocoSettings) -> int:
 
 
 def corrects(contact: Contact, settings: MujocoSettings) -> bool:
-    """Whether the contact's reference acceleration is edited for slip."""
+    """True if the contact's reference acceleration is edited for slip."""
     return settings.cone_correction and 0 < contact.mu_static < math.inf
 
 
@@ -130,18 +130,18 @@ class BoundedFriction:
             self._change(False, self._event(self._lost, "lift_off"))
 
     def _presses(self, data: Any) -> bool:
-        """Whether there is a contact with a normal force; the force goes to ``self._wrench``."""
+        """True if there is a contact with a normal force; the force goes to ``self._wrench``."""
         if data.ncon == 0:
             return False
         mujoco.mj_contactForce(self._model, data, 0, self._wrench)
         return self._wrench.item(0) > 0
 
     def holds(self, data: Any) -> bool:
-        """Whether there is a contact force in ``data`` and it is inside the cone of the present coefficient."""
+        """True if there is a contact force in ``data`` inside the cone of the present coefficient."""
         return self._presses(data) and self._inside()
 
     def _inside(self) -> bool:
-        """Whether the force in ``self._wrench`` is inside the cone of the present coefficient."""
+        """True if the force in ``self._wrench`` is inside the cone of the present coefficient."""
         N, F1, F2 = self._force.tolist()
         # MuJoCo's pyramid lies inside the true cone: along its own tangents it allows |F1| + |F2| = mu N.
         friction = abs(F1) + abs(F2) if self._pyramidal else math.hypot(F1, F2)
@@ -199,7 +199,7 @@ class BoundedFriction:
             aref[0] -= lift
 
     def _near_cone(self, data: Any, N: float) -> bool:
-        """Whether the friction of the evaluation before was near its bound, by its torque: that needs no frame."""
+        """True if the friction of the evaluation before was near its bound, by its torque: that needs no frame."""
         t1, t2, t3 = data.qfrc_constraint[self._spin].tolist()
         lever = self._radius + 0.5 * float(data.efc_pos[0])  # MuJoCo's contact point lies midway in the depth
         return math.hypot(t1, t2, t3) >= NEAR_CONE * self._mu * N * lever

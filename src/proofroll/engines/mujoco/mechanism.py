@@ -170,7 +170,7 @@ class MujocoMechanism(SteppedModel):
         )
 
     def _axis(self, data: Any, number: int, kind: str) -> Array:
-        """Of the turning or sliding along z of a joint's frame, in the world."""
+        """Axis of turning or sliding along z of a joint's frame, in the world."""
         if kind not in WITH_AXIS:
             return np.full(3, np.nan)
         part = 0 if kind == "universal" else len(mechanism_model.PARTS[kind]) - 1
@@ -186,7 +186,7 @@ class MujocoMechanism(SteppedModel):
         return J[: data.ne]
 
     def _accelerations(self, data: Any) -> dict[str, Array]:
-        """Of the bodies' origins, and angular, shape (bodies, 3) each."""
+        """Accelerations of the bodies' origins, and angular ones, shape (bodies, 3) each."""
         mujoco.mj_rnePostConstraint(self._model, data)
         found = np.zeros((len(self._bodies), 6))
         for row, body in zip(found, self._bodies, strict=True):
@@ -195,7 +195,7 @@ class MujocoMechanism(SteppedModel):
         return {"acceleration": found[:, 3:] + self._model.opt.gravity, "angular_acceleration": found[:, :3].copy()}
 
     def _softened(self, data: Any, rows: Array, soft: dict[str, Array]) -> dict[str, Regularised]:
-        """What MuJoCo's soft loops change: its answer against that of its own matrices with hard loops.
+        """Tolerances for MuJoCo's soft loops: its answer against that of its own matrices with hard loops.
 
         Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus
         what softness explains and no more: rows that are wrong or missing are so in both answers.

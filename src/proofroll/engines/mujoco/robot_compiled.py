@@ -58,7 +58,7 @@ def body_of(model: Any, index: int, name: str) -> RobotBody:
 
 
 def _off(model: Any, flag: str) -> bool:
-    """Whether the file disables a part of the physics; MuJoCo up to 3.3 has one flag for springs and dampers."""
+    """True if the file disables a part of the physics; MuJoCo up to 3.3 has one flag for springs and dampers."""
     bits = mujoco.mjtDisableBit
     name = "PASSIVE" if flag in {"SPRING", "DAMPER"} and not hasattr(bits, f"mjDSBL_{flag}") else flag
     return bool(model.opt.disableflags & int(getattr(bits, f"mjDSBL_{name}")))

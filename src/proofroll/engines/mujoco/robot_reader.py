@@ -24,7 +24,7 @@ _PASSIVE = sum(
 
 
 class MujocoRobots:
-    """What MuJoCo's compiler makes of a robot file."""
+    """Robot files as MuJoCo's compiler reads them."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     defines: ClassVar[str] = "mjcf"
@@ -58,7 +58,7 @@ class MujocoRobots:
         return str(spec.to_xml())
 
     def as_written(self, request: Request) -> Whole:
-        """Of the file itself, loaded from its path."""
+        """Numbers of the file itself, loaded from its path."""
         spec = mujoco.MjSpec.from_file(str(request.path))
         for option, on in request.options.items():
             if option == "boundmass":
@@ -70,7 +70,7 @@ class MujocoRobots:
         return Whole(int(model.nv), float(model.body_mass[moved].sum()))
 
     def read(self, request: Request) -> Reading:
-        """The compiled model without actuators, tendons, medium and constraints, of which friction is one."""
+        """Compiled model without actuators, tendons, medium and constraints, friction among them."""
         model = _compile(request)
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= int(off.mjDSBL_CONSTRAINT) | int(off.mjDSBL_ACTUATION)

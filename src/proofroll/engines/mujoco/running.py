@@ -1,4 +1,4 @@
-"""What every model in MuJoCo needs around its steps."""
+"""Code around the steps that every model in MuJoCo needs."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class SteppedModel:
 
     @property
     def native(self) -> tuple[Any, Any]:
-        """MuJoCo's own model and data, for whoever goes on with MuJoCo itself."""
+        """MuJoCo's own model and data, for further use with MuJoCo itself."""
         return self._model, self._data
 
     def _run(self, steps: int) -> None:

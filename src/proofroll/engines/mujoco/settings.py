@@ -1,4 +1,4 @@
-"""What a user can choose about MuJoCo, and the three presets of each formulation."""
+"""Settings of MuJoCo, and the three presets of each formulation."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PRELOAD = 0.01
 
 
 def _digits_as_number(value: object) -> object:
-    """As pydantic reads every number but those of a Literal."""
+    """Number of a text of digits, as pydantic reads every number but those of a Literal."""
     return int(value) if isinstance(value, str) and value.isdecimal() else value
 
 
@@ -115,7 +115,7 @@ class MujocoSettings:
 
     @property
     def velocity_lag(self) -> float:
-        """How long before the positions the velocities hold [s].
+        """Time by which the velocities lag behind the positions [s].
 
         An Euler step of MuJoCo moves the position with the new velocity: it is a leapfrog, of second order if
         velocities are read as those of half a step before. Only a contact with J̇v is exact enough to profit from that.
@@ -142,7 +142,7 @@ class MujocoSettings:
 
     @property
     def normal_lead(self) -> float:
-        """How long after the positions the bend of the path is needed [s].
+        """Time after the positions at which the bend of the path is needed [s].
 
         To stay on the wall, a leapfrog step has to take e1·v from +h/2 V²/c at -h/2 to -h/2 V²/c at +h/2. The damping
         gives ``own_share`` of that, for V at -h/2; the rest is to be added for V this much later than the positions.

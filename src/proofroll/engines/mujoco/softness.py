@@ -1,4 +1,4 @@
-"""What MuJoCo's soft contact changes at time 0, and by how much at most: the certificate's tolerances."""
+"""Certificate tolerances for MuJoCo's soft contact: changes at time 0, and their bounds."""
 
 from __future__ import annotations
 
@@ -83,8 +83,8 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
 def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str) -> dict[str, Regularised]:
     """Tolerances of accelerations and forces, where those of the centre are ``soft``.
 
-    What friction is off by per mass, times a, the turning is off by times m a²/J; rolling resistance adds f to a, as
-    does a contact's own friction against turning and rolling, of which N times the coefficient is the largest moment.
+    An error of the friction per mass, times a, is one of the turning times m a²/J; rolling resistance adds f to a, as
+    does a contact's own friction against turning and rolling, with a largest moment of N times the coefficient.
     """
     a = body.ball.radius
     turning = soft * (1 + body.contact.rolling_resistance / a) / body.ball.inertia_ratio
@@ -98,7 +98,7 @@ def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str
 
 
 def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str, Regularised]]:
-    """What is exact but for the solver, because forces enter it, and what stands for unbounded friction."""
+    """Tolerances of numbers that are exact but for the solver, and of the number that stands for unbounded friction."""
     if math.isinf(body.contact.mu_static):
         stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
         for name in ("1 / static friction", "1 / kinetic friction"):

@@ -110,7 +110,7 @@ def _rounds(body: RollingBall, settings: MujocoSettings, slips: bool) -> int:
 
 
 def accelerations(model: Any, data: Any) -> tuple[FloatArray, FloatArray]:
-    """Of the ball's centre [m/s²] and of its turning [rad/s²] in the world after an evaluation, each shape (3,)."""
+    """Accelerations of the ball's centre [m/s²] and of its turning [rad/s²] in the world, each shape (3,)."""
     result = np.zeros(6)
     mujoco.mj_rnePostConstraint(model, data)
     mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, model.body("ball").id, result, 0)

@@ -1,4 +1,4 @@
-"""What of MuJoCo's model can be switched on and off by a setting."""
+"""Terms of MuJoCo's model that a setting switches on and off."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the two formulations with rows have in common, for the integrators and the adapter."""
+"""Base of the two formulations with rows, for the integrators and the adapter."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ NOISE = 1e-13
 
 
 class ContactRows(NamedTuple):
-    """What the rows are at a state; mass matrix and bias forces are in the ``data`` then.
+    """Rows of the contact at a state; mass matrix and bias forces are then in the ``data``.
 
-    The arrays may be those of the next evaluation, too: whoever needs them longer copies them.
+    The next evaluation may write to the same arrays: copy them to keep them longer.
 
     Attributes:
         frame: e1, e2, e3 as columns, in the world, shape (3, 3).
@@ -43,7 +43,7 @@ class ContactRows(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SlidingContact:
-    """What happens while the contact point slides.
+    """Accelerations, forces and slip while the contact point slides.
 
     Attributes:
         acceleration: of the joints, shape (nv,).
@@ -69,7 +69,7 @@ def unit(vector: FloatArray) -> FloatArray:
 
 
 def left_the_wall(when: str) -> Diverged:
-    """What ends the run where the wall would have to pull; ``when`` is e.g. ``at 0.2 s``."""
+    """Error that ends the run where the wall would have to pull; ``when`` is e.g. ``at 0.2 s``."""
     return Diverged(f"the ball leaves the wall {when}, which this formulation does not model")
 
 
@@ -165,7 +165,7 @@ class BallWithRows(ABC):
     def sliding_reaction(
         self, data: Any, q: FloatArray, v: FloatArray, direction: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As :meth:`reaction`, while sliding against ``direction``."""
+        """Reaction as :meth:`reaction`, while sliding against ``direction``."""
 
     @abstractmethod
     def project_sliding(self, data: Any, q: FloatArray, v: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -106,7 +106,7 @@ class Composite(BallWithRows):
         return ContactRows(frame, directions.dot(jacobian), drift, resistance)
 
     def _along_axes(self) -> _AlongAxes | None:
-        """What is constant along the ball's axes; None if it changes from place to place."""
+        """Constant terms along the ball's axes; None if they change from place to place."""
         here, there = (self._own_jacobian(self.q0 + shift) for shift in _SHIFTS)
         if not np.allclose(here, there, rtol=1e-12, atol=1e-12):
             return None
@@ -115,7 +115,7 @@ class Composite(BallWithRows):
         return _AlongAxes(directions, directions @ here, here[3:].T.copy(), ((t2u, t2v), (t3u, t3v)), tuple(turns))
 
     def _own_jacobian(self, q: FloatArray) -> FloatArray:
-        """Of (v, ω) of the ball with respect to the joint velocities, in the axes of its joint; shape (6, 5)."""
+        """Jacobian of the ball's (v, ω) for the joint velocities, in the axes of its joint; shape (6, 5)."""
         return np.array(pin.computeJointJacobian(self.model, self.model.createData(), q, self.ball))
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
@@ -125,7 +125,7 @@ class Composite(BallWithRows):
         return self._own.rows
 
     def _accelerate_along(self, own: _AlongAxes, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
-        """As :meth:`accelerate`, from what is constant along the ball's axes."""
+        """Acceleration as :meth:`accelerate`, from constant terms along the ball's axes."""
         drift = own.directions.dot(self._own_bias(data, q, v))
         # a ω × ė1 with ė1 = Ω × e1 and Ω of the carriage.
         first, second, spin, _, _ = v.tolist()

@@ -36,7 +36,7 @@ class ConstraintDynamics:
     """
 
     def __init__(self, tree: JointTree, proximal: float) -> None:
-        """With the term μ of the proximal method."""
+        """Takes the term μ of the proximal method."""
         self._tree, self._model = tree, tree.model
         self.proximal = _ACCURACY, proximal, _ITERATIONS
         self._proximal = pin.ProximalSettings(*self.proximal)
@@ -57,11 +57,11 @@ class ConstraintDynamics:
 
     @staticmethod
     def _first_is_b(loop: Loop) -> bool:
-        """Whether Pinocchio's first joint carries body_b: its solver crashes where that is the world."""
+        """True if Pinocchio's first joint carries body_b: its solver crashes where that is the world."""
         return loop.body_a == WORLD
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
-        """Of the joints, shape (nv,), which the next call may overwrite."""
+        """Acceleration of the joints, shape (nv,), which the next call may overwrite."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if tree.springs:  # constraintDynamics takes no external forces: they are put to the joints

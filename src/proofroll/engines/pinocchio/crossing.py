@@ -1,4 +1,4 @@
-"""Where a smooth function first becomes positive: of time, or of the state in the last step of an integration."""
+"""First time at which a smooth function becomes positive: of time, or of the state in the last step."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def first_rise(g: Callable[[float], float], low: float, high: float, at_low: flo
 def located(
     solver: Any, g: Callable[[FloatArray], float], before: float, after: float, span: float
 ) -> tuple[float, float, FloatArray] | None:
-    """Where ``g`` first rises through zero in the last step of a DOP853 ``solver``.
+    """First rise of ``g`` through zero in the last step of a DOP853 ``solver``.
 
     Args:
         solver: after a step.

@@ -197,7 +197,7 @@ class FreeFlyer(BallWithRows):
 
 
 def _sources(radius: float) -> list[tuple[int, int, float]]:
-    """What the directions consist of: place in their 18 numbers, place in a moving triad, and factor.
+    """Sources of the directions: place in their 18 numbers, place in a moving triad, and factor.
 
     Along e1 it is e1·v, along e2 the slip e2·v + a e3·ω, along e3 the slip e3·v - a e2·ω.
     """

@@ -46,7 +46,7 @@ class TangentIntegrator(ABC):
         self.t, self.q, self.v = 0.0, mechanism.q0.copy(), mechanism.v0.copy()
 
     def advance(self, end: float) -> None:
-        """To ``end`` [s].
+        """Advances to ``end`` [s].
 
         Raises:
             Diverged: no step is small enough, the rows have become dependent, or the wall would have to pull.
@@ -60,7 +60,7 @@ class TangentIntegrator(ABC):
 
     @abstractmethod
     def _advance(self, start: float, end: float) -> None:
-        """From ``start`` to ``end`` [s]."""
+        """Advances from ``start`` to ``end`` [s]."""
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
         """Joint acceleration, and force of the wall on the ball in the world [N], now."""
@@ -175,7 +175,7 @@ class Adaptive(TangentIntegrator):
         self._q = mechanism.q0.copy()
 
     def _joined(self, q: FloatArray, v: FloatArray) -> FloatArray:
-        """What is integrated."""
+        """State vector that is integrated."""
         return np.concatenate([q[: self._places], v])
 
     def _split(self, y: FloatArray) -> tuple[FloatArray, FloatArray]:

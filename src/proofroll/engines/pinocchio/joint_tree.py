@@ -129,7 +129,7 @@ class JointTree:
         return forces
 
     def velocity(self, data: Any, frame: int) -> Any:
-        """Of a frame's origin, and angular, in the world's axes."""
+        """Velocity of a frame's origin, and its angular velocity, in the world's axes."""
         return pin.getFrameVelocity(self.model, data, frame, pin.LOCAL_WORLD_ALIGNED)
 
     def put(self, forces: Any, data: Any, frame: int, place: Array, force: Array, torque: Array | None = None) -> None:

@@ -117,7 +117,7 @@ class LoopRows:
         return p, R, J, v, a
 
     def split(self, M: Array, C: Array) -> Split:
-        """How the rows split velocities, in the metric of the mass matrix (upper triangle)."""
+        """Splitting of velocities by the rows, in the metric of the mass matrix (upper triangle)."""
         upper, failed = dpotrf(M, lower=0)
         if failed:
             raise np.linalg.LinAlgError("the mass matrix is not positive definite")
@@ -149,7 +149,7 @@ class NullSpace:
         self._rest = np.zeros(tree.model.nv)
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
-        """Of the joints, shape (nv,), which the next call may overwrite."""
+        """Acceleration of the joints, shape (nv,), which the next call may overwrite."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
         if not tree.loops:

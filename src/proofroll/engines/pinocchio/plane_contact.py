@@ -36,7 +36,7 @@ class PlaneContact:
     """
 
     def __init__(self, body: RollingBall, kind: str, tolerance: float) -> None:
-        """With the ``kind`` of solver ``pgs`` or ``admm``, which stops at ``tolerance``."""
+        """Takes the ``kind`` of solver, ``pgs`` or ``admm``, which stops at ``tolerance``."""
         self._radius = body.ball.radius
         self.model = pin.Model()
         self.model.gravity.linear = body.gravity
@@ -98,7 +98,7 @@ class PlaneContact:
         return self._result.retrieveConstraintImpulses()  # type: ignore[no-any-return]  # it is an array
 
     def friction(self, mu: float) -> float:
-        """What the cone of the contact holds if it is given ``mu``, as before each impulse."""
+        """Coefficient that the contact's cone holds when it is given ``mu``, as before each impulse."""
         self.point.setFriction(mu)
         return float(self.point.getFriction())
 

@@ -16,7 +16,7 @@ from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
 
 class PinocchioRobots:
-    """What ``buildModelFromUrdf`` and ``buildModelFromMJCF`` make of a robot file."""
+    """Robot files as ``buildModelFromUrdf`` and ``buildModelFromMJCF`` read them."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     options: ClassVar[Mapping[str, str]] = {"mimic": "reduce following joints (default: they move freely)"}
@@ -28,7 +28,7 @@ class PinocchioRobots:
         return importlib.metadata.version("pin")
 
     def as_written(self, request: Request) -> Whole:
-        """Of the file itself, loaded from its path."""
+        """Numbers of the file itself, loaded from its path."""
         model = _build(request)
         return Whole(int(model.nv), float(sum(body.mass for body in list(model.inertias)[1:])))
 

@@ -31,7 +31,7 @@ class RowsRun:
     """See :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
-        """At time 0; the settings say whether the orientation is integrated, no longer the scene."""
+        """Starts at time 0; the settings now decide whether the orientation is integrated, not the scene."""
         kind = Composite if settings.formulation == "composite" else FreeFlyer
         self.mechanism: BallWithRows = kind(body, bool(settings.orientation))
         self.motion: TangentIntegrator

@@ -1,4 +1,4 @@
-"""What a user can set, and the presets."""
+"""Settings of Pinocchio, and the presets."""
 
 from __future__ import annotations
 

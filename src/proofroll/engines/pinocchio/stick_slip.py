@@ -77,7 +77,7 @@ class AdaptiveStickSlip(Adaptive):
 
     @property
     def sticking(self) -> bool:  # type: ignore[override]  # follows the mode
-        """Whether the ball sticks now."""
+        """True if the ball sticks now."""
         return self._mode is FrictionLaw.STICKING
 
     def reaction(self, data: Any) -> tuple[FloatArray, FloatArray]:
@@ -165,13 +165,13 @@ class AdaptiveStickSlip(Adaptive):
         return end
 
     def _rest_of_slip(self, solver: Any, end: float) -> float:
-        """To ``end`` [s] by extrapolation, where hardly any slip is left and it ends after that."""
+        """Extrapolates to ``end`` [s], where hardly any slip is left and it ends after that."""
         self._keep(solver.y + (end - solver.t) * solver.f)
         self._solver = None
         return end
 
     def _after_step(self, y: FloatArray) -> tuple[float, float, float]:
-        """What :meth:`_monitor` says after a step."""
+        """Values of :meth:`_monitor` after a step."""
         if self._mode is not FrictionLaw.STICKING:
             return self._speed(y)
         # The rates that were found last are those at the end of the step, with projection or without.
@@ -186,7 +186,7 @@ class AdaptiveStickSlip(Adaptive):
         return y if back[1] is v else self._joined(*back)
 
     def _monitor(self, y: FloatArray) -> tuple[float, float, float]:
-        """What may end the mode, the excess of needed friction when sticking, else |u| and its rate; and N [N]."""
+        """Margin of the mode: the excess of needed friction when sticking, else |u| and its rate; and N [N]."""
         if self._mode is not FrictionLaw.STICKING:
             return self._speed(y)
         beyond, normal_force = self._mechanism.excess(self._data, *self._split(y), self.mu_static)

@@ -27,7 +27,7 @@ class _Law(NamedTuple):
 
 
 class Applied:
-    """What acts on the bodies besides reactions."""
+    """Applied forces on the bodies, without reactions."""
 
     def __init__(self, mechanism: Mechanism, connections: ProjectedConnections) -> None:
         self._connections = connections
@@ -110,7 +110,7 @@ class Applied:
 
     @property
     def remembers(self) -> bool:
-        """Whether forces depend on how often a joint has turned."""
+        """True if forces depend on the number of turns of a joint."""
         return bool(self._angles)
 
     @property

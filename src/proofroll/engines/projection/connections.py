@@ -99,7 +99,7 @@ class ProjectedConnections:
         self.owner = np.concatenate([self._point, self._angle])
 
     def ends(self, bodies: Bodies) -> Ends:
-        """Where the connections' ends are, and how they turn."""
+        """Positions and orientations of the connections' ends."""
         (r, R, v, w), a, b = bodies, self.a, self.b
         turning = np.empty((3, *R.shape))
         spin = (w @ _SKEW).reshape(R.shape)

@@ -23,7 +23,7 @@ _ON_CONE = 1e-12
 
 
 class SlidingForces(NamedTuple):
-    """What the equations give at one state of slip.
+    """Equations solved at one state of slip.
 
     Attributes:
         response: with the friction as an applied force.
@@ -69,7 +69,7 @@ class Friction:
         self._weight = float(ball.mass[0] * np.linalg.norm(ball.gravity))
 
     def reserve(self, response: Response) -> float:
-        """What the static cone leaves [N], from the reactions of sticking; negative where the ball must slip."""
+        """Reserve of the static cone [N], from the reactions of sticking; negative where the ball must slip."""
         if not self.bounded:
             return math.inf  # whatever the sign of N
         F2, F3, *_ = response.multipliers.tolist()

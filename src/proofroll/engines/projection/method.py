@@ -29,7 +29,7 @@ _STANDS, _NONE = np.zeros((2, 3)), np.zeros(0)
 
 
 class Kinematics(NamedTuple):
-    """How the velocities s move the ball: v = D s and v̇ = D ṡ + Ḋ s.
+    """Kinematics of the ball in the velocities s: v = D s and v̇ = D ṡ + Ḋ s.
 
     Attributes:
         local: geometry where the ball is.
@@ -50,7 +50,7 @@ class Kinematics(NamedTuple):
 
 
 class Response(NamedTuple):
-    """What the equations give at one state.
+    """Solution of the equations at one state.
 
     Attributes:
         acceleration: ṡ, shape (5,).
@@ -112,13 +112,13 @@ class ProjectedBall:
     def _carried(
         self, W: FloatArray, q: FloatArray, frame: FloatArray, turning: FloatArray, v: FloatArray
     ) -> FloatArray:
-        """Of a wall that turns at W: W × (p + a e1) and its rate W × (ṗ + a ė1), less what the turning axes make."""
+        """Velocity W × (p + a e1) of a wall that turns at W, and its rate along the turning axes."""
         contact = self._surface.position(q[:2]) @ frame + [self._radius, 0.0, 0.0]
         velocity = cross(W, contact)
         return np.stack([velocity, cross(W, v[:3] + self._radius * turning[:, 0]) - turning @ velocity])
 
     def speed(self, x: FloatArray) -> float:
-        """Of the centre [m/s]."""
+        """Speed of the centre [m/s]."""
         n = self._coordinates
         tangents = self._geometry.at(x[:2]).tangents[1:] if self._tangents is None else self._tangents
         return math.hypot(*tangents.dot(x[n : n + 2]).tolist())
@@ -167,7 +167,7 @@ class ProjectedBall:
         return Response(solution[:5], N, solution[5:])
 
     def response_at(self, x: FloatArray) -> Response:
-        """What :meth:`response` gives at the state x, where the equations are written out by those."""
+        """Solution of :meth:`response` at the state x, from the equations written out where they exist."""
         if self._closed is None:
             return self.response(self.kinematics(x))
         solution, N = self._closed.solve(x)

@@ -1,4 +1,4 @@
-"""What a mode of contact is: its own state y and equations, and the margins that tell when it ends."""
+"""Protocol of a contact mode: its own state y and equations, and the margins that end it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DIFFERENCE = 1e-4
 
 
 class Exit(Enum):
-    """Why a mode ends."""
+    """Reason that a mode ends."""
 
     CONE = auto()  # sticking: the needed friction left the static cone
     HALT = auto()  # sticking with rolling resistance: the centre stands still
@@ -27,7 +27,7 @@ class Exit(Enum):
 
 
 class Survey(NamedTuple):
-    """What a mode says after a step.
+    """Survey of a mode after a step.
 
     Attributes:
         margins: one per exit of the mode; the mode holds while none is negative.
@@ -45,7 +45,7 @@ class Survey(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """Of the motion.
+    """Natural scales of the motion, and limits of the integrator.
 
     Attributes:
         speed, time: natural size of speeds [m/s] and times [s].
@@ -73,11 +73,11 @@ class ContactMode(Protocol):
 
     @property
     def sticking(self) -> bool:
-        """Whether the contact holds by static friction."""
+        """True if the contact holds by static friction."""
 
     @property
     def exits(self) -> tuple[Exit, ...]:
-        """What can end it, in the order of :attr:`Survey.margins`."""
+        """Exits that can end it, in the order of :attr:`Survey.margins`."""
 
     def rates(self, y: FloatArray) -> FloatArray:
         """ẏ."""
@@ -89,7 +89,7 @@ class ContactMode(Protocol):
         """The state with C v brought to the slip that y says."""
 
     def survey(self, y: FloatArray) -> Survey:
-        """How far from its end the mode is."""
+        """Margins of the mode to its end."""
 
     def force(self, y: FloatArray) -> FloatArray:
         """Force of the wall on the ball along the local axes [N], shape (3,)."""

@@ -1,4 +1,4 @@
-"""How the ball's rotation is described: the paper's Euler angles, a quaternion, or nothing but its velocity.
+"""Descriptions of the ball's rotation: the paper's Euler angles, a quaternion, or its velocity alone.
 
 The five velocities are s = [u̇1 u̇2 r1 r2 r3]; here r gives the angular velocity along the local axes,
 ω' = [ω1 ω2 ω3] = A r. A dot on A means its rate seen from the world.
@@ -31,7 +31,7 @@ _LARGEST_SINE = 0.5
 
 
 class Orientation(ABC):
-    """What describes the rotation: angles (none, or three, or a quaternion) and three velocities r.
+    """Description of the rotation: angles (none, or three, or a quaternion) and three velocities r.
 
     Attributes:
         size: number of angles.
@@ -179,7 +179,7 @@ class EulerAngles(Orientation):
         return np.asarray(np.roll(self._orientation(angles).as_quat(), 1), dtype=np.float64)
 
     def _orientation(self, angles: FloatArray) -> Rotation:
-        """Of the ball in the world, identity at time 0."""
+        """Orientation of the ball in the world, identity at time 0."""
         return _body_axes(angles) * self._axes_then.inv() * self._orientation_then
 
 

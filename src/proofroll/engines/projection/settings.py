@@ -1,4 +1,4 @@
-"""What a user can choose about the projection method."""
+"""Settings of the projection method."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class ProjectionSettings:
 
     @property
     def eliminates(self) -> bool:
-        """Whether violations are removed."""
+        """True if violations are removed."""
         return self.elimination is not False
 
     @property

@@ -35,7 +35,7 @@ _DYING = 0.25
 
 
 class _Slip(ABC):
-    """What both descriptions share: ``size`` numbers of a slip behind x."""
+    """Base of both descriptions of slip: ``size`` numbers of a slip behind x."""
 
     sticking = False
     size: ClassVar[int]

@@ -72,7 +72,7 @@ class Stepper(ABC):
         """The state at a time [s] within the last step."""
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
-        """What this method can honestly say of an event found between two times [s]: as tight as it was located."""
+        """Bracket of an event located between two times [s]: as tight as it was located."""
         return low, high
 
 
@@ -106,7 +106,7 @@ class FixedSteps(Stepper):
         return self._accept(t, classical_step(self._rates, self.y_before, t - self.t_before))
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
-        """See :class:`Stepper`. The step of the grid: more could be told only by trusting the step's own error."""
+        """See :class:`Stepper`. The step of the grid: a narrower one would trust the step's own error."""
         start = math.floor(low / self._resolution + _SLIVER) * self._resolution
         return min(start, low), max(start + self._resolution, high)
 

@@ -17,7 +17,7 @@ _CLEAR = 0.25
 
 
 class _Held:
-    """What every set of active rows has in common."""
+    """Base of the modes with active rows."""
 
     sticking = True
 
@@ -97,7 +97,7 @@ class Rest(_Held):
         self._lever, self._ball.rolling_resistance = ball.rolling_resistance, 0.0
 
     def holds(self, x: FloatArray) -> bool:
-        """Whether both, friction and resistance, can hold the ball at x."""
+        """True if friction and resistance can both hold the ball at x."""
         response = self._ball.response(self._ball.kinematics(x))
         moment = math.hypot(*response.multipliers[2:].tolist())
         return self._friction.reserve(response) >= 0 and moment <= self._lever * response.N

@@ -156,7 +156,7 @@ class Switching:
         return exit_, low, high
 
     def _may_dip(self, survey: Survey) -> bool:
-        """Whether a margin that was lowest within the last step could, were it a parabola, come anywhere near zero."""
+        """True if a margin that was lowest within the last step could, were it a parabola, come anywhere near zero."""
         bend = (self.stepper.t - self.stepper.t_before) * (survey.trend - self._survey.trend)
         return min(self._survey.margins[survey.dips], survey.margins[survey.dips]) < bend
 

@@ -77,7 +77,7 @@ class Closed(ABC):
         return tuple([x + sin * y + back * z for x, y, z in zip(start, once, twice, strict=True)])
 
     def angle(self, x: list[float]) -> tuple[float, float]:
-        """Sine and cosine of the angle by which the frame is turned."""
+        """Sine and cosine of the angle of the frame."""
         if self.column is None:
             return 0.0, 1.0
         angle = x[self.column]

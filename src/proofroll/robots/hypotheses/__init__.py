@@ -39,13 +39,13 @@ class EditedRobot(Robot):
 
 @dataclasses.dataclass(frozen=True)
 class RobotEvidence:
-    """What a hypothesis may look at.
+    """Evidence for a hypothesis.
 
     Attributes:
         file: the file.
         robot: what the file describes, with the causes found so far.
         reading: what the engine holds.
-        recompiled: what a changed file would mean, for a format that an engine defines; None where that has no meaning.
+        recompiled: meaning of a changed file, for a format that an engine defines; None where it has none.
     """
 
     file: RobotFile

@@ -1,4 +1,4 @@
-"""Causes by which an importer of MJCF overlooks an attribute, or takes it for another."""
+"""Causes in which an importer of MJCF overlooks an attribute, or takes it for another."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def balance_ignored(evidence: RobotEvidence) -> Robot | None:
 
 
 def _other(body: RobotBody, before: RobotBody) -> bool:
-    """Whether an inertia is another, by more than the round-off of what was added and taken away."""
+    """True if an inertia changed by more than the round-off of what was added and taken away."""
     return bool(np.abs(body.inertia - before.inertia).max() > 1e-9 * np.abs(body.inertia).max())
 
 

@@ -12,7 +12,7 @@ from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
 
 @hypothesis({"drake": "1.51.1"}, "give each further joint a body of its own without mass")
 def body_placed_by_last_joint(evidence: RobotEvidence) -> Robot | None:
-    """Of several joints in one body all but the last are placed in the parent's frame.
+    """All but the last of several joints in one body are placed in the parent's frame.
 
     The body's pose comes with the last.
     """

@@ -1,4 +1,4 @@
-"""Causes by which shapes give a body its mass and inertia, or do not."""
+"""Causes in the mass and inertia that shapes give a body, or do not."""
 
 from __future__ import annotations
 

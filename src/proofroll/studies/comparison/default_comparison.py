@@ -96,14 +96,14 @@ def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -
 
 
 def _provided(workers: Workers | None) -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
-    """What the formulations of each installed engine provide."""
+    """Capabilities of the formulations of each installed engine."""
     for engine, told in described(engine_names(), workers).items():
         if isinstance(told, EngineDescription):
             yield engine, told.provides
 
 
 def _why_none(scene: Scene, workers: Workers | None) -> str:
-    """What no formulation provides; where each is provided by some, of which elements each engine has no model."""
+    """Capabilities that no formulation provides; if there are none, the elements that each engine cannot build."""
     engines = list(_provided(workers))
     given = {item for _, provides in engines for items in provides.values() for item in items}
     if lacking := scene.requires - given:

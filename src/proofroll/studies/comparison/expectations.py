@@ -1,4 +1,4 @@
-"""What a comparison expected of a run, held against what came."""
+"""Expectations of a comparison, held against its results."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE
 def contradictions_of(
     comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
 ) -> list[str]:
-    """What the claim did not expect, as sentences."""
+    """Contradictions of the claim, as sentences."""
     where = f"{run.row.engine}{at_point(run.parameters)}"
     found = []
     row, expected = run.row, run.row.expected(run.parameters)

@@ -32,7 +32,7 @@ def point_name(parameters: dict[str, float]) -> str:
 
 
 def at_point(parameters: dict[str, float]) -> str:
-    """Where in a sentence, e.g. `` at speed=4``; nothing where a comparison has one point alone."""
+    """Phrase with a point's parameters, e.g. `` at speed=4``; empty where a comparison has one point alone."""
     return f" at {point_name(parameters)}" if parameters else ""
 
 
@@ -181,7 +181,7 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
 def _rungs(
     rows: list[Row], resolved: list[EngineFacts | ProofrollError], workers: Workers | None
 ) -> list[dict[float, EngineFacts]]:
-    """For every row the facts of its ladder: its own settings with the resolution scaled, where that is allowed."""
+    """Facts of the ladder of every row: its own settings with the resolution scaled, where that is allowed."""
     wanted: list[tuple[int, float, EngineFacts]] = []
     for index, (row, facts) in enumerate(zip(rows, resolved, strict=True)):
         if isinstance(facts, EngineFacts) and facts.resolution is not None:
@@ -199,7 +199,7 @@ def _rungs(
 
 
 def _asked(facts: EngineFacts, factor: float) -> bool:
-    """Whether a ladder has this rung: a relative tolerance of 1 or more asks for nothing."""
+    """True if a ladder has this rung: a relative tolerance of 1 or more asks for nothing."""
     return facts.resolution != "rtol" or facts.settings["rtol"] * _scaled(facts, factor) < 1
 
 

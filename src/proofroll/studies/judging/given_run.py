@@ -34,7 +34,7 @@ FROM_STATE = "it is taken from the state"
 
 @dataclass(frozen=True)
 class GivenRun:
-    """What somebody gave.
+    """Run of the user.
 
     Attributes:
         dataset: with ``time``, and with all that follows from the state where that is given.
@@ -113,7 +113,7 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
 
 
 def _whole(run: xr.Dataset, scene: Scene) -> bool:
-    """Whether a file that was once a run has all that its motion is told by."""
+    """True if a file that was once a run has all variables of its motion."""
     try:
         found = observe(scene, run)
     except (KeyError, AttributeError):  # of xarray, for a variable or an attribute of one that is not there
@@ -194,7 +194,7 @@ def _check_lengths(given: Mapping[str, Any]) -> None:
 
 
 def _completed(run: xr.Dataset, scene: Scene, times: FloatArray, names: list[str]) -> xr.Dataset:
-    """All that follows from the state."""
+    """Dataset with all variables that follow from the state."""
     sample_type = scene.elements[0].sample_type
     arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
     samples = [sample_type(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]

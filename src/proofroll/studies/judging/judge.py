@@ -49,11 +49,11 @@ class Compared:
 
     @property
     def agrees(self) -> bool:
-        """Whether it is within its tolerance of the truth, and the truth known well enough to say so."""
+        """True if it is within its tolerance of the truth, and the truth known well enough to judge."""
         return self.judgement.verdict is Verdict.AGREES
 
     def __str__(self) -> str:
-        """What differs, by how much and when, how much may, and how well the truth is known."""
+        """Difference of the quantity with its time, its tolerance, and the error bar of the truth."""
         found = self.judgement
         unit = "" if found.unit == "1" else f" {found.unit}"
         when = "" if self.at is None else f" at {self.at:.4g} s"
@@ -75,7 +75,7 @@ class Judged:
     Attributes:
         scene: its name.
         compared: each quantity that was judged, the farthest from its tolerance first.
-        because: why the tolerances are what they are; empty if nobody says.
+        because: why the tolerances are what they are; empty if not given.
         unjudged: variables that were given and are not judged -> why.
     """
 
@@ -86,7 +86,7 @@ class Judged:
 
     @property
     def agrees(self) -> bool:
-        """Whether every quantity does."""
+        """True if every quantity agrees."""
         return all(item.agrees for item in self.compared)
 
     def __str__(self) -> str:
@@ -117,7 +117,7 @@ class Judged:
         return f"<p><b>{escape(head)}</b></p><table><tr>{header}</tr>{''.join(rows)}</table>{rest}"
 
     def content(self) -> dict[str, Any]:
-        """As plain data."""
+        """Plain data for JSON."""
         names = ("observable", "unit", "error", "tolerance", "truth_error_bar", "scale")
         rows = [
             {name: getattr(item.judgement, name) for name in names}
@@ -169,7 +169,7 @@ def judge(
 
 
 def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """What somebody gave besides -> why it is not judged."""
+    """Reasons that further variables of the user's run are not judged, by name."""
     found = {}
     for name, why in given.besides.items():
         if not _comparable(reference, name):
@@ -180,13 +180,13 @@ def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolera
 
 
 def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """What a run says of its events, for which nobody gives a tolerance -> why it is not judged."""
+    """Reasons that events of a run are not judged without a tolerance, by name."""
     names = [name for name in observed if scene.observables[name].role is Role.EVENT and name not in judged]
     return dict.fromkeys(names, _NO_TOLERANCE) if any(observed[name].size for name in names) else {}
 
 
 def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
-    """What of a whole run is not judged, for its samples do not tell it -> why."""
+    """Reasons that variables of a whole run are too coarsely sampled to judge, by name."""
     found = {}
     for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
         if name in dataset and UNCERTAIN in dataset[name].attrs:
@@ -213,7 +213,7 @@ def _bounds(
     observed: Mapping[str, FloatArray],
     variables: Sequence[str],
 ) -> dict[str, Tolerance]:
-    """What is judged, and how far it may be off: observables of a whole run, else variables that the truth has too."""
+    """Judged names with their tolerances: observables of a whole run, else variables that the truth has too."""
     scene = reference.scene
     able = list(dict.fromkeys([*observed, *(name for name in variables if _comparable(reference, name))]))
     if not able:
@@ -234,19 +234,19 @@ def _bounds(
 
 
 def _is_main(item: Observable) -> bool:
-    """Whether it is judged where nobody says what: what a person asks for first, and every force and moment."""
+    """True if it is judged by default: headline observables, and every force and moment."""
     return item.headline or (item.role is Role.REACTION and item.unit != "1")
 
 
 def _states(reference: Reference, variables: Sequence[str]) -> list[str]:
-    """What is given of the state, and is judged as it is: places, velocities, spins and orientations."""
+    """Given parts of the state, judged as they are: places, velocities, spins and orientations."""
     scene = reference.scene
     states = {scene.label(element, name) for element in scene.elements for name in element.sample_type.widths}
     return [name for name in variables if name in states and _comparable(reference, name)]
 
 
 def _size(reference: Reference, name: str, true: FloatArray, unit: str) -> float:
-    """What a percentage of a variable refers to: its range, but no less than a hundredth of what is natural."""
+    """Size that a percentage of a variable refers to: its range, but at least a hundredth of the natural one."""
     if unit == "1":
         return 1.0  # of quaternions
     natural = 0.0
@@ -304,7 +304,7 @@ def _compared(
 
 
 def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:
-    """When two curves are farthest apart [s]."""
+    """Time at which two curves are farthest apart [s]."""
     if values.shape != true.shape or not values.size or len(values) not in {len(times), len(times) - 1}:
         return None
     apart = np.abs(values - true).reshape(len(values), -1).max(axis=1)

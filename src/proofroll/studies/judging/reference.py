@@ -43,12 +43,12 @@ class Reference:
 
     @classmethod
     def read(cls, scene: Scene, path: Path) -> Self:
-        """From a stored trajectory of the truth."""
+        """Reference from a stored trajectory of the truth."""
         return cls.of(scene, read(path))
 
     @classmethod
     def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:
-        """From a trajectory of the truth."""
+        """Reference from a trajectory of the truth."""
         return cls(scene, dataset, observe(scene, dataset), scales(scene, dataset))
 
     def common_span(self, trajectories: Mapping[Key, xr.Dataset]) -> tuple[Reference, dict[Key, xr.Dataset]]:
@@ -59,7 +59,7 @@ class Reference:
         return replace(self, dataset=truth, curves=observe(self.scene, truth)), runs
 
     def another_scene(self, lines: Sequence[Mapping[str, Any]]) -> str | None:
-        """Why a model with this certificate is of another kind than the scene, as one clause; None: it is not."""
+        """Reason that a model with this certificate is of another kind, as one clause; None: it is not."""
         for element in self.scene.elements:
             if isinstance(element, KnowsAnotherScene):
                 why = element.another_scene(lines, part(self.scene, element, self.dataset))
@@ -69,7 +69,7 @@ class Reference:
 
     @property
     def ill_posed(self) -> bool:
-        """Whether the answer hangs on less than the parameters are known to."""
+        """True if the result is sensitive below parameter precision."""
         return bool(self.dataset.attrs.get("ill_posed"))
 
     def shared(self, routes: Collection[str]) -> str:
@@ -83,14 +83,14 @@ class Reference:
         return f"rests on the same equations as the truth itself ({names[own[0]]}): {checked}"
 
     def doubt(self, name: str) -> Doubt:
-        """What is left to be judged of an observable where the time of the first slip is ill-posed."""
+        """Part of an observable that cannot be judged where the time of the first slip is ill-posed."""
         item = self.scene.observables[name]
         if not self.ill_posed or not item.hangs_on_events:
             return Doubt.NONE
         return Doubt.EVERYTHING if item.role == Role.EVENT else Doubt.DIFFERENCES
 
     def scale(self, name: str) -> float | None:
-        """What a percentage of an observable refers to: its size, for an event its time; None: nothing."""
+        """Size that a percentage of an observable refers to: its scale, for an event its time; None: nothing."""
         if self.scene.observables[name].role == Role.EVENT and name in self.curves:
             return next((float(time) for time in self.curves[name]), None)
         return self.sizes.get(name)
@@ -107,7 +107,7 @@ class Reference:
         return {name: values for name, values in sure.items() if values is not None}
 
     def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
-        """The true values of an observable of which an engine gave ``values``, and their error bar."""
+        """True values of an observable with ``values`` from an engine, and their error bar."""
         item = self.scene.observables[name]
         if item.name == EVENT_ORDER:
             return np.zeros(1), 0.0
@@ -120,9 +120,9 @@ class Reference:
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 
     def between(self, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
-        """An observable or state of a run off the grid, and its true values there; None: there is nothing to compare.
+        """Values of an observable or state of a run off the grid, and its true values there; None: nothing to compare.
 
-        Where a sampling interval holds an event, of the run or of the truth, nobody is held to it: within a step of
+        A sampling interval with an event, of the run or of the truth, does not count: within a step of
         the engine forces may still be those before.
         """
         own, item = f"{BETWEEN}.{name}", self.scene.observables.get(name)
@@ -143,7 +143,7 @@ class Reference:
         return None if turned is None else (turned[said], true[said])
 
     def magnitude(self, name: str) -> float:
-        """Of the numbers of which an observable is a small difference; 0: of none."""
+        """Size of the numbers whose small difference an observable is; 0: it is none."""
         for element in self.scene.elements:
             for item in element.observables:
                 if item.difference_of and self.scene.label(element, item.name) == name:
@@ -151,7 +151,7 @@ class Reference:
         return 0.0
 
     def own_bar(self, name: str, dataset: xr.Dataset) -> float:
-        """How far a run leaves open what it shows of an observable: half the width of its widest event."""
+        """Error bar of a run for an observable: half the width of its widest event."""
         item = self.scene.observables[name]
         if item.role != Role.EVENT or item.name == EVENT_ORDER:
             return 0.0
@@ -159,16 +159,16 @@ class Reference:
 
     @property
     def sampled_bar(self) -> float:
-        """How far samples leave open when an event is [s]: half the longest interval between two."""
+        """Error bar of the time of an event between samples [s]: half the longest interval between two."""
         return float(np.max(np.diff(self.dataset["time"].to_numpy()), initial=0.0)) / 2
 
     @property
     def events(self) -> list[Event]:
-        """Of all elements."""
+        """Events of all elements."""
         return self.events_of(self.dataset)
 
     def events_of(self, dataset: xr.Dataset) -> list[Event]:
-        """Of all elements, in another run."""
+        """Events of all elements in another run."""
         return [event for item in self.scene.elements for event in events_of(part(self.scene, item, dataset))]
 
 
@@ -180,6 +180,6 @@ def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
 
 
 def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
-    """How many of the events are of another kind than the truth's, or missing, or too many."""
+    """Count of events that are missing, too many, or of another kind than the truth's."""
     kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
     return np.array([float(sum(a != b for a, b in kinds))])

@@ -34,7 +34,7 @@ _TIME_LIMIT = 60.0  # wall seconds for one case
 
 @dataclass(frozen=True)
 class ModelAnswer:
-    """What one model gave.
+    """Answer of one model.
 
     Attributes:
         case: what was run; None if its settings make no sense or its engine is missing.
@@ -177,7 +177,7 @@ def key_of(model: LadderModel) -> str:
 
 
 def absence(error: ProofrollError) -> Result:
-    """Why an engine, or its settings, could not be asked."""
+    """Result for an engine, or settings, that could not be asked."""
     if isinstance(error, WorkerDied):
         return Result(error.status, str(error))
     return Result(Status.REFUSED if isinstance(error, InputError) else Status.MISSING, str(error))

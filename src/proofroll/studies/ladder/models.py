@@ -42,7 +42,7 @@ class LadderModel:
 
     @property
     def formulation(self) -> str:
-        """Which of the engine's models."""
+        """Name of the engine's model."""
         return str(self.options["formulation"])
 
 
@@ -135,7 +135,7 @@ def switches(
 
 
 def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:
-    """What the scene's elements can have or not."""
+    """Switches of the optional terms of the scene's elements."""
     found: list[Switch] = []
     for element in scene.elements:
         for term in element.optional_terms(scene.parameters, part(scene, element, truth)):
@@ -149,7 +149,7 @@ def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent:
 
 
 class Need(StrEnum):
-    """Whether a term is needed; the value is what a person reads."""
+    """Need of a term; the value is a text for a person."""
 
     NEEDED = "needed"
     NOT_NEEDED = "paid for, not needed"
@@ -174,7 +174,7 @@ class Ran:
 
     @property
     def ending(self) -> str:
-        """How it ended."""
+        """Status and message of the end."""
         return f"{self.status}, {self.message}"
 
 

@@ -83,7 +83,7 @@ def thinned(values: Sequence[float], count: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Effort:
-    """How much a map may cost.
+    """Limits on the cost of a map.
 
     Attributes:
         periods: length of every run in natural times; an axis may say otherwise.
@@ -92,7 +92,7 @@ class Effort:
             looks for a boundary on the same rungs.
         limit: a run that takes longer is ended [s]; a worker's start counts. What it would have shown is left open.
         longest: lengths of runs in natural times that an axis may have, or None: any.
-        matched: of each formulation only the matched settings are mapped, or its first where there are none.
+        matched: only the matched settings of each formulation are mapped, or its first where there are none.
     """
 
     periods: float = 3.0

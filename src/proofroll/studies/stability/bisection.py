@@ -9,15 +9,15 @@ from typing import Generic, Protocol, TypeVar
 
 
 class RungVerdict(Protocol):
-    """What a run on a rung gave."""
+    """Verdict of a run on a rung."""
 
     @property
     def stable(self) -> bool:
-        """Whether it held together."""
+        """True if it held together."""
 
     @property
     def accurate(self) -> bool:
-        """Whether it was right as well; never without being stable."""
+        """True if it was right as well; never without being stable."""
 
 
 V = TypeVar("V", bound=RungVerdict)
@@ -25,7 +25,7 @@ V = TypeVar("V", bound=RungVerdict)
 
 @dataclass
 class SearchResult(Generic[V]):
-    """What a search found; rungs are numbered from the coarsest.
+    """Result of a search; rungs are numbered from the coarsest.
 
     Attributes:
         seen: rung -> what a run on it gave.

@@ -28,11 +28,11 @@ _TRIED = 4
 
 @dataclass(frozen=True)
 class Claim:
-    """What is claimed of an engine's boundaries.
+    """Claim about an engine's boundaries.
 
     Attributes:
         engine: name, or ``name[key=value,…]``; every curve with these settings.
-        boundary: of which.
+        boundary: which of the two.
         because: why.
         axes: along which; all if empty.
         values: lowest and highest value of the axis; all if empty.
@@ -57,7 +57,7 @@ class Claim:
     silent: bool | None = None
 
     def untested(self, points: Sequence[BoundaryPoint]) -> str:
-        """Why the points of a map can say nothing of it; empty if they can."""
+        """Reason that the points of a map cannot test it; empty if they can."""
         about = [point for point in points if self._about(point) and not point.problem]
         if not about:
             return "no point of this map is about it"
@@ -74,7 +74,7 @@ class Claim:
         return ""
 
     def contradictions(self, points: Sequence[BoundaryPoint]) -> list[str]:
-        """What the points of a map do not confirm, as sentences; where a run met the limit of time, nothing."""
+        """Contradictions by the points of a map, as sentences; none where a run met the limit of time."""
         found = []
         about = [p for p in points if self._about(p) and not p.problem and not p.timed_out]
         if self.same:
@@ -102,7 +102,7 @@ class Claim:
         return not self.values or self.values[0] <= point.value <= self.values[1]
 
     def _wrong(self, side: Boundary, cut: bool) -> list[str]:
-        """Of one boundary; where the search was ``cut`` for its many steps, a boundary that is missing says nothing."""
+        """Contradictions by one boundary; a missing boundary is none if the search was ``cut`` for its many steps."""
         found = []
         largest = side.largest
         if self.never and largest is not None:
@@ -125,7 +125,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class StabilityFile:
-    """What a file asks and claims.
+    """Question and claims of a stability map's file.
 
     Attributes:
         name: of the file, without ending.
@@ -145,7 +145,7 @@ class StabilityFile:
     on_request: bool = False
 
     def contradictions(self, study: StabilityStudy) -> list[str]:
-        """What a map does not confirm, as sentences."""
+        """Contradictions by a map, as sentences."""
         return [sentence for claim in self.claims for sentence in claim.contradictions(study.points)]
 
 

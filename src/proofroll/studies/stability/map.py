@@ -1,4 +1,4 @@
-"""Where every engine, formulation and setting stops being right, along axes that take a scene to its extremes.
+"""Stability map of every engine, formulation and setting, along axes that take a scene to its extremes.
 
 Each point of the map is a search for two boundaries on a ladder of steps or tolerances. All searches go on side by
 side, each as fast as its answers come. Every run is a stored case, so an interrupted map resumes where it was.
@@ -59,7 +59,7 @@ class MapPoint:
         return dataclasses.replace(facts, settings={**facts.settings, str(facts.resolution): self.ladder[rung]})
 
     def too_long(self, rung: int, effort: Effort) -> bool:
-        """Whether a run is not made: it has too many steps, or coarser ones met the limit of time.
+        """True if a run is not made: it has too many steps, or coarser ones met the limit of time.
 
         The coarsest is always made: in a long run it may have more steps than are allowed to a finer one.
         """
@@ -69,13 +69,13 @@ class MapPoint:
 
     @property
     def timeouts(self) -> int:
-        """How many runs met the limit of time."""
+        """Count of runs that met the limit of time."""
         return sum(result.status == Status.TIMEOUT for result in self.results.values())
 
 
 @dataclass
 class StabilityMap:
-    """What the study found.
+    """Stability map as found.
 
     Attributes:
         scene: name of the scene.
@@ -94,7 +94,7 @@ class StabilityMap:
 
     @property
     def runs(self) -> int:
-        """How many runs there were."""
+        """Count of runs."""
         return sum(len(point.results) for point in self.points)
 
 
@@ -232,7 +232,7 @@ def failure_beyond(point: MapPoint, rung: int | None) -> RunOutcome | None:
 
 
 def stability_path(folder: Path, scene: str, axes: Sequence[Axis], engines: Sequence[str], effort: Effort) -> Path:
-    """Where a map is kept: a file for each scene, axes with their values, engines and effort."""
+    """File of a map: one for each scene, axes with their values, engines and effort."""
     identity = [load_scene(scene).digest, [dataclasses.asdict(axis) for axis in axes], sorted(engines), repr(effort)]
     digest = hashlib.sha256(json.dumps(identity).encode()).hexdigest()[:10]
     return folder / "stability" / f"{Path(scene).name}-{digest}.json"

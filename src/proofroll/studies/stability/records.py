@@ -1,4 +1,4 @@
-"""What a stability map is kept as, printed as, judged by and drawn from."""
+"""Records of a stability map, for its file, its text, its verdict and its drawings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SAME = {True: 2.3, False: 15.0}
 
 @dataclass(frozen=True)
 class Boundary:
-    """Where a curve stops being stable, or accurate, at one place.
+    """Boundary at which a curve stops being stable, or accurate, at one place.
 
     Attributes:
         largest: step [s] or tolerance that holds; None: none that is affordable does.
@@ -27,7 +27,7 @@ class Boundary:
         numbers: dimensionless numbers of that step, by name.
         beyond: the next step or tolerance, which fails.
         failure: what happens there.
-        silent: the engine does not say so.
+        silent: the engine does not report it.
         error: of the deciding observable there, in parts of its range.
         time: when the failure shows [s].
         message: how the run there ended.
@@ -103,7 +103,7 @@ class BoundaryPoint:
 
     @property
     def cut(self) -> bool:
-        """Whether the search ended for runs that were too slow: a boundary that is missing then says nothing."""
+        """True if the search ended for runs that were too slow: a missing boundary then proves nothing."""
         return self.too_slow is not None
 
 
@@ -186,9 +186,9 @@ class StabilityStudy:
 
 
 def dependence(points: Sequence[BoundaryPoint], name: str) -> str:
-    """How a boundary, in parts of the natural time, changes along an axis, if it does; else nothing.
+    """Change of a boundary, in parts of the natural time, along an axis; empty if there is none.
 
-    The points are those of one curve. Where the search was cut for its many steps, a missing boundary says nothing.
+    The points are those of one curve. Where the search was cut for its many steps, a missing boundary proves nothing.
     """
     fixed_step = any(point.resolution == "dt" for point in points)
     sizes = [

@@ -57,7 +57,7 @@ class Explanation:
 
 
 def explanation(boundaries: Sequence[Mapping[str, float]]) -> Explanation | None:
-    """Which number explains the boundaries of one engine along one axis; None: there are too few of them."""
+    """Number that explains the boundaries of one engine along one axis; None: there are too few of them."""
     if len(boundaries) < _ENOUGH:
         return None
     common = [name for name in boundaries[0] if name != OSCILLATION and all(name in item for item in boundaries)]

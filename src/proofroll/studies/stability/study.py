@@ -59,7 +59,7 @@ def make_stability(
 
 
 def stability_study(found: StabilityMap) -> StabilityStudy:
-    """Everything, with counts on top."""
+    """Record of a stability map, with counts on top."""
     points = [_point(point) for point in found.points]
     scene = load_scene(found.scene)
     failing = [point for point in points if point.failure and point.failure not in NOT_RUN]
@@ -146,7 +146,7 @@ def _side(point: MapPoint, name: str) -> Boundary:
 
 
 def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
-    """For every curve, axis and boundary, the number that is the most constant along the axis."""
+    """Most constant dimensionless number of every curve, axis and boundary, along the axis."""
     found = []
     for curve in dict.fromkeys(point.curve for point in points):
         for axis in dict.fromkeys(point.axis for point in points):
@@ -159,7 +159,7 @@ def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
 
 
 def _scale_findings(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
-    """What depends on an axis along which the dimensionless problem is the same, as sentences."""
+    """Sentences on results that depend on an axis along which the dimensionless problem is the same."""
     sentences = []
     for axis in (axis for axis in found.axes if axis.scale_free):
         for curve in dict.fromkeys(point.curve for point in points):

@@ -23,7 +23,7 @@ STUDY = "tradeoff"
 
 @dataclass(frozen=True)
 class TradeoffClaims:
-    """What a file asks and claims.
+    """Question and claims of a trade-off's file.
 
     Attributes:
         name: of the file, without ending.
@@ -47,20 +47,20 @@ class TradeoffClaims:
 
     @property
     def swept(self) -> Question:
-        """What is to be swept."""
+        """Question that is swept."""
         return Question(self.scene, self.parameters, self.until, self.quantity)
 
     def judged(self, study: TradeoffStudy) -> list[ClaimJudgement]:
-        """What a study says of each claim."""
+        """Judgement of each claim by a study."""
         claims: list[Holds | Converges | Cheapest] = [*self.holds, *self.converges, *self.cheapest]
         return [claim.judged(study, self.quantity) for claim in claims]
 
     def contradictions(self, study: TradeoffStudy) -> list[str]:
-        """What a study contradicts, as sentences."""
+        """Contradicted claims, as sentences."""
         return self._said(study, False, "contradicted")
 
     def undecided(self, study: TradeoffStudy) -> list[str]:
-        """What a study neither confirms nor contradicts, as sentences."""
+        """Undecided claims, as sentences."""
         return self._said(study, None, "undecided")
 
     def _said(self, study: TradeoffStudy, verdict: bool | None, word: str) -> list[str]:

@@ -1,7 +1,7 @@
-"""What can be claimed of a trade-off, and how a study judges it: steps and orders exactly, cost by ratios.
+"""Claims about a trade-off, and their judgement: steps and orders exactly, cost by ratios.
 
-A claim that the measured costs do not decide is neither held nor contradicted: nothing that hangs on how fast a
-machine is, or on what else it does, may contradict one.
+A claim that the measured costs do not decide is neither held nor contradicted: the speed of a
+machine, or its other work, must not contradict one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from proofroll.studies.tradeoff.requirements import Wish
 
 @dataclass(frozen=True)
 class ClaimJudgement:
-    """What a study says of a claim.
+    """Judgement of a claim by a study.
 
     Attributes:
         claim: in one sentence.
@@ -37,10 +37,10 @@ class ClaimJudgement:
 
 @dataclass(frozen=True)
 class Holds:
-    """The coarsest step that is claimed to hold a tolerance with margin at the scene's own parameters; no clock.
+    """Claim: the coarsest step that holds a tolerance with margin at the scene's own parameters; no clock.
 
     Attributes:
-        engine: of which curves, ``name[key=value,…]``.
+        engine: whose curves, ``name[key=value,…]``.
         tolerance: of the quantity.
         step: the coarsest of the sweep that holds it [s], or the loosest tolerance.
         because: why.
@@ -66,10 +66,10 @@ class Holds:
 
 @dataclass(frozen=True)
 class Converges:
-    """The order of convergence that is claimed; no clock.
+    """Claim: the order of convergence; no clock.
 
     Attributes:
-        engine: of which curves, ``name[key=value,…]``.
+        engine: whose curves, ``name[key=value,…]``.
         order: lowest and highest.
         because: why.
     """
@@ -96,7 +96,7 @@ class Converges:
 
 @dataclass(frozen=True)
 class Cheapest:
-    """Which engine is claimed to be the cheapest at a tolerance.
+    """Claim: the cheapest engine at a tolerance.
 
     Attributes:
         tolerance: of the quantity.
@@ -111,7 +111,7 @@ class Cheapest:
     levels: list[Level] = field(default_factory=list)
 
     def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
-        """By the ratio of its cost to that of the cheapest other that holds the tolerance.
+        """Judges by the ratio of its cost to that of the cheapest other that holds the tolerance.
 
         It holds where the whole interval of the ratio is at most 1, and is contradicted where all of it exceeds
         :data:`proofroll.running.timing.FACTOR`, which no brief study can show; where no step of the engine holds the
@@ -157,7 +157,7 @@ def _name(point: MeasuredPoint) -> str:
 
 
 def _unknown(study: TradeoffStudy, engines: Sequence[str]) -> str:
-    """Why nothing can be said of some engines here; empty if something can."""
+    """Reason that the study knows nothing of some engines; empty if it does."""
     about = [point for point in study.points if any(fits(point, text) for text in engines)]
     if not about:
         return "it was not measured"

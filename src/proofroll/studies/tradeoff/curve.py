@@ -32,7 +32,7 @@ _SAME = 1e-6
 
 @dataclass(frozen=True)
 class Question:
-    """What is swept.
+    """Subject of a sweep.
 
     Attributes:
         scene: name of the scene.
@@ -57,7 +57,7 @@ class Question:
         return float(f"{self.until / SPARSE:.12g}")
 
     def step(self, factor: float) -> float:
-        """So many sampling intervals [s], without the digits that multiplying leaves (0.005000000000000001)."""
+        """Step of several sampling intervals [s], without digits that multiplying leaves (0.005000000000000001)."""
         return float(f"{self.every * factor:.12g}")
 
     def loaded(self) -> Scene:
@@ -107,7 +107,7 @@ class CurvePoint:
 
 
 class Floor(NamedTuple):
-    """Where the runs of a curve come no closer, for each step rounds the state.
+    """Floor of a curve, below which its runs come no closer because each step rounds the state.
 
     Attributes:
         best: the most accurate run; those with smaller steps are worse.
@@ -140,7 +140,7 @@ class Curve:
 
     @property
     def fixed_step(self) -> bool:
-        """Whether it is swept over steps rather than over tolerances."""
+        """True if it is swept over steps rather than over tolerances."""
         return self.facts.resolution == "dt"
 
     @property
@@ -149,16 +149,16 @@ class Curve:
         return {point.step for point in self.points} | self.dropped.keys()
 
     def envelope(self, quantity: str) -> list[float]:
-        """Of each point's error, see :func:`proofroll.studies.tradeoff.pareto.envelope`.
+        """Envelope of the points' errors, see :func:`proofroll.studies.tradeoff.pareto.envelope`.
 
-        That round-off of single precision grows below the best step says nothing of this one.
+        Below the best step the round-off of single precision grows; that counts against no larger step.
         """
         errors, floor = [point.errors.get(quantity, np.inf) for point in self.points], self.floor(quantity)
         last = self.points.index(floor.best) + 1 if floor else len(errors)
         return envelope(errors[:last]) + errors[last:]
 
     def floor(self, quantity: str) -> Floor | None:
-        """Where smaller steps become worse in single precision; None: double, or none of them is."""
+        """Floor at which smaller steps become worse in single precision; None: double, or none of them is worse."""
         if self.facts.precision == "double" or not self.fixed_step:
             return None
         done = [point for point in self.points if np.isfinite(point.errors.get(quantity, np.inf))]
@@ -174,7 +174,7 @@ class Curve:
         return Floor(done[best], errors[best], changes[least + 1])
 
     def saturated(self, quantity: str) -> bool:
-        """Whether the two loosest tolerances give the same run: something else than they limits its steps.
+        """True if the two loosest tolerances give the same run: something else than they limits its steps.
 
         Where an array happens to lie in memory may change the round-off of a run, so equal is equal up to that.
         """

@@ -123,7 +123,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
 
 
 def _contradicted(order: Order, declared: int | None) -> bool:
-    """Whether the declared order lies outside the interval of the observed one."""
+    """True if the declared order lies outside the interval of the observed one."""
     if declared is None or order.low is None or order.high is None:
         return False
     return not order.low - _SLACK <= declared <= order.high + _SLACK
@@ -188,7 +188,7 @@ def _coarse_end(curve: Curve, quantity: str, every: float, limit: Limit) -> tupl
 
 
 def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: float | None, truth: float) -> str:
-    """What the error of a run at some distance from the limit of small steps mostly is."""
+    """Dominating part of the error of a run at some distance from the limit of small steps."""
     # Where the runs still approach one another, what is not known of their limit is the time step's too.
     time_step = max(size(departure), limit.error_bar if floor is None else 0.0)
     parts = {TIME_STEP: time_step, TRUTH: truth, FLOOR: floor or 0.0}
@@ -198,7 +198,7 @@ def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: flo
 
 
 def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
-    """What dominates the error at each end, for a person."""
+    """Sentence on the dominating part of the error at each end."""
     assert found.model_form is not None  # there are enough runs
     assert found.model_form_bar is not None
     step = " s" if resolution == "dt" else ""

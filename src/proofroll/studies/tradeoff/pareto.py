@@ -1,4 +1,4 @@
-"""Which points nothing beats: at most as expensive and at most as wrong."""
+"""Pareto front: points that no other is both as cheap and as accurate as."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def envelope(errors: Sequence[float]) -> list[float]:
 
 
 def tied(one: Sequence[float] | None, other: Sequence[float] | None) -> bool:
-    """Whether two costs cannot be told apart: their intervals (low, high) overlap; not where one has none."""
+    """True if the intervals (low, high) of two costs overlap; False if one has none."""
     return one is not None and other is not None and one[0] <= other[1] and other[0] <= one[1]
 
 

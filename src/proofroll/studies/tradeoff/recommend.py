@@ -24,7 +24,7 @@ _BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
 
 
 def by_hand(level: str | None) -> bool:
-    """Whether a rung of the ladder solves equations derived for the scene, and is not an engine's model of it."""
+    """True if a rung of the ladder solves equations derived for the scene, and is not an engine's model of it."""
     return level in set(_BY_HAND)
 
 
@@ -37,21 +37,21 @@ class Choice:
     reason: str
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: what a person needs of the point, the error and the reason."""
+        """Point, error and reason for JSON."""
         told = {name: getattr(self.point, name) for name in _OF_A_POINT}
         return told | {"caveat": self.point.caveat, "error": self.error, "reason": self.reason}
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What to use for a tolerance of a quantity.
+    """Advice for a tolerance of a quantity.
 
     Attributes:
         quantity, unit: what matters.
         tolerance: in that unit.
         margin: how many times smaller an error must be.
         choice: the cheapest point that holds the tolerance with margin, and at every corner of the range.
-        ties: others that hold it and whose cost cannot be told from the choice's, for their intervals overlap.
+        ties: others that hold it and whose cost is not distinguishable from the choice's, for their intervals overlap.
         runner_up: the cheapest of another engine or formulation.
         first_failure: of all cheaper points, which fail, the most accurate.
         least_model: the cheapest solution of the scene's own equations.
@@ -191,7 +191,7 @@ def _asked(point: MeasuredPoint, wish: Wish) -> bool:
 
 
 def fits(point: MeasuredPoint, text: str) -> bool:
-    """Whether a point is of the engine, and has the settings, of ``name[key=value,…]``."""
+    """True if a point is of the engine, and has the settings, of ``name[key=value,…]``."""
     spec = parse_engine(text)
     if point.engine != spec.name:
         return False
@@ -199,7 +199,7 @@ def fits(point: MeasuredPoint, text: str) -> bool:
 
 
 def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:
-    """Whether a study restricted to some engines (to none: of all) can answer about those that are asked for."""
+    """True if a study restricted to some engines (to none: of all) can answer about the engines asked for."""
     if not measured or not asked:
         return not measured
     whole = {spec.name for spec in map(parse_engine, measured) if not spec.options}
@@ -214,7 +214,7 @@ def _same(value: object, text: str) -> bool:
 
 
 def _holds(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str:
-    """By how much a point holds the tolerance."""
+    """Margin by which a point holds the tolerance, as text."""
     held, bar = point.held(wish.quantity), study.quantities[wish.quantity].truth_error_bar or 0.0
     if not max(held, bar):
         return "no error is seen"

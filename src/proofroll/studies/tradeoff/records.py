@@ -1,4 +1,4 @@
-"""What a trade-off is kept as, printed as, answered from and drawn from."""
+"""Records of a trade-off, for its file, its text, its advice and its drawings."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from proofroll.studies.study_store import Measured
 
 @dataclass(frozen=True, kw_only=True)
 class MeasuredCost:
-    """What computing costs.
+    """Cost of computing.
 
     Attributes:
         seconds_per_second: median of wall seconds per simulated second; None: not measured.
@@ -114,10 +114,10 @@ class MeasuredPoint(MeasuredCost):
 
 @dataclass(frozen=True)
 class MeasuredQuantity:
-    """An observable: its unit, what a percentage of it refers to, and the truth's error bar; None: there is none.
+    """Record of an observable: unit, size that a percentage refers to, and the truth's error bar; None: there is none.
 
-    ``symbol`` is what heads its columns, and ``column`` says whether tables show it where nobody
-    says which quantities they show.
+    ``symbol`` is what heads its columns, and ``column`` is true if tables show it by
+    default.
     """
 
     unit: str
@@ -138,7 +138,7 @@ class DroppedStep:
 
 @dataclass(frozen=True, kw_only=True)
 class CurveBudget:
-    """What the error of one quantity consists of along a curve; lengths of error in the quantity's unit.
+    """Makeup of the error of one quantity along a curve; lengths of error in the quantity's unit.
 
     Attributes:
         engine, curve, quantity: which.
@@ -185,14 +185,14 @@ class CurveBudget:
 
 @dataclass(frozen=True, kw_only=True)
 class TruthCost(MeasuredCost):
-    """What the truth costs, and by which route it was computed."""
+    """Cost of the truth, and its route."""
 
     route: str
 
 
 @dataclass(frozen=True)
 class TradeoffJudged:
-    """What the claims of a file say of a study, as sentences."""
+    """Judgements of a file's claims by a study, as sentences."""
 
     file: str | None = None
     contradictions: list[str] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What is asked of a recommendation, and why a measured point does not hold it."""
+"""Requirements of a recommendation, and reasons that a measured point does not meet them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MARGIN = 2.0
 
 @dataclass(frozen=True)
 class Wish:
-    """What is asked for.
+    """Requirements of a recommendation.
 
     Attributes:
         quantity: an observable.
@@ -48,7 +48,7 @@ def absolute_tolerance(study: TradeoffStudy, wish: Wish) -> float:
 
 
 def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str | None:
-    """Why a point does not hold the tolerance, in one sentence; None if it does."""
+    """Reason that a point does not hold the tolerance, in one sentence; None if it does."""
     sparse = point.sparse
     lives = _lives_on_the_grid(study, sparse, wish.quantity, absolute) if sparse else None
     return (
@@ -59,7 +59,7 @@ def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolut
 
 
 def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolute: float) -> str | None:
-    """Why it does not hold it with margin at the scene's own parameters."""
+    """Reason that it does not hold it with margin at the scene's own parameters."""
     unit = study.quantities[name].unit
     error, held = point.error.get(name), point.envelope.get(name)
     if error is None or held is None:
@@ -78,7 +78,7 @@ def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolut
 
 
 def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
-    """Why a tolerance holds only because a step ends at each of many samples; None if that is not why."""
+    """Reason of a tolerance that holds only because a step ends at each of many samples; None if it holds otherwise."""
     dense, rare, unit = sparse.dense_error.get(name), sparse.error.get(name), study.quantities[name].unit
     if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
         return None
@@ -90,7 +90,7 @@ def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absol
 
 
 def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str | None:
-    """Why it does not hold it at some corner of the range."""
+    """Reason that it does not hold it at some corner of the range."""
     name, unit = wish.quantity, study.quantities[wish.quantity].unit
     if point.corners is None:
         return "it was not checked over the range of the parameters"
@@ -107,7 +107,7 @@ def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absol
 
 
 def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> str:
-    """Whether a finer step could help."""
+    """Clause on the help to expect of a finer step."""
     budget = next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
     if budget is None or budget.model_form is None:
         return "too few finer runs reached the end to say whether a finer step would do"

@@ -80,7 +80,7 @@ def make_tradeoff(
 
 
 def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
-    """What is kept of it, as it will be read: numbers that are not finite are None."""
+    """Record of a trade-off; numbers that are not finite are None."""
     question, reference, known = found.question, found.reference, found.reference.scene.observables
     numbers = {point.case.key: number for number, point in enumerate(found.points)}
     budgets = _budgets(found)
@@ -133,7 +133,7 @@ def _budgets(found: Tradeoff) -> list[CurveBudget]:
 
 
 def _fronts(found: Tradeoff, curves: Sequence[Curve], numbers: Mapping[str, int]) -> dict[str, list[int]]:
-    """For every observable the points that nothing beats, cheapest first."""
+    """Pareto front of every observable, cheapest first."""
     return {
         name: [numbers[point.case.key] for point in front(pareto_entries(curves, name))] for name in found.quantities
     }
@@ -187,7 +187,7 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
 
 
 def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
-    """What stands out, as sentences."""
+    """Findings of the study, as sentences."""
     said = told_hosts(hosts(point.result for point in found.points))
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit

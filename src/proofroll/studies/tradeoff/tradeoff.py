@@ -41,14 +41,14 @@ BRIEF_FINER, BRIEF_GAIN = tuple(part for part in FINER if part >= 1e-3), 0.65
 
 @dataclass
 class Tradeoff:
-    """What the study found.
+    """Trade-off as found.
 
     Attributes:
         question: what was swept.
         curves: with their points.
         absent: engine -> why it has no curve.
         references: the truth by sampling interval.
-        truth_timing: of the truth itself, measured in turns with the points; None if it could not be.
+        truth_timing: time of the truth itself, measured in turns with the points; None if it could not be.
         over: parameter -> values; the range over which the best points were checked.
         brief: whether speeds were measured less often, as the option of :func:`tradeoff` says.
     """
@@ -147,7 +147,7 @@ def _time(found: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Pro
 def _check(found: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[Case, Result], None]) -> None:
     """Runs the points on any formulation's own Pareto front, for any quantity, at every corner of the range.
 
-    Whoever asks for a kind of model must not lose a formulation that another one of the same engine dominates.
+    A question about one kind of model must not lose a formulation that another one of the same engine dominates.
     """
     formulations: dict[tuple[str, object], list[Curve]] = {}
     for curve in found.curves:
@@ -196,7 +196,7 @@ def _corner(place: dict[str, float], point: CurvePoint, reference: Reference) ->
 
 
 def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePoint, float, float]]:
-    """Every timed point with its cost and the envelope of its error, of which the truth shows no more than its bar."""
+    """Timed points with their costs and the envelopes of their errors, no smaller than the truth's error bar."""
     entries = []
     for curve in curves:
         for point, error in zip(curve.points, curve.envelope(quantity), strict=True):
@@ -206,7 +206,7 @@ def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePo
 
 
 def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
-    """Where the study of a question is stored below the folder of results; a brief or restricted one by itself."""
+    """File of a question's study below the folder of results; a brief or restricted one has its own."""
     scene = question.loaded()
     parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
     digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)

@@ -38,7 +38,7 @@ def setting_of(run: Run) -> str:
 
 
 class NumberKind(StrEnum):
-    """How far numbers of two versions are apart."""
+    """Kind of difference between the numbers of two versions."""
 
     SAME_BITS = "same bits"
     ROUND_OFF = "round-off"
@@ -47,7 +47,7 @@ class NumberKind(StrEnum):
 
 @dataclass(frozen=True)
 class NumbersApart:
-    """How far two trajectories are apart, by the observable that differs most for its size.
+    """Difference of two trajectories, by the observable that differs most for its size.
 
     Attributes:
         quantity, unit: of that observable; empty where nothing differs.
@@ -84,7 +84,7 @@ class RunInVersion:
 
     @classmethod
     def of(cls, run: Run) -> Self:
-        """What is told of a judged run."""
+        """Facts of a judged run."""
         order = run.facts.order if run.facts else None
         errors = {judgement.observable: judgement.error for judgement in run.judgements}
         return cls(run.result.status, run.result.message, run.verdict, order, errors, run.result.versions)
@@ -163,7 +163,7 @@ def _ending(run: Run) -> str:
 
 
 def _numbers(item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner) -> NumbersApart | None:
-    """How far the trajectories are apart; None: there are none."""
+    """Difference of the trajectories; None: there are none."""
     if before.case is None or after.case is None or not before.result.trajectory or not after.result.trajectory:
         return None
     one, other = (read(runner.store.trajectory(run.case)) for run in (before, after) if run.case is not None)

@@ -1,4 +1,4 @@
-"""Which cases two versions of an engine are asked for: comparisons, a scene, or all that there is."""
+"""Cases for two versions of an engine: comparisons, a scene, or all that there is."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from proofroll.studies.comparison import default_comparison as first_look
 
 
 def comparisons_about(subject: str, engine: str) -> list[Comparison]:
-    """What is run: a comparison, or those about a scene, or all that have rows of the engine.
+    """Comparisons to run: one, or those about a scene, or all that have rows of the engine.
 
     Args:
         subject: name or path of a comparison, or of a scene; empty: all comparisons, briefly.
@@ -47,7 +47,7 @@ def _rows_of(comparison: Comparison, engine: str) -> list[Row]:
 
 
 def _of_scene(name: str, engine: str) -> Comparison:
-    """What a comparison of a scene alone has of an engine."""
+    """Rows of one engine in the default comparison of a scene."""
     looked = first_look.compared(name, {})
     rows = _rows_of(looked, engine)
     if not rows:

@@ -71,7 +71,7 @@ class EngineVersion:
 
 @dataclass(frozen=True)
 class ChangedDefault:
-    """What the engine takes where nobody chooses, or a formulation provides, in both versions; None: nothing."""
+    """Default value or capability that changed; None: absent in that version."""
 
     name: str
     old: Any
@@ -210,7 +210,7 @@ def _speeds(
 
 
 def _defaults(old: EngineDescription, new: EngineDescription) -> list[ChangedDefault]:
-    """What the engine itself takes where nobody chooses, and what formulations can represent, if that changed."""
+    """Default values of the engine and capabilities of its formulations that changed."""
     both: tuple[tuple[dict[str, Any], dict[str, Any]], ...] = (
         (old.defaults, new.defaults),
         (old.provides, new.provides),

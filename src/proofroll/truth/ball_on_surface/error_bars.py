@@ -1,4 +1,4 @@
-"""What a route says of a ball, and two routes to one answer: their difference is the answer's error bar."""
+"""Answer of a route about a ball, and the error bar of two routes: the difference of their answers."""
 
 from __future__ import annotations
 

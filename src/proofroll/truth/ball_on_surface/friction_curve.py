@@ -55,7 +55,7 @@ class FrictionCurve:
         return float(fit.deriv()(time))
 
     def onset(self, mu: float) -> float | None:
-        """When the needed friction first reaches ``mu`` [s]; None: not until the end."""
+        """Time at which the needed friction first reaches ``mu`` [s]; None: not until the end."""
         if self.values[0] > mu:
             return 0.0
         times = np.concatenate([self.times, self.crest_times])

@@ -1,4 +1,4 @@
-"""What an impact on the wall makes of velocity and spin, found in two ways: one for each route of the truth.
+"""Impact on the wall: velocity and spin after it, computed in two ways: one for each route of the truth.
 
 Newton's coefficient of restitution e for the normal velocity; along the wall the contact point's velocity u is turned
 to -e_t u where friction suffices, else the impulse of friction is μk times the normal one against u (Walton, in
@@ -32,7 +32,7 @@ def by_coefficients(
 def by_equations(
     body: RollingBall, p: FloatArray, v: FloatArray, w: FloatArray, e: float, e_t: float
 ) -> tuple[FloatArray, FloatArray]:
-    """As :func:`by_coefficients`, with velocity, spin and impulse as nine unknowns of linear equations."""
+    """Impact as :func:`by_coefficients`, with velocity, spin and impulse as nine unknowns of linear equations."""
     a, m, J, contact = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact
     e1 = body.surface.normal(p)
     cross = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])

@@ -1,4 +1,4 @@
-"""When the first slip comes, how well that is posed, and how far the next stair edge is."""
+"""First slip: its time, its conditioning, and the distance to the next stair edge."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Onset:
 
 
 def first_slip(scene: Scene, until: float) -> float | None:
-    """When the ball first slips [s]; None: not until ``until`` [s]."""
+    """Time of the ball's first slip [s]; None: not until ``until`` [s]."""
     body = rolling_ball(scene)
     if np.any(body.slip0):
         return 0.0

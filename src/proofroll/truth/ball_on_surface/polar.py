@@ -211,7 +211,7 @@ class Polar(Sliding):
         return speed / slowing if slowing > 0 else np.inf
 
     def _ended(self, piece: Piece) -> tuple[float, FloatArray, End] | None:
-        """What ends rolling without slip first within a step: time, state and reason."""
+        """First end of rolling without slip within a step: time, state and reason."""
         ends: list[tuple[End, Callable[[FloatArray], float]]] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
         if np.isfinite(self._body.contact.mu_static):
             ends.append((End.CONE, self._missing))

@@ -1,4 +1,4 @@
-"""What becomes of the ball in the truth, and the analytic boundaries between the regimes."""
+"""Regimes of the ball in the truth, and the analytic boundaries between them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from proofroll.truth.ball_on_surface.switching import follow
 
 
 class Regime(IntEnum):
-    """What becomes of the ball until the end of the run."""
+    """Regime of the ball until the end of the run."""
 
     NEVER_SLIPS = 0
     RECOVERS = 1  # slips, and sticks at the end or still could carry its weight by friction
@@ -24,7 +24,7 @@ class Regime(IntEnum):
 
 
 def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
-    """What becomes of the ball until ``until`` [s], how often it began to slip, and when first [s] (nan: never)."""
+    """Regime of the ball until ``until`` [s], the number of its slips, and the time of the first [s] (nan: never)."""
     route = first_route(body)
     path = follow(body, route, until)
     slips = [time for kind, time in path.events if kind == "slip"]
@@ -40,7 +40,7 @@ def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
 
 
 def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
-    """Whether friction could hold the weight along the surface if it pointed straight against it."""
+    """True if friction could hold the weight along the surface if it pointed straight against it."""
     e1 = body.surface.normal(p_WB)
     weight = np.linalg.norm(body.gravity - float(e1 @ body.gravity) * e1)
     return bool(body.contact.mu_kinetic * pressed(body, p_WB, v_WB) >= weight)

@@ -1,4 +1,4 @@
-"""What the sequence of sticking and slipping asks of whatever integrates its legs."""
+"""Protocol of a route: the sequence of sticking and slipping asks it to integrate the legs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Motion = Callable[[FloatArray], BallMotion]
 
 
 class End(Enum):
-    """Why a leg ended."""
+    """Reason that a leg ended."""
 
     TIME = auto()  # the last time was reached
     CONE = auto()  # sticking: the needed friction left the static cone
@@ -91,7 +91,7 @@ class Route(ABC):
 
     @abstractmethod
     def world(self, state: FloatArray) -> World:
-        """What the state means in the world."""
+        """Place, velocity and spin of a state in the world."""
 
     @abstractmethod
     def nudged(self, state: FloatArray, v_WB: FloatArray) -> FloatArray:
@@ -144,6 +144,6 @@ class Path:
         return joined(times, [(leg.start, leg.motion) for leg in self.legs], route)
 
     def sticking(self, times: FloatArray) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-        """Whether the ball sticks at ``times`` [s]."""
+        """Mask of the ``times`` [s] at which the ball sticks."""
         index = np.searchsorted([leg.start for leg in self.legs], times, side="right") - 1
         return np.array([leg.sticking for leg in self.legs])[index]

@@ -1,4 +1,4 @@
-"""What the routes share that follow a slip by its size and direction: how it begins, goes on and ends."""
+"""Slip followed by its size and direction, shared by the routes: its beginning, course and end."""
 
 from __future__ import annotations
 

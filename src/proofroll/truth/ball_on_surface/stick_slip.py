@@ -36,7 +36,7 @@ def first_route(body: RollingBall) -> Route:
 
 
 def stays_on(body: RollingBall, until: float) -> bool:
-    """Whether the ball is on the wall until ``until`` [s], as the first route tells it."""
+    """True if the ball is on the wall until ``until`` [s], by the first route."""
     return all(kind != "lift_off" for kind, _ in follow(body, first_route(body), until).events)
 
 

@@ -32,7 +32,7 @@ _SHORTER = 1e-6
 
 
 def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0912, PLR0915 -- one per end
-    """Everything from time 0 to ``until`` [s].
+    """Path from time 0 to ``until`` [s].
 
     Raises:
         Refused: the ball slips to and fro ever faster.
@@ -100,7 +100,7 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0
 
 
 def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
-    """Whether the needed friction is outside the static cone, or on it and about to leave."""
+    """True if the needed friction is outside the static cone, or on it and about to leave."""
     if not np.isfinite(body.contact.mu_static):
         return False
     excess = route.excess(state)
@@ -112,7 +112,7 @@ def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
 
 
 def _comes_to_rest(body: RollingBall, route: Route, leg: Leg) -> bool:
-    """Whether the ball stops at the end of a leg and can rest there: its centre, or all but round-off of a slip.
+    """True if the ball stops at the end of a leg and can rest there: its centre, or all but round-off of a slip.
 
     Where resistance slows the rolling faster than friction the centre, the ball slips to a stop, rolls back a part of
     the way and so on: on a level plane infinitely often in a finite time, each time by the same part.

@@ -26,7 +26,7 @@ _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
 
 
 def supports(body: RollingBall) -> bool:
-    """Whether heyoka is installed, and the compiled equations hold for this scene.
+    """True if heyoka is installed, and the compiled equations hold for this scene.
 
     The direction of the rolling resistance jumps where the centre stands still. A Taylor series does not see the
     jump, so with resistance only the vertical cylinder is taken, where the centre of a pressed ball always moves.

@@ -38,7 +38,7 @@ _LEVEL = 0
 
 
 def available(body: RollingBall) -> bool:
-    """Whether heyoka is installed, and has these equations: of a surface that does not resist rolling."""
+    """True if heyoka is installed and has these equations: for a surface that does not resist rolling."""
     surface = body.surface
     known = surface.knows_distance if isinstance(surface, Declared) else isinstance(surface, (Cylinder, Plane))
     return known and not body.contact.rolling_resistance and library.available()

@@ -123,7 +123,7 @@ class ConstraintRows:
         return self._sliding(number, axis)
 
     def _sliding(self, number: int, n: Sequence[Scalar]) -> ConstraintRow:
-        """How far two points are apart along an axis that turns with body a, as a row."""
+        """Row for the distance of two points along an axis that turns with body a."""
         c = self._connections[number]
         a, b = self._views[c.a], self._views[c.b]
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)

@@ -81,7 +81,7 @@ class GeneralBody:
         return BodyInScalars(x[:3], R, u[:3], turned(R, u[3:]))
 
     def projected(self, view: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
-        """What a force and a moment about the centre of mass, world axes, do along the velocities u."""
+        """Generalised force along the velocities u of a force and a moment about the centre of mass, world axes."""
         return [*force, *turned_back(view.R, moment)]
 
     def gyroscopic(self, u: Sequence[Scalar]) -> list[Scalar]:
@@ -147,7 +147,7 @@ class Planar:
         return BodyInScalars(r, R, plus(scaled(u[0], e1), scaled(u[1], e2)), scaled(u[2], normal))
 
     def projected(self, _: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
-        """What a force and a moment about the centre of mass, world axes, do along the velocities u."""
+        """Generalised force along the velocities u of a force and a moment about the centre of mass, world axes."""
         e1, e2, normal = self._columns
         return [dot(force, e1), dot(force, e2), dot(moment, normal)]
 
@@ -161,7 +161,7 @@ class Planar:
 
 
 def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, BodyStart]:
-    """Where all bodies are at the start, from the joints' own definition; at_zero: at q = 0, v = 0 instead."""
+    """Poses and velocities of all bodies at the start, from the joints' own definition; at_zero: at q = 0, v = 0."""
     found = {WORLD: BodyStart(np.zeros(3), Rotation.identity(), np.zeros(3), np.zeros(3))}
     for joint in mechanism.joints:
         parent = found[joint.parent]

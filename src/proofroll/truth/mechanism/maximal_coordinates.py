@@ -228,7 +228,7 @@ class MaximalCoordinates:
         return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance))
 
     def growth(self, times: Array) -> Array:
-        """How many times as far apart as at the start is a motion that starts beside this one, at the given times, s.
+        """Growth of the distance from a motion that starts beside this one, at the given times, s.
 
         The start is moved in all ways that the rows allow, by far more than round-off, so that this hangs on none.
 
@@ -249,11 +249,11 @@ class MaximalCoordinates:
         return np.array(list(integrated(self.lean.rate, start, times, tolerance, self.lean.eliminated)))
 
     def at_start(self) -> Record:
-        """Where this route places everything at time 0."""
+        """Poses of this route at time 0."""
         return self.recorded(np.zeros(1), self.lean.equations.start()[None])
 
     def recorded(self, times: Array, states: Array, switched: Sequence[Switched] | None = None) -> Record:
-        """What the states mean, with what switched joints did there; reactions come from the complete rows."""
+        """Record of the states, with the modes of switched joints; reactions come from the complete rows."""
         modes = [None] * len(states) if switched is None else switched
         pairs = zip(states, modes, strict=True)
         found = gathered(times, [self._sample(self.lean.normalised(state), mode) for state, mode in pairs])

@@ -47,7 +47,7 @@ class Drive(NamedTuple):
 
 
 class Switched(NamedTuple):
-    """What joints with dry friction or stops do at present.
+    """Present state of joints with dry friction or stops.
 
     Attributes:
         held: numbers of the joints whose coordinates do not move.

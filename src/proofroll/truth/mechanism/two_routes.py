@@ -66,7 +66,7 @@ class TwoRouteMotion:
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
-    """The truth at growing times, s, of which the first may be 0; ``tolerance`` is DOP853's.
+    """Truth at growing times, s, the first may be 0; ``tolerance`` is DOP853's.
 
     Raises:
         Refused: fewer than two routes cover the mechanism; the text says why.
@@ -123,14 +123,14 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
 
 
 def judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
-    """What gets an error bar: fields of the record, and tracked points and energy, which follow from the poses."""
+    """Fields with an error bar: those of the record, and tracked points and energy, which follow from the poses."""
     placed = record.placed(mechanism)
     found = {name: getattr(record, name) for name in JUDGED}
     return found | {"points": placed.points, "energy": placed.energy()}
 
 
 def _singular(mechanism: Mechanism, until: float) -> str:
-    """Where singular poses lie on the way, as a clause; nothing where none is found."""
+    """Clause on singular poses on the way; empty where none is found."""
     try:
         found = branching(singular_poses(mechanism, until, min(5e-3, until / 200)))
     except np.linalg.LinAlgError:  # steps of that size do not follow the motion
@@ -139,7 +139,7 @@ def _singular(mechanism: Mechanism, until: float) -> str:
 
 
 def _apart(one: Record, two: Record) -> Array:
-    """How far two motions are apart at each time, m and 1."""
+    """Largest difference of two motions at each time, m and 1."""
     return np.maximum(largest(one.p_WB - two.p_WB), largest(one.q_WB - two.q_WB))
 
 

@@ -1,4 +1,4 @@
-"""Where two kinds of arithmetic part: in a decision, or in numbers by more than their error bars."""
+"""Differences of two kinds of arithmetic: in a decision, or in numbers by more than their error bars."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def differences(kind: str, reference: Path, other: Path, records: tuple[Any, Any
 
 
 def _decisions(record: Any) -> dict[str, Any]:
-    """Those of the runs and of the truths."""
+    """Decisions of the runs and of the truths."""
     truths = {f"truth at {point}": item["decisions"] for point, item in record.get("truths", {}).items()}
     return {**record.get("decisions", {}), **truths}
 
 
 def _parted(one: Any, two: Any, place: str = "") -> Iterator[tuple[str, str, str]]:
-    """Where two trees of decisions have another leaf."""
+    """Differing leaves of two trees of decisions."""
     if isinstance(one, dict) and isinstance(two, dict):
         for key in [*one, *(key for key in two if key not in one)]:
             yield from _parted(one.get(key), two.get(key), f"{place}: {key}" if place else key)

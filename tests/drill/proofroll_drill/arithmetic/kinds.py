@@ -30,10 +30,10 @@ _PROBE = "import sys; from proofroll_drill.arithmetic import probe; probe.main()
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """A way in which the same numbers are computed otherwise.
+    """Variant of the arithmetic for the same numbers.
 
     Attributes:
-        name: by which it is chosen.
+        name: name of its option.
         says: what is different, in words.
         environment: variables of its processes.
         python: interpreter with this package; by default the one that runs this.
@@ -75,7 +75,7 @@ def kinds() -> list[Arithmetic]:
 
 
 def took_effect(kind: Arithmetic, folder: Path) -> str:
-    """Why the kind is none here, as one clause; empty: its processes compute as it says."""
+    """Reason that the kind has no effect here, as one clause; empty: its processes compute as declared."""
     done = subprocess.run(
         [kind.python, "-c", _PROBE], env=kind.variables(folder), capture_output=True, text=True, check=False
     )
@@ -113,7 +113,7 @@ def _without_features(name: str, says: str, wanted: tuple[str, ...], more: dict[
 
 
 def _dispatched() -> Iterator[str]:
-    """What numpy chooses at run time and this processor has; a baseline cannot be switched off."""
+    """Features that numpy chooses at run time and this processor has; a baseline cannot be switched off."""
     umath = import_module("numpy._core._multiarray_umath")  # numpy has no public name for it
 
     return (name for name in umath.__cpu_dispatch__ if umath.__cpu_features__.get(name))

@@ -22,7 +22,7 @@ TESTS = {"sensitive": ["-m", "arithmetic"], "all": []}
 
 @dataclass(frozen=True)
 class Tried:
-    """What came of one kind of arithmetic.
+    """Result of one kind of arithmetic.
 
     Attributes:
         kind: its name.
@@ -30,7 +30,7 @@ class Tried:
         untried: why it was not tried; empty: it was.
         runs: how many runs were held against the reference.
         differences: what of them is not as in the reference.
-        failed: tests that failed, by name; or the end of what pytest said where it did not come to tests.
+        failed: tests that failed, by name; or the end of pytest's output where no test ran.
         passed: the last line of pytest; empty: no tests were asked for.
     """
 
@@ -44,7 +44,7 @@ class Tried:
 
     @property
     def same(self) -> bool:
-        """Whether nothing hangs on this kind of arithmetic, as far as it was tried."""
+        """True if nothing depends on this kind of arithmetic, as far as it was tried."""
         return not self.differences and not self.failed
 
 

@@ -26,7 +26,7 @@ def main() -> None:
 
 
 def _core() -> str:
-    """For which processor the loaded OpenBLAS computes; empty: there is none, or it does not say."""
+    """Processor that the loaded OpenBLAS computes for; empty: there is none, or it is not known."""
     maps = Path("/proc/self/maps")
     if not maps.exists():
         return ""

@@ -1,4 +1,4 @@
-"""All that comparisons decide, with the truths' numbers: made in a process of one kind of arithmetic, in a fresh store.
+"""Record of all decisions of comparisons, with the truths' numbers, of one kind of arithmetic, in a fresh store.
 
 ``python -m proofroll_drill.arithmetic.record FOLDER THREADS JOBS COMPARISON …`` writes ``FOLDER/record.json``.
 """

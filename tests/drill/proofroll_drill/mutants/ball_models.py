@@ -165,7 +165,7 @@ class NewtonMutant(Mutant):
     """Runge-Kutta 4 on the unreduced equations, with a fault in them.
 
     Attributes:
-        h: step by which it moves for each that it counts [s].
+        h: length of a step that it counts as one [s].
     """
 
     h: ClassVar[float] = STEP
@@ -180,7 +180,7 @@ class NewtonMutant(Mutant):
         return newton_euler(self.body, *x)
 
     def rates(self, x: FloatArray) -> FloatArray:
-        """Of the state."""
+        """Rates of the state."""
         a, alpha, _ = self.response(x)
         return np.stack([x[1], a, alpha])
 
@@ -196,7 +196,7 @@ class NewtonMutant(Mutant):
         self.t = t
 
     def after_step(self, x: FloatArray) -> FloatArray:
-        """What the engine does between steps."""
+        """State after the engine's changes between steps."""
         return x
 
     def sample(self) -> BallSample:
@@ -209,7 +209,7 @@ class NewtonMutant(Mutant):
         return []
 
     def built(self) -> Any:
-        """What it was given; how it sets off is that of its own equations."""
+        """Model as given; its start follows its own equations."""
         a, alpha, _ = self.response(self.x)
         return dataclasses.replace(self.claimed.built(), acceleration=a, angular_acceleration=alpha)
 
@@ -260,7 +260,7 @@ class Pyramid(Mutant):
         self.x: FloatArray | None = None
 
     def friction(self, x: FloatArray, N: float, slip: FloatArray, tangents: FloatArray) -> FloatArray:  # noqa: ARG002 -- of the next
-        """On the ball."""
+        """Friction on the ball."""
         c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
         turn = np.array([[c, -s], [s, c]])
         along = turn.T @ (tangents.T @ slip)

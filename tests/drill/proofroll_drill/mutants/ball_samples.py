@@ -1,4 +1,4 @@
-"""Balls that move rightly and are told wrongly."""
+"""Balls that move rightly and are reported wrongly."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from proofroll_drill.mutants.base import STEP, Mutant, OneStepBehind
 
 
 class ToldBall(Mutant):
-    """What a ball's samples are made wrong with."""
+    """Base of mutants with wrong samples of a ball."""
 
     asks = ("orientation",)
 

@@ -1,4 +1,4 @@
-"""Balls that set off, touch the wall, or are clocked otherwise than the scene says."""
+"""Balls with another start, contact or clock than the scene's."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ResistedByWeight(NewtonMutant):
     named = ("weight",)
 
     def response(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """With the f that gives this moment."""
+        """Response with the f that gives this moment."""
         contact, weight = self.body.contact, self.body.ball.mass * float(np.linalg.norm(self.body.gravity))
         f = contact.rolling_resistance
         for _ in range(20):
@@ -55,7 +55,7 @@ class MeanForce(OneStepBehind):
     named = ("half a step",)
 
     def misreport(self, sample: BallSample) -> BallSample:
-        """By the trapezoidal rule."""
+        """Mean force by the trapezoidal rule."""
         before = self.behind.sample().force
         assert before is not None
         assert sample.force is not None

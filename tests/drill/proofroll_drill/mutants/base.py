@@ -19,12 +19,12 @@ STEP = 2e-3
 
 
 class Mutant:
-    """The scene in the projection method, as the mutant misreads it.
+    """Base of mutants: the scene in the projection method, misread.
 
     Attributes:
         fault: what is planted, in a few words.
         scene: on which it is tried, with its parameters.
-        named: words of which the diagnosis must have one: the cause in plain words.
+        named: the cause in plain words; the diagnosis must have one of these words.
         until, every: length of the run and interval of its samples [s].
         asks: what is wanted besides the motion.
     """
@@ -62,7 +62,7 @@ class Mutant:
         return scene
 
     def misreport(self, sample: Any) -> Any:
-        """What it says of its state."""
+        """Report of its state."""
         return sample
 
     def clock(self, t: float) -> float:
@@ -83,14 +83,14 @@ class Mutant:
         return list(self.inner.events())
 
     def built(self) -> BallBuilt | Any:
-        """What it was given, as the scene says; how it sets off it reads back."""
+        """Model as given by the scene; its start is read back."""
         found = self.inner.built()
         moves = {name: getattr(found, name) for name in ("acceleration", "angular_acceleration")}
         return dataclasses.replace(self.claimed.built(), **moves)
 
 
 class Honest(Mutant):
-    """It tells what it really built, so that its certificate shows the fault."""
+    """Base of mutants with an honest certificate, which shows the fault."""
 
     def built(self) -> BallBuilt | Any:
         """Read back."""
@@ -98,7 +98,7 @@ class Honest(Mutant):
 
 
 class OneStepBehind(Mutant):
-    """It has a second model, one step behind.
+    """Base of mutants with a second model, one step behind.
 
     Attributes:
         behind: that model.

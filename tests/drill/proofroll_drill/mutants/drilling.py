@@ -54,7 +54,7 @@ ENOUGH = 0.9
 
 @dataclass(frozen=True)
 class Mutated:
-    """What became of one mutant.
+    """Result of one mutant.
 
     Attributes:
         fault: what was planted.

@@ -37,7 +37,7 @@ class MechanismMutant(Mutant):
         return dataclasses.replace(scene, elements=(MechanismElement(self.other(element.mechanism)),))
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """What it builds."""
+        """Mechanism that it builds."""
         return mechanism
 
     def events(self) -> list[Any]:
@@ -62,7 +62,7 @@ class AboutOrigin(MechanismMutant):
     named = ("wrong point",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """With Steiner's part."""
+        """Mechanism with Steiner's part in its inertia."""
 
         def about_origin(body: Any) -> Any:
             c = np.array(body.com)
@@ -202,7 +202,7 @@ class JointsMutant(MechanismMutant):
         return MechanismSample(**{name: said[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")})
 
     def built(self) -> Any:
-        """What it was given; it does not say how it sets off."""
+        """Model as given; without its start."""
         return dataclasses.replace(self.claimed.built(), acceleration=None, angular_acceleration=None)
 
 
@@ -213,7 +213,7 @@ class Armature(JointsMutant):
     named = ("every joint has an armature",)
 
     def faulty(self, mechanism: Mechanism) -> JointCoordinates:
-        """In each joint."""
+        """Equations with an armature in each joint."""
         return JointCoordinates(of_joints(mechanism, lambda joint: dataclasses.replace(joint, armature=0.05)))
 
 
@@ -243,7 +243,7 @@ class OutOfOrder(JointsMutant):
     named = ("mass matrix lacks",)
 
     def faulty(self, mechanism: Mechanism) -> JointCoordinates:
-        """With the diagonal alone."""
+        """Equations with the diagonal of the mass matrix alone."""
         found = JointCoordinates(mechanism)
         whole = found.inertial
 

@@ -16,7 +16,7 @@ class ToldTop(Honest, MechanismMutant):
     """A top with one number off.
 
     Attributes:
-        factors: by which a field of the body is multiplied; empty: none.
+        factors: field of the body -> factor on it; empty: none.
     """
 
     scene: ClassVar[Any] = TOP
@@ -92,5 +92,5 @@ class AsideTop(ToldTop):
     named = ("centre of mass 0.001, 0, 0.3",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """By a millimetre."""
+        """Mechanism with the centre of mass off by a millimetre."""
         return of_bodies(mechanism, lambda body: dataclasses.replace(body, com=(1e-3, 0.0, body.com[2])))

@@ -1,4 +1,4 @@
-"""Mechanisms that move rightly and are told wrongly."""
+"""Mechanisms that move rightly and are reported wrongly."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ToldMechanism(Mutant):
         return []
 
     def of_children(self, sample: MechanismSample) -> Rotation:
-        """How the child of each joint and loop is turned."""
+        """Orientation of the child of each joint and loop."""
         turns = np.concatenate([_turns(sample).as_matrix(), np.eye(3)[None]])
         return Rotation.from_matrix(turns[[body for body, _ in self.ends]])
 
@@ -123,7 +123,7 @@ class AboutCentre(ToldMechanism):
     named = ("moment about the centre of mass",)
 
     def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """Of each child."""
+        """Moment about the centre of mass of each child."""
         assert sample.joint_force is not None
         assert sample.joint_torque is not None
         coms = np.concatenate([self.com, np.zeros((1, 3))])
@@ -132,7 +132,7 @@ class AboutCentre(ToldMechanism):
 
 
 class LoopReaction(BodyReaction):
-    """The same in loops, of which not every component is determined."""
+    """Reactions of loops with the same fault; not every component is determined."""
 
     fault = "reactions of loops in body axes"
     scene = CRANK
@@ -161,7 +161,7 @@ class Unnormalised(ToldMechanism):
     named = ("not of unit length",)
 
     def misreport(self, sample: MechanismSample) -> MechanismSample:
-        """By a twentieth per second."""
+        """Quaternions that grow by a twentieth per second."""
         assert sample.q_WB is not None
         return dataclasses.replace(sample, q_WB=sample.q_WB * (1 + 0.05 * self.t))
 

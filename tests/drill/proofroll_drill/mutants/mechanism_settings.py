@@ -29,7 +29,7 @@ class OrderOfMoments(MechanismMutant):
     named = ("moments of inertia",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """Of every body."""
+        """Mechanism with permuted moments of every body."""
         order = [0, 2, 1]
         return of_bodies(
             mechanism, lambda body: dataclasses.replace(body, inertia=np.array(body.inertia)[np.ix_(order, order)])
@@ -83,5 +83,5 @@ class Backwards(MechanismMutant):
     named = ("wrong sign",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """Of every joint."""
+        """Mechanism with every joint's velocity reversed."""
         return of_joints(mechanism, lambda joint: dataclasses.replace(joint, v0=tuple(-x for x in joint.v0)))

@@ -42,7 +42,7 @@ class Held:
 
     @property
     def sound(self) -> bool:
-        """Whether there is a truth, and no error beyond its bar."""
+        """True if there is a truth, and no error beyond its bar."""
         return not self.refused and all(value <= 1 for value in self.worst.values())
 
     @property

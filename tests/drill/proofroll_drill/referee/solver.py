@@ -126,7 +126,7 @@ class Referee:
         return np.concatenate([r.ravel(), quaternions.ravel(), rate.ravel(), w[:n].ravel(), long(angles)])
 
     def run(self, times: NDArray[np.float64]) -> list[dict[str, Long]]:
-        """What is true at growing times, s, see :meth:`seen`."""
+        """True state at growing times, s, see :meth:`seen`."""
         return [self.seen(state) for state in extrapolated(lambda y: self.solve(y)[0], self.start(), long(times))]
 
     def seen(self, state: Long) -> dict[str, Long]:

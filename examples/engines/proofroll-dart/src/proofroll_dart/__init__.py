@@ -58,12 +58,12 @@ class DartSettings:
 
     @property
     def resolution(self) -> str:
-        """What trades speed for accuracy."""
+        """Name of the setting that trades speed for accuracy."""
         return "dt" if self.formulation == "world" else "rtol"
 
     @property
     def order(self) -> int | None:
-        """Of semi-implicit Euler."""
+        """Order of semi-implicit Euler."""
         return 1 if self.formulation == "world" else None
 
 
@@ -81,12 +81,12 @@ class Dart:
 
     @staticmethod
     def version() -> str:
-        """Of the package."""
+        """Version of the package."""
         return importlib.metadata.version("dartpy")
 
     @staticmethod
     def caveat(settings: DartSettings) -> str:
-        """What is not DART's own."""
+        """Part that is not DART's own."""
         return "integrated by scipy around DART's accelerations" if settings.formulation == "forward_dynamics" else ""
 
     @classmethod

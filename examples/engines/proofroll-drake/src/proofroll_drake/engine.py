@@ -29,7 +29,7 @@ class Drake:
 
     @staticmethod
     def version() -> str:
-        """Of the package."""
+        """Version of the package."""
         return importlib.metadata.version("drake")
 
     @staticmethod
@@ -40,5 +40,5 @@ class Drake:
 
     @staticmethod
     def caveat(settings: DrakeSettings) -> str:
-        """What is not Drake's own."""
+        """Part that is not Drake's own."""
         return "rolling and integration are ours, around Drake's terms" if settings.formulation == "terms" else ""

@@ -161,7 +161,7 @@ class DrakeMechanism:
     def _reactions(self) -> tuple[Any, Any]:
         """Force and moment on the child of each joint; Drake gives them along the joint's axes on the child [N, N m].
 
-        Those of loops are not told.
+        Those of loops are not reported.
         """
         count = len(self._joints) + len(self._mechanism.loops)
         force, torque = np.full((count, 3), np.nan), np.full((count, 3), np.nan)

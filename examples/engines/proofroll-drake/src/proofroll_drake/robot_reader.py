@@ -16,7 +16,7 @@ _STEP = 1e-3
 
 
 class DrakeRobots:
-    """What ``Parser`` makes of a robot file, in a ``MultibodyPlant`` without geometry."""
+    """Robot files as ``Parser`` reads them, in a ``MultibodyPlant`` without geometry."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     options: ClassVar[Mapping[str, str]] = {}

@@ -1,4 +1,4 @@
-"""What a user can choose of Drake."""
+"""Settings of Drake."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class DrakeSettings:
 
     @property
     def resolution(self) -> str:
-        """What trades speed for accuracy."""
+        """Name of the setting that trades speed for accuracy."""
         return "dt" if self.formulation == "discrete" else "rtol"
 
     @property
     def order(self) -> int | None:
-        """Of the discrete plant's semi-implicit Euler."""
+        """Order of the discrete plant's semi-implicit Euler."""
         return 1 if self.formulation == "discrete" else None
 
 

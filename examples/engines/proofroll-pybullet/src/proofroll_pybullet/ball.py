@@ -109,7 +109,7 @@ class PybulletBall:
         return min(f * self._normal_force, most) * np.cross(e1, v) / speed
 
     def _first_normal_force(self) -> float:
-        """That of a first step, which is then taken back [N]."""
+        """Normal force of a first step, which is then taken back [N]."""
         state = self._world.saveState()
         self._step()
         self._world.restoreState(state)
@@ -143,7 +143,7 @@ class PybulletBall:
         return self._world.getBasePositionAndOrientation(self._ball)
 
     def _velocities(self) -> tuple[Sequence[float], Sequence[float]]:
-        """Of the centre [m/s], and angular [rad/s]."""
+        """Velocity of the centre [m/s], and angular velocity [rad/s]."""
         return self._world.getBaseVelocity(self._ball)
 
     def sample(self) -> BallSample:

@@ -25,7 +25,7 @@ class Pybullet:
 
     @staticmethod
     def version() -> str:
-        """Of the package."""
+        """Version of the package."""
         return importlib.metadata.version("pybullet")
 
     @staticmethod

@@ -17,7 +17,7 @@ _STEP = 1e-2
 
 
 class PybulletRobots:
-    """What ``loadURDF`` makes of a robot file."""
+    """Robot files as ``loadURDF`` reads them."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf",)
     options: ClassVar[Mapping[str, str]] = {
@@ -194,7 +194,7 @@ class _Loaded:
         return np.array(place) - R @ c, R
 
     def groups(self) -> dict[str, RobotBody]:
-        """What each moving joint carries rigidly."""
+        """Bodies that each moving joint carries rigidly."""
         homes = {index: (index, np.zeros(3), np.eye(3)) for index in (-1, *self.indices)}
         parts: dict[int, list[tuple[RobotBody, Array, Array]]] = {index: [] for index in homes}
         for index in range(-1, len(self.parents)):

@@ -1,4 +1,4 @@
-"""What a user can choose of PyBullet."""
+"""Settings of PyBullet."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class PybulletSettings:
 
     @property
     def order(self) -> int | None:
-        """Of semi-implicit Euler; none is declared where springs and slack of fixed size are in the way."""
+        """Order of semi-implicit Euler; none is declared where springs and slack of fixed size are in the way."""
         return 1 if self.preset == "matched" else None
 
 

@@ -15,7 +15,7 @@ from proofroll_pybullet.settings import PybulletSettings
 
 
 class World:
-    """What the module ``pybullet`` has, for a world of its own, which ends with this."""
+    """World of its own with the functions of the module ``pybullet``; it ends with this object."""
 
     def __init__(self, gravity: Sequence[float], settings: PybulletSettings) -> None:
         self._number = pybullet.connect(pybullet.DIRECT)
@@ -34,7 +34,7 @@ class World:
         return functools.partial(found, physicsClientId=self._number) if callable(found) else found
 
     def gravity(self) -> Any:
-        """As PyBullet has it [m/s²], shape (3,)."""
+        """Gravity as PyBullet has it [m/s²], shape (3,)."""
         told = self.getPhysicsEngineParameters()
         return np.array([told[f"gravityAcceleration{axis}"] for axis in "XYZ"])
 

@@ -21,10 +21,10 @@ _LINES, _FINE = 13, 61  # lines of a net along each coordinate, and points of ea
 
 @singledispatch
 def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001 -- the kinds below use it
-    """The scene as a whole, and its contact enlarged; empty for a surface that nobody has drawn yet.
+    """Drawings of the whole scene and of its contact enlarged; empty for a surface without a drawing.
 
     Args:
-        wall: the scene's wall, by whose type the drawing is chosen.
+        wall: the scene's wall; its type chooses the drawing.
         body: the ball on it.
     """
     return []

@@ -13,7 +13,7 @@ TIGHTEST = float(np.finfo(float).eps)
 
 
 def available() -> bool:
-    """Whether heyoka is installed."""
+    """True if heyoka is installed."""
     return util.find_spec("heyoka") is not None
 
 

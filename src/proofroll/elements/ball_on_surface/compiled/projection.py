@@ -37,7 +37,7 @@ _UPRIGHT = (*(0.0,) * 8, 1.0, 1.0, *(0.0,) * 3, 1.0, *(0.0,) * 4, *(0.0, -1.0, 0
 
 @dataclass(frozen=True)
 class Structure:
-    """What of a scene decides the form of the equations; its other numbers are parameters.
+    """Facts of a scene that decide the form of the equations; its other numbers are parameters.
 
     Attributes:
         formulation: as in the engine ``projection``.
@@ -55,7 +55,7 @@ class Structure:
 
     @property
     def upright(self) -> bool:
-        """Whether F is a rotation about the vertical by γ."""
+        """True if F is a rotation about the vertical by γ."""
         return self.curved and self.frame == _UPRIGHT
 
 
@@ -87,7 +87,7 @@ def parameters(body: RollingBall) -> list[float]:
 
 @dataclass(frozen=True)
 class ProjectionEquations:
-    """In symbols.
+    """Equations of the projection solver as symbols.
 
     Attributes:
         system: state variable and its rate, for q = [u, angles] and s.
@@ -176,7 +176,7 @@ def _euler_angles(theta: Any, psi: Any, r: _Symbols) -> tuple[_Symbols, _Symbols
 
 @lru_cache(maxsize=16)
 def projected(form: Structure, tolerance: float) -> CompiledEquations:
-    """As :func:`rolling.reduced`, with the forces N, λ1 and λ2."""
+    """Compiled integrator like :func:`rolling.reduced`, with the forces N, λ1 and λ2."""
     import heyoka as hy
 
     found = equations(form)

@@ -152,12 +152,12 @@ def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquati
 
 
 def supports(body: RollingBall) -> bool:
-    """Whether the expressions hold on the scene's surface, and on a wall that stands."""
+    """True if the expressions hold on the scene's surface and the wall stands still."""
     return isinstance(body.surface, (Cylinder, Plane)) and body.wall_rate is None
 
 
 def is_uniform(body: RollingBall) -> bool:
-    """Whether gravity's local components do not change along the surface."""
+    """True if gravity's local components do not change along the surface."""
     return not isinstance(body.surface, Cylinder) or not np.any(local_gravity(body)[:2])
 
 

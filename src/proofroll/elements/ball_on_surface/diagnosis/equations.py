@@ -56,7 +56,7 @@ class BallStates:
 
 @dataclass(frozen=True)
 class Law:
-    """How a ball is taken to move.
+    """Law of motion of a ball.
 
     Attributes:
         body: with what the law takes its numbers to be.
@@ -102,7 +102,7 @@ def _states(body: RollingBall, part: xr.Dataset) -> BallStates:
 
 
 def residuals(body: RollingBall, seen: BallStates, law: Law) -> FloatArray:
-    """What the law leaves of accelerations, turning times the radius, and force over mass [m/s²]."""
+    """Residuals of a law: accelerations, angular ones times the radius, and force over mass [m/s²]."""
     left = []
     for i in range(len(seen.p)):
         a, alpha, force = response(law, seen.p[i], seen.v[i], seen.w[i], bool(seen.sticks[i]))
@@ -182,7 +182,7 @@ def held_against(evidence: Evidence) -> Iterator[Residuals[Law]]:
 
 
 def held_at_start(evidence: Evidence, body: RollingBall, wrong: Sequence[Mapping[str, Any]]) -> Residuals[Law]:
-    """What is left of the certificate."""
+    """Residuals of the certificate."""
 
     def left_of_lines(law: Law | None) -> FloatArray:
         plain = left(evidence.lines, {}, GIVEN)
@@ -207,9 +207,9 @@ def _others(body: RollingBall) -> list[Law]:
 
 
 def _contradicted(lines: Sequence[Mapping[str, Any]], body: RollingBall, law: Law, allowed: float) -> bool:
-    """Whether the first steps of an engine show accelerations that are not those of a law.
+    """True if the first steps of an engine show other accelerations than those of a law.
 
-    What it says of its accelerations may be what its model has, to which it then adds damping.
+    Its reported accelerations may be those of a model without a damping that it adds later.
     """
     if not float(np.linalg.norm(body.v0)):
         return False
@@ -229,7 +229,7 @@ def _leaves(data: xr.Dataset) -> bool:
 
 
 def at_start(body: RollingBall, law: Law) -> dict[str, Any]:
-    """What a certificate would expect of a ball that moves by a law."""
+    """Expected lines of a certificate for a ball that moves by a law."""
     acceleration, turning, force = response(law, body.p0, body.v0, body.w0, not np.any(body.slip0))
     local = body.surface.frame(body.u0).T @ force
     ball, contact = law.body.ball, law.body.contact
@@ -249,15 +249,15 @@ def at_start(body: RollingBall, law: Law) -> dict[str, Any]:
 
 
 def falling(element: Any, gravity: FloatArray) -> Law:
-    """With another gravity [m/s²]."""
+    """Law with another gravity [m/s²]."""
     return Law(dataclasses.replace(element.rolling, gravity=gravity))
 
 
 def is_bounded(body: RollingBall) -> bool:
-    """Whether the scene's ball may slip."""
+    """True if the scene's ball may slip."""
     return bool(np.isfinite(body.contact.mu_static))
 
 
 def has_resistance(body: RollingBall) -> bool:
-    """Whether the scene resists the rolling."""
+    """True if the scene resists the rolling."""
     return body.contact.rolling_resistance > 0

@@ -25,7 +25,7 @@ def _ball(body: RollingBall, **changes: float) -> RollingBall:
 
 
 def _resisting(body: RollingBall, f: float) -> RollingBall:
-    """With any f, also one that no contact has: an engine may drive the ball by it."""
+    """Ball with any f, even a negative one: an engine may drive the ball by it."""
     contact = copy.copy(body.contact)
     object.__setattr__(contact, "rolling_resistance", f)
     return dataclasses.replace(body, contact=contact)
@@ -44,7 +44,7 @@ def number(
     only: Callable[[RollingBall], bool] = lambda _: True,
     signed: bool = False,
 ) -> Hypothesis:
-    """That a number of the scene is another one in the engine.
+    """Hypothesis: a number of the scene is another one in the engine.
 
     Args:
         name: of the hypothesis.
@@ -86,7 +86,7 @@ def _snapped(factor: float) -> tuple[float, int]:
 
 
 def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy: str) -> Hypothesis:
-    """That a force or moment acts which the scene does not have, with one coefficient, in ``says`` as ``{value}``."""
+    """Hypothesis: an extra force or moment acts, with one coefficient, in ``says`` as ``{value}``."""
 
     @hypothesis(name, "the load with one coefficient closes accelerations and forces at every sample")
     def test(evidence: Evidence) -> Iterator[Cause]:

@@ -96,7 +96,7 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
-    """That N is right and the friction points the other way."""
+    """Hypothesis: N is right and the friction points the other way."""
     normal = np.sum(told.true * e1, axis=-1, keepdims=True) * e1
     says = "the friction has the wrong sign, and N is right"
     return told.cause("friction sign", says, 2 * normal - told.true, "give the friction on the ball, not on the wall")
@@ -122,7 +122,7 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
 
 @hypothesis("contact point", "the contact point is at p + a e1, its velocity v + a w x e1, both known from the truth")
 def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
-    """What is said of the centre belongs to the contact point, or lacks the turning about the normal."""
+    """Hypothesis: quantities of the centre are those of the contact point, or lack the spin about the normal."""
     run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
     if run is None or truth is None:
         return

@@ -24,8 +24,8 @@ class Bowl(Declared):
     against y, in metres at the bottom.
 
     Attributes:
-        name: by which contacts name it.
-        kind: which surface it is.
+        name: used by contacts.
+        kind: name of the surface in scene files.
         radius: radius [m]; of the wall in a scene, of the sphere of the centre after :meth:`offset`.
     """
 

@@ -25,8 +25,8 @@ class Cylinder:
     """Inside of a circular cylinder; coordinates are the angle γ about its axis and the height z along it.
 
     Attributes:
-        name: by which contacts name it.
-        kind: which surface it is.
+        name: used by contacts.
+        kind: name of the surface in scene files.
         radius: radius [m]; of the wall in a scene, of the centre's path after :meth:`offset`.
         tilt: rotation of the axis from the vertical about the world's y axis [rad].
     """

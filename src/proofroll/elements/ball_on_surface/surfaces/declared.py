@@ -23,7 +23,7 @@ _NEWTON = 12
 
 
 class Declared:
-    """Base of surfaces of which a subclass, a frozen dataclass, says these, with ``name`` and ``kind`` as its fields.
+    """Base of surfaces; a subclass is a frozen dataclass with ``name`` and ``kind``, and defines these.
 
     * ``coordinates``, ``units``, ``periods``, ``domain``, in such an order that the product of the tangents points to
       the wall;
@@ -57,7 +57,7 @@ class Declared:
 
     @property
     def knows_distance(self) -> bool:
-        """Whether :meth:`distance` is a formula; if not, distances are those from the nearest point."""
+        """True if :meth:`distance` is a formula; if not, distances are taken from the nearest point."""
         return type(self).distance is not Declared.distance
 
     def distance(self, x: Any, y: Any, z: Any) -> Any:  # noqa: ARG002 -- said by subclasses

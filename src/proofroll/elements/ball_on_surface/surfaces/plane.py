@@ -19,8 +19,8 @@ class Plane:
     """Plane through the world's origin; coordinates are the distances down the slope and across it.
 
     Attributes:
-        name: by which contacts name it.
-        kind: which surface it is.
+        name: used by contacts.
+        kind: name of the surface in scene files.
         tilt: rotation from the horizontal about the world's y axis [rad]; positive descends along +x.
         height: distance of the ball's centre above the wall's surface [m]; 0 for the wall itself.
         turning: rate of a turntable, about the normal through the world's origin, upwards [rad/s].

@@ -155,8 +155,8 @@ class Cone(Revolved):
     """Inside of a cone that opens upwards; coordinates are the angle about its axis and the way from its tip.
 
     Attributes:
-        name: by which contacts name it.
-        kind: which surface it is.
+        name: used by contacts.
+        kind: name of the surface in scene files.
         slope: of the wall from the horizontal [rad].
         length: from the tip to the rim, along the wall [m]; only drawn.
         tip: height of the tip [m]; 0 for the wall itself.
@@ -209,8 +209,8 @@ class Torus(Revolved):
     """Outside of a ring of round wire; coordinates are the angle about its axis and that around the wire.
 
     Attributes:
-        name: by which contacts name it.
-        kind: which surface it is.
+        name: used by contacts.
+        kind: name of the surface in scene files.
         ring_radius: of the wire's middle from the axis [m].
         wire_radius: radius of the wire [m]; of the centre's surface after :meth:`offset`.
     """

@@ -1,4 +1,4 @@
-"""What a surface is on which the centre of a ball moves; the modules beside this one are the only ones that know any.
+"""Protocol of surfaces on which the centre of a ball moves; only the modules beside this one know any.
 
 Each surface gives two independent descriptions of itself: a parametrisation (position, tangents, second
 derivatives; what constraint models need) and a signed distance with its derivatives (what contact models need).
@@ -46,7 +46,7 @@ class Surface(Protocol):
 
     @property
     def kind(self) -> str:
-        """Which surface it is, as scenes write it."""
+        """Name of the surface in scene files."""
 
     @property
     def coordinates(self) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Why the run of a mechanism is not the scene's: what an engine says otherwise, and what it moves instead."""
+"""Diagnosis of a mechanism: wrong reports of a right motion, and wrong motions."""
 
 from __future__ import annotations
 

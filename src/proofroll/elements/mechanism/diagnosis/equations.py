@@ -31,7 +31,7 @@ _CONSISTENT = 1e-3
 
 @dataclass(frozen=True)
 class MechanismState:
-    """Everything that the equations need at one instant of a run.
+    """State of a mechanism at one instant of a run, with its kinematics and accelerations.
 
     Attributes:
         q, v: coordinates and velocities of the tree.
@@ -50,8 +50,8 @@ class MechanismStates:
 
     Attributes:
         each: the states.
-        consistent: whether the bodies' velocities are such as the tree allows in their poses; where they are not,
-            what is said of the motion is wrong, and equations would be blamed for it.
+        consistent: whether the tree allows the bodies' velocities in their poses; where it does not, the
+        reported motion is wrong, and equations would be blamed for it.
     """
 
     def __init__(self, mechanism: Mechanism, placed: Placed, acceleration: FloatArray, which: FloatArray) -> None:
@@ -94,7 +94,7 @@ class MechanismStates:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """What each balance is relative to: the largest that inertia or loads make of it."""
+        """Scale of each balance: the largest term of inertia or loads."""
         sizes = self._own[:, :2].reshape(-1, self.mechanism.nv)
         largest = np.max(np.abs(sizes), axis=0, initial=0.0)
         return np.where(largest > 1e-9 * np.max(largest), largest, np.max(largest) or 1.0)
@@ -104,7 +104,7 @@ class MechanismStates:
         return np.array([change.balance(self, i) for i in range(len(self.each))])
 
     def left(self, change: Change, without: tuple[int, ...] = ()) -> FloatArray:
-        """What does not balance, relative, along the motions that are allowed.
+        """Residuals of the balance, relative, along the motions that are allowed.
 
         A change that takes away all of a velocity's inertia and loads balances nothing there: what the mechanism itself
         leaves is left.
@@ -119,7 +119,7 @@ class MechanismStates:
 
     @cached_property
     def _own(self) -> FloatArray:
-        """Those of the mechanism itself."""
+        """Terms of the mechanism itself."""
         return self.parts(Change(self.mechanism))
 
 
@@ -157,7 +157,7 @@ class Change:
     coupling: FloatArray | None = None
 
     def balance(self, states: MechanismStates, i: int) -> FloatArray:
-        """What inertia needs, what acts, and the size of all their terms, along each velocity of the tree."""
+        """Inertia forces, applied forces, and the size of all their terms, along each velocity of the tree."""
         m, state, mechanism = states.mechanism, states.each[i], self.mechanism
         motion, n = state.motion, len(m.bodies)
         mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
@@ -214,7 +214,7 @@ def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
 
 
 def is_motion(dataset: Any) -> bool:
-    """Whether all poses and velocities of a run are numbers, and its quaternions are of rotations."""
+    """True if all poses and velocities of a run are finite, and its quaternions are rotations."""
     parts = [dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB")]
     return all(np.all(np.isfinite(part)) for part in parts) and bool(
         np.all(np.linalg.norm(parts[-1], axis=-1) > _TURNS)

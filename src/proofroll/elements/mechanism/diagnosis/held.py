@@ -1,4 +1,4 @@
-"""What other models of a mechanism are held against: its certificate, if that differs, and the states of its run."""
+"""Residuals of other models of a mechanism: against its certificate, if that differs, and the states of its run."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def balanced_at_start(start: MechanismStates) -> Residuals[Change]:
 
 
 def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
-    """How far the first steps are from balance by themselves, or by what their lines allow."""
+    """Imbalance of the first steps by themselves, or the tolerance of their lines if that is larger."""
     if start is None:
         return 0.0
     allowed = [float(line["tolerance"]) for line in evidence.lines if str(line["quantity"]).endswith(DERIVED)]

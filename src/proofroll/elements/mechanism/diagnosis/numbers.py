@@ -24,7 +24,7 @@ def factor_of_all(
     remedy: str,
     signed: bool = True,
 ) -> Hypothesis:
-    """That a number of all bodies or joints, of a mechanism that has such, has a factor on it in the engine.
+    """Hypothesis: a number of all bodies or joints has one factor on it in the engine, if the mechanism has it.
 
     ``signed``: whether its sign can be mistaken; nothing has a negative mass.
     """

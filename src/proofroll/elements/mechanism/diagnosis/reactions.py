@@ -1,6 +1,6 @@
-"""Hypotheses about the reactions that an engine tells: on which body, at which joint, about which point, in which axes.
+"""Hypotheses of wrongly reported reactions: other body, joint, point or axes.
 
-In a loop not every component is determined. What is said of those is left aside, by components in the world.
+In a loop not every component is determined; the others are left out, by components in the world.
 """
 
 from __future__ import annotations
@@ -35,59 +35,59 @@ _KINDS = (
 
 @dataclass(frozen=True)
 class Reactions:
-    """Forces or moments of all joints and loops, said and true.
+    """Forces or moments of all joints and loops, reported and true.
 
     Attributes:
-        told: those of the connections that are known on both sides, shape (time, connections, 3).
+        reported: those of the connections that are known on both sides, shape (time, connections, 3).
         which: their indices among the mechanism's connections.
         placed: the bodies at these times.
         force: the true forces of the same connections.
     """
 
-    told: Reported
+    reported: Reported
     which: list[int]
     placed: Placed
     force: FloatArray
 
     @property
     def mechanism(self) -> Mechanism:
-        """Whose they are."""
+        """Mechanism of the reactions."""
         return self.placed.mechanism
 
     def causes(self, step: float | None) -> Iterator[Cause]:
-        """What can have happened to them."""
-        if self.told.differs:
-            yield from self.told.causes(step)
+        """Possible causes of wrong reactions."""
+        if self.reported.differs:
+            yield from self.reported.causes(step)
             yield from self._of_other_joints()
-            if self.told.name == "torque":
+            if self.reported.name == "torque":
                 yield from self._about_other_points()
 
     def _of_other_joints(self) -> Iterator[Cause]:
-        """That reactions stand at other joints than those whose they are."""
-        said, true = self.told.said, self.told.true
+        """Hypothesis: reactions are reported at other joints than their own."""
+        said, true = self.reported.said, self.reported.true
         off = np.abs(said[:, :, None] - true[:, None])
         shared = np.any(np.isfinite(off), axis=(0, 3))
         distance = np.where(shared, np.max(np.nan_to_num(off), axis=(0, 3)), np.inf)
-        order = linear_sum_assignment(np.minimum(distance, _FAR * self.told.size))[1].tolist()
+        order = linear_sum_assignment(np.minimum(distance, _FAR * self.reported.size))[1].tolist()
         if order == list(range(len(order))):
             return
         names = [self.mechanism.connections[k].name for k in self.which]
-        sure = np.sum(distance <= _SAME * self.told.before, axis=1) == 1  # two joints may carry the same
+        sure = np.sum(distance <= _SAME * self.reported.before, axis=1) == 1  # two joints may carry the same
         moves = [(i, j) for i, j in enumerate(order) if i != j and sure[i]]
         moved = "; ".join(f"at {names[i]} stands that of {names[j]}" for i, j in moves)
-        says = f"the {self.told.name} is of another joint{': ' if moved else ''}{moved}"
-        yield self.told.cause("other joint", says, true[:, order], "look at the order of joints in the engine")
+        says = f"the {self.reported.name} is of another joint{': ' if moved else ''}{moved}"
+        yield self.reported.cause("other joint", says, true[:, order], "look at the order of joints in the engine")
 
     def _about_other_points(self) -> Iterator[Cause]:
-        """That moments are about the centre of mass of the child, or about the world's origin."""
+        """Hypothesis: moments are about the centre of mass of the child, or about the world's origin."""
         coms = {body.name: body.com for body in self.mechanism.bodies}
         ends = [self.mechanism.connections[k] for k in self.which]
         at = np.stack([self.placed.point(end.b, end.position_b) for end in ends], axis=1)
         centre = np.stack([self.placed.point(end.b, coms.get(end.b, (0, 0, 0))) for end in ends], axis=1)
         for where, arm in (("centre of mass of the child", at - centre), ("origin of the world", at)):
-            moved = self.told.true + product(skews(arm.reshape(-1, 3)).reshape(*arm.shape, 3), self.force)
+            moved = self.reported.true + product(skews(arm.reshape(-1, 3)).reshape(*arm.shape, 3), self.force)
             says = f"torque is the moment about the {where}, not at the joint"
-            yield self.told.cause("point of moment", says, moved, "give the moment at the joint")
+            yield self.reported.cause("point of moment", says, moved, "give the moment at the joint")
 
 
 def _reactions(
@@ -97,7 +97,7 @@ def _reactions(
     true: Mapping[str, FloatArray],
     bars: Mapping[str, float],
 ) -> Iterator[Reactions]:
-    """Forces and moments, of shape (time, connections, 3), of the connections of which something is known."""
+    """Forces and moments, of shape (time, connections, 3), of the connections with known values."""
     element = evidence.element
     ends = element.mechanism.connections
     bodies = element.mechanism.body_index
@@ -114,8 +114,8 @@ def _reactions(
         }
         own = np.where(known, said[kind], np.nan)[:, which], true[kind][:, which]
         least = force if kind == "force" else force * element.length
-        told = Reported(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
-        yield Reactions(told, which, placed, true["force"][:, which])
+        reported = Reported(kind, what, unit, *own, placed.time, frames, least, bars.get(kind, 0.0))
+        yield Reactions(reported, which, placed, true["force"][:, which])
 
 
 @hypothesis(

@@ -46,7 +46,7 @@ def _axes_at_start(element: Any) -> Mapping[str, FloatArray]:
 
 
 def _of_centres(told: Reported, evidence: Evidence) -> Iterator[Cause]:
-    """That positions or velocities are those of the centres of mass."""
+    """Hypothesis: positions or velocities are those of the centres of mass."""
     com = np.array([body.com for body in evidence.element.mechanism.bodies])
     if told.name == "w_WB" or not np.any(com) or told.said.shape != told.true.shape:
         return
@@ -59,7 +59,7 @@ def _of_centres(told: Reported, evidence: Evidence) -> Iterator[Cause]:
 
 
 def _size(element: Any, name: str) -> float:
-    """What a mechanism of its size has of a quantity in its time."""
+    """Scale of a quantity of a mechanism, from its length and natural time."""
     length, time = element.length, element.natural_time
     return float({"p_WB": length, "v_WB": length / time, "w_WB": 1 / time}[name])
 

@@ -44,7 +44,7 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis: FloatArray) -> bool:
-    """Whether the poses, too, turn about the one axis and not about the other: a spin alone may be said wrongly."""
+    """True if the poses turn about the one axis and not about the other: a spin alone may be reported wrongly."""
     relative = np.swapaxes(placed.R_WB[:, parent], 1, 2) @ placed.R_WB[:, child]
     turns = relative @ relative[0].T
     moved, unmoved = (float(np.max(np.linalg.norm(turns @ n - n, axis=-1))) for n in (own, axis))
@@ -99,7 +99,7 @@ def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
-    """Pairs of velocities of which one's joint carries the other's, without those of one joint, (nv, nv)."""
+    """Mask of pairs of velocities whose joints carry one another, without pairs of one joint, (nv, nv)."""
     above = {joint.child: joint for joint in mechanism.joints}
     slices = dict(zip((joint.name for joint in mechanism.joints), mechanism.v_slices, strict=True))
     found = np.zeros((mechanism.nv, mechanism.nv))

@@ -39,12 +39,12 @@ _MOTION = ("time", "p_WB", "v_WB", "w_WB", "q_WB")
 
 
 def seen(scene: Scene) -> float:
-    """How far a body can be off and look right [m]."""
+    """Largest invisible error of a body's place [m]."""
     return _SEEN * covered(scene).length
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
-    """What the replay draws of a mechanism: see :data:`proofroll.report.replay.records.Drawer`."""
+    """Drawing of a mechanism in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     element = covered(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
@@ -109,7 +109,7 @@ def _readings(element: MechanismElement) -> list[tuple[str, str]]:
 
 
 def _camera(element: MechanismElement) -> tuple[float, float]:
-    """Where the camera stands: about the vertical and above the horizon [rad]."""
+    """Angles of the camera about the vertical and above the horizon [rad]."""
     x, y, z = direction(element)[0]
     lift = math.asin(max(-1.0, min(1.0, z))) + (_ASIDE[1] if z < 0.5 else -_ASIDE[1])
     upright = math.hypot(x, y) < 1e-6  # seen from above

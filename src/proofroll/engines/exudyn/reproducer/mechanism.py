@@ -87,7 +87,7 @@ def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
 
 
 def _essential(item: dict[str, Any]) -> dict[str, Any]:
-    """What Exudyn lists of an item, without drawing, name, functions (there are none) and what it lists twice."""
+    """Item of Exudyn without drawing, name, functions (there are none) and entries listed twice."""
     twice = {"jointHTs", "referenceHT", "referenceRotation"} | ({"localPosition"} if "localHT" in item else set())
     return {
         key: value

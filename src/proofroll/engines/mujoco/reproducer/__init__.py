@@ -87,7 +87,7 @@ def mechanism_source(xml: str, mechanism: Mechanism) -> str:
 
 
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
-    """What of the model its file, with six digits, does not give back: numbers, and shortcuts that hang on them."""
+    """Numbers of the model, and shortcuts from them, that its file with six digits does not give back."""
     read = mujoco.MjModel.from_xml_string(xml)
     found = {}
     for name in dir(model):

@@ -1,0 +1,78 @@
+"""First lines of docstrings are nouns or verbs of the field: what can be counted of plain English."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+FOLDERS = ("src", "benchmarks", "papers", "tests/drill", "tests/plugins", "examples/engines")
+# A clause or a phrase that hangs on a word which is not there.
+_OPENERS = (
+    r"all (?:that|who)|as|at(?! least)|because|by|every(?:thing|body) (?:that|who)|everything|for|from|how|if|in|is|it|"
+    r"of|on|since|so|such|that|they|those|to|under|what|when|where|whether|which|who|whose|whom|why|with"
+)
+_OPENS = re.compile(rf"(?:{_OPENERS})\b", re.IGNORECASE)
+# Words without a noun behind them; a reader has to guess who does what.
+_VAGUE = re.compile(r"\b(?:such as|nobody|another than|otherwise than|told|said of|said by|of which)\b")
+# Modules that are being rewritten; their docstrings follow.
+_LATER = re.compile(
+    r"src/proofroll/(report/|elements/mechanism/switches|truth/hybrid|truth/mechanism/.*switch|"
+    r"studies/comparison/(outcome|compare)|engines/projection/dependent)|/contact[^/]*\.py$"
+)
+
+
+def _docstrings(source: str) -> Iterator[tuple[int, str]]:
+    """Line and text of every docstring of a module."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            text = ast.get_docstring(node)
+            if text:
+                yield node.body[0].lineno, text
+
+
+def hard_to_read(source: str) -> Iterator[str]:
+    """Line and reason of every docstring that opens with a clause or has a vague word."""
+    for line, text in _docstrings(source):
+        first = text.splitlines()[0]
+        if _OPENS.match(first):
+            yield f"{line}: opens with a clause: {first}"
+        for vague in _VAGUE.finditer(text):
+            yield f"{line}: says {vague[0]!r}: {first}"
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_docstrings_open_with_a_noun_or_a_verb(folder: str) -> None:
+    """No docstring opens with a clause or a phrase without its noun, and none has a word that hides who does what."""
+    found = [
+        f"{path.relative_to(ROOT)}:{problem}"
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        if not _LATER.search(path.as_posix())
+        for problem in hard_to_read(path.read_text(encoding="utf-8"))
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    ("first", "hard"),
+    [
+        ("What a run gave.", True),
+        ("Whether it holds.", True),
+        ("Of the quantity.", True),
+        ("Everything that follows from the state.", True),
+        ("Scenes such as show a frame.", True),
+        ("A sum that nobody pays.", True),
+        ("Residuals of a law.", False),
+        ("True if it holds.", False),
+        ("Asks the worker to read a file.", False),
+        ("Formulation of an element.", False),
+        ("Items, the first of them 0.", False),
+    ],
+)
+def test_a_clause_is_seen(first: str, hard: bool) -> None:
+    """A docstring that opens with a clause is found, and one that opens with a noun or a verb is not."""
+    assert bool(list(hard_to_read(f'"""{first}"""'))) is hard
