@@ -21,7 +21,7 @@ _OPENS = re.compile(rf"(?:{_OPENERS})\b", re.IGNORECASE)
 _VAGUE = re.compile(r"\b(?:such as|nobody|another than|otherwise than|told|said of|said by|of which)\b")
 # Modules that are being rewritten; their docstrings follow.
 _LATER = re.compile(
-    r"src/proofroll/(report/|elements/mechanism/switches|truth/hybrid|truth/mechanism/.*switch|"
+    r"src/proofroll/(report/|elements/mechanism/(switches|contacts/)|truth/hybrid|truth/mechanism/.*switch|"
     r"studies/comparison/(outcome|compare)|engines/projection/dependent)|/contact[^/]*\.py$"
 )
 

@@ -264,7 +264,7 @@ def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
 
 
 def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float, out: Path) -> Result:
-    """What comes of a case; a budget learns what it took, and a case that would have taken more is left out."""
+    """Result of a case; a budget learns its cost, and a case that would cost more is left out."""
     if budget is None:
         return _ask(worker, case, limit, out)
     seconds = None

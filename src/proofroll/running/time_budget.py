@@ -30,7 +30,7 @@ class TimeBudget:
 
     @property
     def sentence(self) -> str:
-        """Why a case is left out."""
+        """Reason that a case is left out."""
         return f"the {self.seconds:g} s of processor time for a first look did not suffice"
 
     def wait(self) -> None:

@@ -34,7 +34,7 @@ class BallReport(ReportKind):
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """How the ball meets the wall: by impacts, slipping, or rolling alone."""
+        """Group of the ball's contact with the wall: impacts, slipping, or rolling alone."""
         needs = scene.elements[0].requires
         if BallCapability.IMPACTS in needs:
             return "ball, impacts"

@@ -87,7 +87,7 @@ def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
 
 
 def _bar(item: Judgement) -> float:
-    """Of a limit, with the round-off that no verdict hangs on."""
+    """Error bar of a limit, with the round-off that no verdict depends on."""
     return (item.limit_error_bar or 0.0) + item.truth_error_bar + round_off_of("double", item.scale)
 
 

@@ -43,7 +43,7 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """What is hardest in it: laws of joints that switch, loops, springs and drives, or none of them."""
+        """Group of its hardest part: laws of joints that switch, loops, springs and drives, or none of them."""
         needs = covered(scene).requires
         if needs & _LAWS:
             return "joint laws"
