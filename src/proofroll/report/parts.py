@@ -16,6 +16,7 @@ from proofroll.core.announced import loaded
 from proofroll.core.errors import ProofrollError, require_known
 from proofroll.files.scene_sources import source_of
 from proofroll.files.toml import named_file, read_toml, study_files
+from proofroll.report.long_table import TableLine
 from proofroll.running.runner import Runner
 
 GROUP = "proofroll.report_parts"
@@ -108,6 +109,10 @@ class Part(Protocol):
 
     def entry(self) -> PartEntry:
         """What is known, with whatever its template needs besides; only after it was made or taken."""
+
+    def lines(self) -> Sequence[TableLine]:
+        """Its runs in the long table; only after it was made or taken."""
+        return ()
 
     def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- for those that have any
         """Its pictures as markup, by name; every id in them begins with ``prefix``."""

@@ -37,8 +37,8 @@ class BallReport(ReportKind):
         """Group of the ball's contact with the wall: impacts, slipping, or rolling alone."""
         needs = scene.elements[0].requires
         if BallCapability.IMPACTS in needs:
-            return "ball, impacts"
-        return "ball, slipping" if BallCapability.BOUNDED_FRICTION in needs else "ball, rolling"
+            return "ball impacts"
+        return "ball slipping" if BallCapability.BOUNDED_FRICTION in needs else "ball rolling"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

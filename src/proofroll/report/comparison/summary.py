@@ -93,7 +93,7 @@ def _row(runs: list[Run]) -> ReportedRow:
     timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
     reason, limit = _why(judged)
     return ReportedRow(
-        **_settings(first),
+        **settings_of(first),
         verdict=max((run.verdict for run in judged), key=SEVERITY.index),
         verdicts={verdict.value: sum(run.verdict == verdict for run in runs) for verdict in Verdict},
         reason=reason,
@@ -182,7 +182,7 @@ def _setting(engine: str, facts: EngineFacts) -> str:
     return " ".join([*shown, *chosen, *precision_words(facts.precision)])
 
 
-def _settings(run: Run) -> dict[str, Any]:
+def settings_of(run: Run) -> dict[str, Any]:
     """The fields of :class:`Setting`."""
     facts = run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
     return {
@@ -203,7 +203,7 @@ def _run(run: Run, row: int) -> ReportedRun:
     reason, limit = _why([run])
     return ReportedRun(
         row=row,
-        **_settings(run),
+        **settings_of(run),
         settings=run.facts.settings if run.facts else {},
         point=point_name(run.parameters),
         parameters=run.parameters,

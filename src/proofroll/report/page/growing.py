@@ -12,6 +12,7 @@ from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import plain
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
+from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, Sentences, report_content
 from proofroll.report.page.summary import three_sentences
@@ -40,6 +41,7 @@ class Report:
     parts: list[Part] = field(default_factory=list)
     pictures: dict[str, str] = field(default_factory=dict)
     _said: dict[int, PartEntry] = field(default_factory=dict)
+    _lines: dict[int, Sequence[TableLine]] = field(default_factory=dict)
 
     @property
     def content(self) -> ReportContent:
@@ -51,7 +53,9 @@ class Report:
             if isinstance(entry.study, dict):  # of a kept study the versions are those of now
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
         findings = Sentences(three_sentences(self.compared.comparisons, entries))
-        return replace(self.compared, entries=entries, findings=findings, environment=environment)
+        further = [line for part in self.parts for line in self._lines.get(id(part), ())]
+        table = LongTable([*self.compared.table.lines, *further])
+        return replace(self.compared, entries=entries, findings=findings, environment=environment, table=table)
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
         """Lists further studies with what is kept of them in the folder of all results, unless it is made ``fresh``.
@@ -77,18 +81,20 @@ class Report:
         return said
 
     def write(self, out: Path) -> None:
-        """Writes ``report.html`` and ``report.json``.
+        """Writes ``report.html``, ``report.json`` and ``report.csv``.
 
         Raises:
             ProofrollError: the folder cannot be written.
         """
         content = self.content
         write_text(out / "report.json", json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+        write_text(out / "report.csv", content.table.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 
     def _put(self, part: Part, said: PartEntry) -> None:
         self._said[id(part)] = said
         if said.study is not None:
+            self._lines[id(part)] = part.lines()
             alike = [id(other) for other in self.parts if other.key == part.key]
             prefix = f"{part.key}{alike.index(id(part))}-"
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
@@ -114,7 +120,7 @@ def begun(
 
 
 def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> ReportContent:
-    """Writes ``report.html`` and ``report.json`` of comparisons alone into a folder, and returns their content.
+    """Writes the files of a report of comparisons alone into a folder, and returns their content.
 
     The rest is as for :func:`begun`. Raises ProofrollError if the folder cannot be written.
     """

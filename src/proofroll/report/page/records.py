@@ -12,10 +12,12 @@ from typing import Any
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.report.comparison.growth import Growth, growth
+from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.sentences import Findings, findings
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
+from proofroll.report.long_table import LongTable
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.page.summary import three_sentences
 from proofroll.report.parts import PartEntry, part_kinds
@@ -99,6 +101,7 @@ class ReportContent:
         engine_findings: what is known of engines.
         entries: of further studies, by the key of their kind.
         environment: where and with what it was made.
+        table: every quantity of every run.
         replay: its cases without their numbers, which follow from the trajectories that they name.
     """
 
@@ -110,6 +113,7 @@ class ReportContent:
     entries: Mapping[str, Sequence[PartEntry]] = field(metadata=MERGED)
     environment: MadeWith
     findings: Sentences
+    table: LongTable
     replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
 
     @property
@@ -135,6 +139,7 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> Repor
         entries,
         MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
         Sentences(three_sentences(comparisons, entries)),
+        LongTable([line for outcome in outcomes for line in lines_of(outcome)]),
     )
 
 

@@ -11,15 +11,19 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.number_text import counted
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.work_precision import svg
+from proofroll.report.kinds import group_of
+from proofroll.report.long_table import TableLine
 from proofroll.report.pages import element
 from proofroll.report.parts import Part, PartEntry, Tell, held
 from proofroll.report.tradeoff import tables as tradeoff_tables
 from proofroll.report.tradeoff.tables import default_quantities
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
+from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.study_store import kept
 from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
 from proofroll.studies.tradeoff.cost_claims import ClaimJudgement
-from proofroll.studies.tradeoff.recommend import Answer, recommend
+from proofroll.studies.tradeoff.recommend import Answer, by_hand, recommend
 from proofroll.studies.tradeoff.records import TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Wish
 from proofroll.studies.tradeoff.study import make_tradeoff
@@ -100,6 +104,40 @@ class TradeoffPart(Part):
             claims=[] if self.engines else self.asked.judged(study),
             contradictions=[] if self.engines else self.asked.contradictions(study),
         )
+
+    def lines(self) -> list[TableLine]:
+        """Each error of each point; nobody judges them, for a choice of a tolerance does."""
+        study = self.study
+        assert study is not None  # it was made
+        scene = self.asked.swept.loaded()
+        group, place = group_of(scene), point_name(study.parameters)
+        found = []
+        for point in study.points:
+            low, high = point.interval or (None, None)
+            run: dict[str, Any] = {
+                "study": self.asked.name, "group": group, "scene": study.scene, "place": place, "row": point.id,
+                "engine": point.engine, "version": study.measured.versions.get(point.engine, ""),
+                "formulation": point.settings.get("formulation") or "", "preset": point.settings.get("preset") or "",
+                "setting": point.settings.get("preset") or "", "precision": point.precision,
+                "own_equations": by_hand(point.level), "resolution": point.resolution or "", "step": point.step,
+                "status": point.status, "message": "" if point.status == Status.DONE else point.message, "verdict": "",
+                "cost": point.seconds_per_second, "cost_low": low, "cost_high": high, "clean": True,
+            }  # fmt: skip
+            found += [
+                TableLine(
+                    **run,
+                    quantity=name,
+                    unit=study.quantities[name].unit,
+                    role=scene.observables[name].role,
+                    headline=scene.observables[name].headline,
+                    error=error,
+                    truth_error_bar=study.quantities[name].truth_error_bar,
+                    scale=study.quantities[name].scale,
+                )
+                for name, error in point.envelope.items()
+                if name in study.quantities
+            ] or [TableLine(**run)]
+        return found
 
     def pictures(self, prefix: str) -> dict[str, str]:
         """The work-precision diagram."""

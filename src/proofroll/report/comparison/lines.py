@@ -1,0 +1,97 @@
+"""The runs of a comparison as lines of the long table, those of its ladders of steps among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+from proofroll.core.verdict import Judgement, Verdict
+from proofroll.report.comparison.records import Cost
+from proofroll.report.comparison.summary import by_row, settings_of
+from proofroll.report.kinds import group_of
+from proofroll.report.long_table import TableLine
+from proofroll.running.case import Result, Status
+from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
+from proofroll.studies.comparison.planning import point_name
+
+
+def lines_of(outcome: Outcome) -> list[TableLine]:
+    """A line for each judgement, and for each error of a rung, to which no verdict belongs."""
+    numbers = {key: number for number, key in enumerate(by_row(outcome))}
+    found: list[TableLine] = []
+    for run in outcome.runs:
+        plain = _plain(outcome, run, numbers[id(run.row)])
+        found += [_judged(outcome, run, plain, item) for item in run.judgements] or [plain]
+        for rung in run.rungs:
+            found += _of_rung(outcome, run, plain, rung)
+    return found
+
+
+def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
+    """What is the same in all lines of a run."""
+    comparison, said = outcome.comparison, settings_of(run)
+    point = outcome.points.get(point_name(run.parameters))
+    return TableLine(
+        study=comparison.name,
+        group=group_of(outcome.scene if point is None else point.scene),
+        scene=comparison.scene,
+        place=point_name(run.parameters),
+        row=row,
+        engine=said["name"],
+        version=run.facts.version if run.facts else "",
+        formulation=said["formulation"] or "",
+        preset=said["preset"] or "",
+        setting=said["setting"],
+        precision=said["precision"],
+        own_equations=bool(run.shared),
+        resolution=said["resolution"] or "",
+        step=said["resolution_value"],
+        verdict=run.verdict,
+        **_ended(outcome, run.result),
+    )
+
+
+def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
+    """How a run ended and what it cost; without clean runs as the sampled one tells, beside which others ran."""
+    cost, done = Cost.of(result.timings), result.status == Status.DONE
+    rough = result.wall_seconds / outcome.comparison.until if done and not result.host and result.wall_seconds else None
+    return {
+        "status": result.status,
+        "message": "" if done else result.message,
+        "cost": cost.median if cost else rough,
+        "cost_low": cost.low if cost else None,
+        "cost_high": cost.high if cost else None,
+        "clean": cost is not None,
+    }
+
+
+def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> TableLine:
+    scene = outcome.points[point_name(run.parameters)].scene
+    known = scene.observables[item.observable]
+    return replace(
+        plain,
+        verdict=item.verdict,
+        limit=item.limit,
+        quantity=item.observable,
+        unit=item.unit,
+        role=known.role,
+        headline=known.headline,
+        error=item.error,
+        truth_error_bar=item.truth_error_bar,
+        tolerance=item.tolerance,
+        scale=item.scale,
+        order=item.order,
+    )
+
+
+def _of_rung(outcome: Outcome, run: Run, plain: TableLine, rung: LadderRun) -> Iterator[TableLine]:
+    """Lines of a rung; where the question is ill-posed its errors are nobody's, too."""
+    ended = replace(plain, step=rung.value, verdict="", **_ended(outcome, rung.result))
+    judged = [item for item in run.judgements if item.observable in rung.errors]
+    for item in judged:
+        verdict = item.verdict if item.verdict in {Verdict.ILL_POSED, Verdict.NOT_JUDGED} else ""
+        line = _judged(outcome, run, ended, item)
+        yield replace(line, verdict=verdict, error=rung.errors[item.observable], order=None, limit="")
+    if not judged:
+        yield ended

@@ -1,0 +1,104 @@
+"""The long table: one line for each quantity of each run, with flat values alone; the files of a report hold it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from proofroll.files.json_data import plain
+
+
+@dataclass(frozen=True, kw_only=True)
+class TableLine:
+    """One quantity of one run, or a run without any.
+
+    Attributes:
+        study: name of the file that asked for the run.
+        group: of scenes like this one.
+        scene: name of the scene.
+        place: parameters of the run in words; empty: the scene's own.
+        row: number of the run's row in its study.
+        engine, version, formulation, preset, setting, precision: which; ``setting`` has preset and further options.
+        own_equations: the run solves equations derived for the scene, as its truth does.
+        resolution, step: setting that trades speed for accuracy, and its value.
+        status, message: how the run ended.
+        verdict: of the quantity, of a run without quantities that of the run; empty: none was given.
+        limit: what a ladder of steps says of the quantity.
+        quantity, unit, role: what was measured, of which role (:class:`proofroll.core.observable.Role`).
+        headline: summaries show it.
+        error: largest distance from the truth; None: not finite, or there is none.
+        truth_error_bar: of the truth, in the same unit.
+        tolerance: largest error that counts as agreement; None: nobody said.
+        scale: size of the quantity.
+        order: observed order of the time step.
+        cost: wall seconds per simulated second.
+        cost_low, cost_high: its interval; None: it was measured once.
+        clean: the cost was measured in clean runs of their own; otherwise it is that of the sampled run, beside which
+            others ran.
+    """
+
+    study: str
+    group: str
+    scene: str
+    place: str
+    row: int
+    engine: str
+    version: str
+    formulation: str
+    preset: str
+    setting: str
+    precision: str
+    own_equations: bool
+    resolution: str
+    step: float | None
+    status: str
+    message: str
+    verdict: str
+    limit: str = ""
+    quantity: str = ""
+    unit: str = ""
+    role: str = ""
+    headline: bool = False
+    error: float | None = None
+    truth_error_bar: float | None = None
+    tolerance: float | None = None
+    scale: float | None = None
+    order: float | None = None
+    cost: float | None
+    cost_low: float | None
+    cost_high: float | None
+    clean: bool
+
+    @property
+    def relative(self) -> float:
+        """Error with the truth's error bar in parts of the quantity's size: the truth vouches for no more."""
+        if self.error is None or not self.scale:
+            return math.inf
+        return (self.error + (self.truth_error_bar or 0.0)) / self.scale
+
+
+COLUMNS = tuple(item.name for item in fields(TableLine))
+
+
+@dataclass(frozen=True)
+class LongTable:
+    """The lines of a report."""
+
+    lines: Sequence[TableLine]
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON: names of columns once, then the values of each line; ``pandas.DataFrame(**table)`` reads it."""
+        return {"columns": COLUMNS, "data": [[getattr(line, name) for name in COLUMNS] for line in self.lines]}
+
+    @property
+    def csv(self) -> str:
+        """The same as CSV; a value that is not there, or not finite, is an empty field."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(plain(self)["data"])
+        return text.getvalue()
