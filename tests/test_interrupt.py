@@ -78,13 +78,15 @@ def test_while_the_map_is_drawn(tmp_path: Path) -> None:
     assert line == "proofroll: interrupted; cases that were finished and stored will be reused"
 
 
-def test_while_the_command_is_loaded() -> None:
-    """Ctrl-C before anything is run is one line too."""
+@pytest.mark.parametrize("module", ["proofroll.core.errors", "typing", "proofroll.cli", "typer"])
+def test_while_the_command_is_loaded(module: str) -> None:
+    """Ctrl-C before anything is run is one line too, from the first module on that is loaded."""
     script = (
         "import sys\n"
+        f"sys.modules.pop({module!r}, None)\n"
         "class Impatient:\n"
         "    def find_spec(self, name, *_):\n"
-        "        if name == 'typer':\n"
+        f"        if name == {module!r}:\n"
         "            raise KeyboardInterrupt\n"
         "sys.meta_path.insert(0, Impatient())\n"
         "from proofroll.__main__ import main\n"

@@ -1,16 +1,16 @@
 """Cross-validation of multibody engines: which engine, formulation and time step to trust for a scene.
 
-The public names, loaded when they are first used, so that importing proofroll stays light.
+The public names, loaded when they are first used, so that importing proofroll stays light: the command is ready for
+Ctrl-C before anything else is loaded.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused
-
+TYPE_CHECKING = False  # type checkers take it for true, and the module typing is not loaded
 if TYPE_CHECKING:
+    from typing import Any
+
+    from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused
     from proofroll.files.scene_file import load_scene
     from proofroll.running.simulation import simulate
     from proofroll.studies.judging.judge import judge
@@ -19,6 +19,7 @@ __all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "ju
 __version__ = "0.1.0"
 
 _HOMES = {
+    **dict.fromkeys(("Diverged", "InputError", "Missing", "ProofrollError", "Refused"), "proofroll.core.errors"),
     "judge": "proofroll.studies.judging.judge",
     "load_scene": "proofroll.files.scene_file",
     "simulate": "proofroll.running.simulation",
@@ -28,6 +29,8 @@ _HOMES = {
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module 'proofroll' has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(_HOMES[name]), name)
 
 

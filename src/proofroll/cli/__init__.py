@@ -136,7 +136,7 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _interrupt)  # a time limit from outside also ends the workers
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # so does the end of the terminal, but for nohup
         signal.signal(signal.SIGHUP, _interrupt)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # a shell may have told us to ignore it
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # as a shell may have told us
         signal.signal(signal.SIGINT, _interrupt)
     warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that overflow: what comes of them is told
     try:

@@ -70,7 +70,7 @@ def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
     events: Any = None
     if run.case is not None and run.result.status == Status.DONE and run.result.trajectory is not None:
         scene = load_scene(outcome.comparison.scene, **run.parameters)
-        path = store.trajectory(outcome.truths[point_name(run.parameters)])
+        path = outcome.points[point_name(run.parameters)].file
         true = _events(scene, read(path)) if path.exists() else {}
         found = _events(scene, read(store.trajectory(run.case)))
         events = {name: until_wrong(kinds, true.get(name, kinds)) for name, kinds in found.items()}
