@@ -58,6 +58,8 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
         Table("[[points]]", mechanisms.Point),
         Table("[[geometries]]", contacts.Geometry),
         Table("[[pairs]]", contacts.Pair),
+        Table("[[actuators]]", mechanisms.Actuator),
+        Table("[[couplings]]", mechanisms.Coupling),
     ),
     "A comparison: `comparisons/*.toml` without `study`": (
         Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget")),
@@ -161,6 +163,8 @@ def _type(annotation: Any) -> str:
         "Numbers": "number or list",
         "Kind": "kind of joint",
         "Tolerance": '"1e-3 m" or "1 %"',
+        "float | Formula | Table": "number, formula of t, or table",
+        "ActuatorKind": "torque or velocity or position",
     }
     text = re.sub(r"Literal\[([^]]*)\]", lambda found: found[1].replace(", ", " or "), text)
     text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text)).replace("FloatOrInf", "float")

@@ -32,8 +32,8 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     dependent = [joint.name for joint in mechanism.joints if joint.dependent]
     if not dependent:
         return mechanism
-    if not mechanism.loops:
-        advice = "there is no loop that it could follow from; add one, or leave dependent out"
+    if not mechanism.loops and not mechanism.couplings:
+        advice = "there is no loop or coupling that it could follow from; add one, or leave dependent out"
         raise InputError(f"joints.{dependent[0]}.dependent", True, advice)
     tree = Tree(mechanism)
     q, v = mechanism.start()
@@ -107,6 +107,15 @@ def check_start(mechanism: Mechanism) -> None:
         rate = float(np.abs(rows.C[mine] @ v).max(initial=0.0))
         if rate > CLOSED * max(1.0, float(np.abs(v).max(initial=0.0))):
             advice = f"v0 opens the loop at {rate:.3g} m/s (or rad/s); {ADVICE.replace('q0', 'v0', 1)}"
+            raise InputError(field, between, advice)
+    for number, coupling in enumerate(mechanism.couplings, len(mechanism.loops)):
+        field, between = f"couplings.{coupling.name}", f"{coupling.joint_a} to {coupling.joint_b}"
+        apart, sizes = rows.residual[rows.loop == number], np.abs([coupling.offset, *q])
+        if abs(apart[0]) > CLOSED * max(1.0, sizes.max()):
+            raise InputError(field, between, f"q0 of {coupling.joint_b} is {apart[0]:.3g} rad (or m) off; {ADVICE}")
+        rate = float(np.abs(rows.C[rows.loop == number] @ v)[0])
+        if rate > CLOSED * max(1.0, float(np.abs(v).max(initial=0.0))):
+            advice = f"v0 opens the coupling at {rate:.3g} rad/s (or m/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
     _check_inertia(mechanism, JointCoordinates(mechanism, 0).inertial(motion)[1])
     if analysed(mechanism).mobility == 0:

@@ -8,6 +8,7 @@ from enum import StrEnum
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.signal import varies
 
 
 class MechanismCapability(StrEnum):
@@ -36,6 +37,10 @@ class MechanismCapability(StrEnum):
     CONTACT = "contact between bodies"
     CONTACT_FRICTION = "friction of contacts between bodies"
     CONTACT_REBOUNDS = "rebounds of bodies from each other (restitution)"
+    ACTUATORS = "actuators of joints"
+    SATURATION = "limits of efforts"
+    COUPLINGS = "couplings of joints"
+    SIGNALS = "drives and targets that change in time"
 
 
 ALL_JOINTS = frozenset(MechanismCapability[kind.upper()] for kind in FACTS)
@@ -49,25 +54,23 @@ def required(mechanism: Mechanism) -> frozenset[str]:
     needs: set[str] = {*mechanism.unmodelled}
     needs |= {capability[joint.kind.upper()] for joint in mechanism.joints}
     needs |= {capability[f"{loop.kind.upper()}_LOOP"] for loop in mechanism.loops}
-    if mechanism.springs:
-        needs.add(capability.SPRINGS)
-    for joint in mechanism.joints:
-        if joint.stiffness or joint.damping or joint.torque:
-            needs.add(capability.JOINT_SPRINGS)
-        if joint.friction:
-            needs.add(capability.JOINT_FRICTION)
-        if joint.armature:
-            needs.add(capability.ARMATURE)
-        if joint.limits:
-            needs.add(capability.STOPS)
-        if joint.restitution:
-            needs.add(capability.REBOUNDS)
-    for pair in mechanism.pairs:
-        needs.add(capability.CONTACT)
-        if pair.friction:
-            needs.add(capability.CONTACT_FRICTION)
-        if pair.restitution:
-            needs.add(capability.CONTACT_REBOUNDS)
+    joints, pairs, actuators = mechanism.joints, mechanism.pairs, mechanism.actuators
+    asked: dict[str, bool] = {
+        capability.SPRINGS: bool(mechanism.springs),
+        capability.JOINT_SPRINGS: any(joint.stiffness or joint.damping or joint.torque for joint in joints),
+        capability.JOINT_FRICTION: any(joint.friction for joint in joints),
+        capability.ARMATURE: any(joint.armature for joint in joints),
+        capability.STOPS: any(joint.limits for joint in joints),
+        capability.REBOUNDS: any(joint.restitution for joint in joints),
+        capability.CONTACT: bool(pairs),
+        capability.CONTACT_FRICTION: any(pair.friction for pair in pairs),
+        capability.CONTACT_REBOUNDS: any(pair.restitution for pair in pairs),
+        capability.ACTUATORS: bool(actuators),
+        capability.SATURATION: any(actuator.limit is not None for actuator in actuators),
+        capability.COUPLINGS: bool(mechanism.couplings),
+        capability.SIGNALS: any(map(varies, mechanism.signals)),
+    }
+    needs |= {need for need, here in asked.items() if here}
     return frozenset(needs)
 
 

@@ -10,8 +10,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
-from proofroll.elements.mechanism.dataset import reactions
+from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
+from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _COMPOSED = "composed along the tree by the engine's own arithmetic"
 # Three evaluations show the noise, they do not bound it; each side has its own.
 _MARGIN = 10.0
 _NOISY = "round-off of the scene's own accelerations, which many bodies in a row magnify"
-_FROM_ACCELERATIONS = ("acceleration", "angular acceleration", "forces", "torques")
+_FROM_ACCELERATIONS = ("acceleration", "angular acceleration", "forces", "torques", "couplings")
 # What a model may soften: quantity -> largest relative difference that any reason explains, and why.
 CAPS: Mapping[str, Regularised] = {
     # with all of it allowed, a mechanism that does not set off at all would pass
@@ -59,7 +60,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         known = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
         difference = float(np.max(np.abs(got - want)[known], initial=0.0)) / scale if known.size else float("inf")
         soft = built.regularised.get(quantity.replace(" ", "_"))
-        if soft is None and quantity in {"forces", "torques"}:  # as soft as what they accelerate
+        if soft is None and quantity in {"forces", "torques", "couplings"}:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda one: one.tolerance, default=None)
         tolerance, because = tolerated(soft, CAPS.get(quantity), COMPOSED, _COMPOSED)
         own = scale if "acceleration" in quantity else found.scale
@@ -102,7 +103,8 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
 def _compare_reactions(
     element: MechanismElement, sample: MechanismSample, compare: Callable[[str, str, Any, Any, float], None]
 ) -> None:
-    """Forces and moments of joints and loops, as far as they are determinate; models without them are not asked."""
+    """Named forces, and forces and moments as far as they are determinate; models without them are not asked."""
+    _compare_named(element, sample, compare)
     if sample.joint_force is None or sample.joint_torque is None:
         return
     found = element.first_motion
@@ -112,6 +114,20 @@ def _compare_reactions(
     torque = max(float(np.nanmax(np.abs(wrench[:, 3:]), initial=0.0)), force * element.length)
     compare("forces", "N", wrench[:, :3], reactions(element, sample, "joint_force"), force)
     compare("torques", "N m", wrench[:, 3:], reactions(element, sample, "joint_torque"), torque)
+
+
+def _compare_named(
+    element: MechanismElement, sample: MechanismSample, compare: Callable[[str, str, Any, Any, float], None]
+) -> None:
+    """Efforts and forces of couplings."""
+    names, natural = named_forces(element.mechanism), element.first_motion.scale * element.length
+    natural *= sum(body.mass for body in element.mechanism.bodies)
+    for key, quantity in (("effort", "efforts"), ("coupling", "couplings")):
+        mine = np.array([item.field == key for item in names], dtype=bool)
+        if mine.any():
+            expected = element.first_named[mine]
+            given = None if getattr(sample, key) is None else along(sample, key, len(expected))
+            compare(quantity, "N or N m", expected, given, float(np.max(np.abs(expected))) or natural)
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:

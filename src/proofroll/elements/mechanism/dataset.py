@@ -14,6 +14,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.turns import doubt
 from proofroll.elements.mechanism.contacts.observables import followed, given_forces
 from proofroll.elements.mechanism.joint import TURNING
+from proofroll.elements.mechanism.named_forces import lengths, named_forces, taken
 from proofroll.elements.mechanism.placed import TURN, Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
 
@@ -42,7 +43,28 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
     p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
     wrench = np.array([[reactions(element, s, name) for name in ("joint_force", "joint_torque")] for s in samples])
     placed = Placed(element.mechanism, times, p, v, w, stacked("q_WB", 4, count))
-    return columns(element, placed, wrench, given_forces(element.mechanism, samples))
+    named = np.array([_named(element, sample) for sample in samples])
+    return columns(element, placed, wrench, given_forces(element.mechanism, samples), named)
+
+
+def _named(element: MechanismElement, sample: MechanismSample) -> FloatArray:
+    counts = lengths(element.mechanism)
+    return taken(element.mechanism, {name: along(sample, name, count) for name, count in counts.items()})
+
+
+def along(sample: MechanismSample, name: str, count: int) -> FloatArray:
+    """A field of a sample with a force for each actuator, coupling or joint [N, N m]; NaN where it is None.
+
+    Raises:
+        Diverged: it has another shape, or is not of numbers.
+    """
+    given = getattr(sample, name)
+    if given is None:
+        return np.full(count, np.nan)
+    try:
+        return np.asarray(given, dtype=np.float64).reshape(count)
+    except (TypeError, ValueError):
+        raise Diverged(f"the engine gave {name} that is no array of {count} numbers") from None
 
 
 def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> FloatArray:
@@ -63,15 +85,19 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
     return values.reshape(shape)
 
 
-def columns(element: MechanismElement, placed: Placed, wrench: FloatArray, pressed: FloatArray) -> Columns:
+def columns(
+    element: MechanismElement, placed: Placed, wrench: FloatArray, pressed: FloatArray, named: FloatArray
+) -> Columns:
     """All variables of a run, from where the bodies are and the forces and moments on them.
 
-    ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3).
+    ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
+    ``named``: see :func:`~proofroll.elements.mechanism.named_forces.named_forces`, (time, forces).
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] over (time, body, xyz), ``q_WB`` over (time, body, wxyz);
     ``positions`` [m] of the tracked points; ``q.<joint>``, ``v.<joint>`` of joints with one coordinate;
     ``<point>.x|y|z`` [m]; ``force.<joint>.x|y|z`` [N] and ``torque.<joint>.x|y|z`` [N m] on the child, at the joint, in
     world axes, NaN with a reason in the attribute ``absent``; ``forces``, ``torques``: the
-    determinate components of all; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
+    determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
+    [N, N m] along coordinates; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
     ``slip.<pair>`` [m/s]; ``energy`` [J], ``drift`` [m], and ``energy_error`` [J], or ``energy_change`` [J] of what is
     driven or damped.
     """
@@ -112,6 +138,8 @@ def columns(element: MechanismElement, placed: Placed, wrench: FloatArray, press
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
         _put_contacts(placed, pressed, put)
+    for values, item in zip(named.T, named_forces(mechanism), strict=True):
+        put(item.name, values, str(item.unit), item.meaning, absent=UNSAID if np.all(np.isnan(values)) else "")
     energy = placed.energy()
     wound = [doubts[joint.name][UNCERTAIN] for joint in mechanism.joints if joint.stiffness and joint.name in doubts]
     unsure = {UNCERTAIN: wound[0]} if wound else {}

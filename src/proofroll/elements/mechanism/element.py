@@ -26,6 +26,7 @@ from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll.elements.mechanism.start_words import start_facts
@@ -161,6 +162,8 @@ class MechanismElement:
     @cached_property
     def conservative(self) -> bool:
         """True if nothing in it drives or damps."""
+        if self.mechanism.actuators:
+            return False
         laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.mechanism.joints]
         lossy = any(pair.friction or pair.restitution < 1 for pair in self.mechanism.pairs)
         damped = any(spring.damping for spring in self.mechanism.springs)
@@ -203,6 +206,9 @@ class MechanismElement:
             meaning = "determinate components of the moments on children at their joints"
             found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=force * self.length))
         found += contact_observables(self.mechanism, a, speed, force)
+        for item in named_forces(self.mechanism):
+            floor = force if item.unit == "N" else force * self.length
+            found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor))
         if self.conservative:
             meaning = "energy now minus energy at the start"
             floor = force * self.length
@@ -238,8 +244,18 @@ class MechanismElement:
     @cached_property
     def first_wrench(self) -> FloatArray:
         """Wrench of each joint and loop on its child at the start: force [N] and moment [N m], (joints + loops, 6)."""
-        wrench: FloatArray = self._equations.sample(*self.mechanism.start())["wrench"]
+        wrench: FloatArray = self._first["wrench"]
         return read_only(wrench)
+
+    @cached_property
+    def first_named(self) -> FloatArray:
+        """The named forces at the start, see :mod:`proofroll.elements.mechanism.named_forces`."""
+        named: FloatArray = self._first["named"]
+        return read_only(named)
+
+    @cached_property
+    def _first(self) -> dict[str, Any]:
+        return self._equations.sample(*self.mechanism.start())
 
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""

@@ -14,6 +14,7 @@ from proofroll.core.numbers import Unit
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Numbers, Vector, Z
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import Formula, Table, checked, varies
 
 Kind = Literal["fixed", "revolute", "prismatic", "universal", "spherical", "planar", "free"]
 
@@ -122,7 +123,7 @@ class Joint:
         stiffness, damping: of a spring and damper along each coordinate.
         rest: coordinate at which the spring is at rest.
         friction: dry friction.
-        torque: constant drive.
+        torque: drive; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
         armature: inertia of the drive, added to the coordinate's own.
         limits: least and greatest coordinate of a revolute or prismatic joint, where stops hold it, or None.
         restitution: speed after an impact on a stop over the speed before it, from 0 to 1.
@@ -145,7 +146,7 @@ class Joint:
     rest: float = field(default=0.0, metadata=_UNITS["coordinate"])
     damping: float = field(default=0.0, metadata=_UNITS["damping"])
     friction: float = field(default=0.0, metadata=_UNITS["effort"])
-    torque: float = field(default=0.0, metadata=_UNITS["effort"])
+    torque: float | Formula | Table = field(default=0.0, metadata={**_UNITS["effort"], "signal": True})
     armature: float = field(default=0.0, metadata=_UNITS["armature"])
     limits: tuple[float, float] | None = field(default=None, metadata=_UNITS["coordinate"])
     restitution: float = field(default=0.0, metadata=RATIO)
@@ -171,7 +172,9 @@ class Joint:
         self._check_start(place)
         for key, kinds in LAWS.items():
             least = None if key in {"rest", "torque"} else 0.0
-            value = checks.number(f"{place}.{key}", getattr(self, key), at_least=least)
+            given, here = getattr(self, key), f"{place}.{key}"
+            moving = key == "torque" and varies(given)
+            value = checked(here, given) if moving else checks.number(here, given, at_least=least)
             if value and self.kind not in kinds:
                 raise InputError(f"{place}.{key}", value, f"a {self.kind} joint has none; it is for {', '.join(kinds)}")
             checks.assign(self, **{key: value})
@@ -207,6 +210,11 @@ class Joint:
             q0[-4:] = [component / length for component in q0[-4:]]
         v0 = checks.numbers(f"{place}.v0", [0.0] * self.nv if _none(self.v0) else self.v0, self.nv)
         checks.assign(self, q0=tuple(q0), v0=v0)
+
+    @property
+    def constant_drive(self) -> float:
+        """The drive [N, N m]; zero where it changes in time."""
+        return 0.0 if isinstance(self.torque, Formula | Table) else self.torque
 
     @property
     def nq(self) -> int:

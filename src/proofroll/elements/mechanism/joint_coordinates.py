@@ -20,14 +20,17 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import RANK, RowSign, analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
+from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import (
+    STOPPED,
     Mode,
     decided,
     held_by,
     load_of,
-    refuse_dry,
+    refuse_switching,
     struck,
     switched_joints,
 )
@@ -43,7 +46,7 @@ class Solution:
 
     Attributes:
         acceleration: v̇, (nv).
-        multipliers: of the loops' rows, the smallest in norm where they are redundant.
+        multipliers: of the rows of loops and couplings, the smallest in norm where they are redundant.
         motion, rows: kinematics.
         split: (L⁻ᵀV, Uᵀ/S) of the locked directions: −product with a residual is the correction that removes it.
         C: rows of the loops, then of what holds, (rows, nv).
@@ -76,12 +79,20 @@ class JointCoordinates:
         self._gravity = np.array(mechanism.gravity)
         by_velocity = [joint for joint in mechanism.joints for _ in range(joint.nv)]
         self._damping = np.array([joint.damping for joint in by_velocity])
-        self._torque = np.array([joint.torque for joint in by_velocity])
+        self._torque = np.array([joint.constant_drive for joint in by_velocity])
+        joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
+        self._driven = [(joint.torque, at.start) for joint, at in joints if varies(joint.torque)]
+        self.actuators = [(actuator, *mechanism.place_of(actuator.joint)) for actuator in mechanism.actuators]
+        self.limited = [place for place in self.actuators if place[0].limit is not None]
+        self._clamped = [actuator.limit is not None for actuator in mechanism.actuators]
+        self.switches = bool(self.switched or self.limited)
         self._armature = np.diag([joint.armature for joint in by_velocity])
         laws = zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
         self._springs = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in laws if joint.stiffness]
 
-    def solve(self, q: Array, v: Array, mode: Mode | None = None, load: Array | None = None) -> Solution:
+    def solve(
+        self, q: Array, v: Array, mode: Mode | None = None, load: Array | None = None, time: float = 0.0
+    ) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv).
 
         Args:
@@ -89,12 +100,13 @@ class JointCoordinates:
             v: velocities.
             mode: of the switched joints; None: what the forces make of it, see :meth:`decided`.
             load: further forces along the velocities, (nv).
+            time: at which drives and targets are taken [s].
 
         Raises:
             Diverged: a velocity moves nothing with inertia in this pose.
         """
         if mode is None:
-            mode = self.decided(q, v)[0] if self.switched else ()
+            mode = self.decided(q, v, time)[0] if self.switched else ()
         motion = self.tree.at(q, v)
         J, M, loads = self.inertial(motion)
         b = self._torque - self._damping * v - loads.ravel() @ J.reshape(-1, len(v))
@@ -106,6 +118,11 @@ class JointCoordinates:
             b += load_of(self.switched, mode, len(v))
         if load is not None:
             b += load
+        for signal, at in self._driven:
+            b[at] += value_at(signal, time)
+        if self.actuators:
+            for (_, _, at), effort in zip(self.actuators, self.efforts(time, q, v, mode), strict=True):
+                b[at] += effort
         rows = self.tree.loop_rows(motion)
         C, bias, rank = rows.C, rows.bias, self.rank
         if held := [self.switched[number].velocity for number in held_by(mode)]:
@@ -139,19 +156,28 @@ class JointCoordinates:
         """Constraints of the loops for coordinates (nq), at rest."""
         return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
 
-    def decided(self, q: Array, v: Array) -> tuple[Mode, float]:
-        """See :func:`proofroll.elements.mechanism.switches.decided`."""
-        return decided(self.switched, q, v, partial(self._responses, q, v))
+    def efforts(self, time: float, q: Array, v: Array, mode: Mode = ()) -> list[float]:
+        """Effort of each actuator at its joint, by its mode where there is one, else clamped by its size."""
+        modes = iter(mode[len(self.switched) :])
+        return [
+            actuator.effort(time, float(q[at_q]), float(v[at_v]), next(modes, None) if clamped else "linear")
+            for (actuator, at_q, at_v), clamped in zip(self.actuators, self._clamped, strict=True)
+        ]
+
+    def decided(self, q: Array, v: Array, time: float = 0.0) -> tuple[Mode, float]:
+        """See :func:`proofroll.elements.mechanism.switches.decided`; modes of efforts follow from their own sizes."""
+        mode, apart = decided(self.switched, q, v, partial(self._responses, time, q, v))
+        return mode + tuple(item.mode(time, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self.limited), apart
 
     def struck(self, q: Array, v: Array, hit: int) -> tuple[Array, float]:
         """See :func:`proofroll.elements.mechanism.switches.struck`."""
-        return struck(self.switched, q, v, hit, partial(self._responses, q, v))
+        return struck(self.switched, q, v, hit, partial(self._responses, 0.0, q, v))
 
-    def _responses(self, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
+    def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
         """Accelerations without further forces, (nv), and what unit forces along velocities add, (nv, forces)."""
-        free = self.solve(q, v, mode).acceleration
+        free = self.solve(q, v, mode, time=time).acceleration
         unit = np.eye(self.mechanism.nv)
-        return free, np.array([self.solve(q, v, mode, unit[k]).acceleration - free for k in at]).T
+        return free, np.array([self.solve(q, v, mode, unit[k], time).acceleration - free for k in at]).T
 
     def run(self, times: Array, tolerance: float = 1e-14) -> Record:
         """The motion at the given times, s, by DOP853.
@@ -160,7 +186,7 @@ class JointCoordinates:
             Refused: the mechanism has dry friction, which switches.
             Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
         """
-        refuse_dry(self.mechanism)
+        refuse_switching(self.mechanism)
         nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
         sign = RowSign(self.rank)
 
@@ -171,7 +197,7 @@ class JointCoordinates:
             return y
 
         states = integrated(self.rate, start, times, tolerance, corrected, least=self._least(tolerance))
-        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in states])
+        return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
 
     def sensitivity(self) -> tuple[float, float]:
         """Sensitivity of the accelerations to the state at the start.
@@ -203,10 +229,10 @@ class JointCoordinates:
             ]
         )
 
-    def rate(self, _: float, y: Array, mode: Mode | None = None) -> Array:
+    def rate(self, time: float, y: Array, mode: Mode | None = None) -> Array:
         """Right-hand side for the state (q, v)."""
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
-        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode).acceleration])
+        return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode, time=time).acceleration])
 
     def run_rk4(self, times: Array) -> Record:
         """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most 2 ms.
@@ -214,7 +240,8 @@ class JointCoordinates:
         Equal steps pass singular poses, before which an error control shrinks its steps for ever.
         """
         nq = self.mechanism.nq
-        return gathered(times, [self.sample(y[:nq], y[nq:]) for y in self.rk4_states(times, _EQUAL_STEP)])
+        states = zip(times, self.rk4_states(times, _EQUAL_STEP), strict=True)
+        return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in states])
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
         """The states (q, v) at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s."""
@@ -222,11 +249,11 @@ class JointCoordinates:
         for time in times:
             steps = int(np.ceil((time - now) / step - 1e-9))
             h = (time - now) / max(steps, 1)
-            for _ in range(steps):
-                k1 = self.rate(0.0, y)
-                k2 = self.rate(0.0, y + h / 2 * k1)
-                k3 = self.rate(0.0, y + h / 2 * k2)
-                y = self.eliminated(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + self.rate(0.0, y + h * k3)))
+            for t in now + h * np.arange(steps):
+                k1 = self.rate(t, y)
+                k2 = self.rate(t + h / 2, y + h / 2 * k1)
+                k3 = self.rate(t + h / 2, y + h / 2 * k2)
+                y = self.eliminated(y + h / 6 * (k1 + 2 * k2 + 2 * k3 + self.rate(t + h, y + h * k3)))
             now = time
             yield y
 
@@ -243,9 +270,11 @@ class JointCoordinates:
                 q = self.tree.moved(q, -into @ (back @ residual))
         return np.concatenate([q, v])
 
-    def sample(self, q: Array, v: Array, mode: Mode | None = None) -> dict[str, Any]:
+    def sample(self, q: Array, v: Array, mode: Mode | None = None, time: float = 0.0) -> dict[str, Any]:
         """Fields of a :class:`~proofroll.elements.mechanism.record.Record` at one time."""
-        found = self.solve(q, v, mode)
+        if mode is None and self.switched:
+            mode = self.decided(q, v, time)[0]
+        found = self.solve(q, v, mode, time=time)
         motion, rows, mechanism = found.motion, found.rows, self.mechanism
         n = len(mechanism.bodies)
         wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, self._needed(found)))
@@ -258,8 +287,20 @@ class JointCoordinates:
             "q": q,
             "v": v,
             "wrench": wrench,
+            "named": self._named(found, q, v, mode or (), time),
             "residual": np.array(largest),
         }
+
+    def _named(self, found: Solution, q: Array, v: Array, mode: Mode, time: float) -> Array:
+        fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
+        fields["effort"][:] = self.efforts(time, q, v, mode)
+        fields["coupling"][:] = found.multipliers[len(found.multipliers) - len(fields["coupling"]) :]
+        holding = dict(zip(held_by(mode), found.holding, strict=True))
+        for number, (joint, own) in enumerate(zip(self.switched, mode, strict=False)):
+            force = holding.get(number, joint.push(own))
+            on = on_joint(own in STOPPED, joint.friction, force)
+            fields["friction"][joint.number], fields["stop"][joint.number] = on
+        return taken(self.mechanism, fields)
 
     def inertial(self, motion: BodyMotion) -> tuple[Array, Array, Array]:
         """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from proofroll.elements.mechanism.drives import Coupling
 from proofroll.elements.mechanism.joint import AXES, FACTS, child_in_parent, coordinate_rate
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
@@ -27,6 +28,7 @@ class BodyMotion:
         bias: acceleration (linear, angular) of each body where v̇ = 0, (bodies + 1, 6).
         p_joint: position of each joint on its child, (joints, 3).
         R_parent, R_child: its frames A and B, (joints, 3, 3).
+        q: coordinates of the tree, (nq).
     """
 
     p_WB: Array
@@ -38,18 +40,20 @@ class BodyMotion:
     p_joint: Array
     R_parent: Array
     R_child: Array
+    q: Array
 
 
 class Rows(NamedTuple):
-    """Constraints of loops: Φ(q) = 0, C v = 0, C v̇ + bias = 0.
+    """Constraints of loops, then of couplings: Φ(q) = 0, C v = 0, C v̇ + bias = 0.
 
-    Each row is n·(v_b − v_a) + t·(ω_b − ω_a) − (d×n)·ω_a at the loop's points, d from a to b.
+    Each row of a loop is n·(v_b − v_a) + t·(ω_b − ω_a) − (d×n)·ω_a at its points, d from a to b. That of a coupling
+    has no n and no t.
 
     Attributes:
         residual: Φ, m or 1, (m).
         C, bias: (m, nv), (m).
         force, torque: n and t, what a unit multiplier applies to body_b at its point, (m, 3).
-        loop: index of each row's loop, (m).
+        loop: index of each row's loop, those of couplings after those of loops, (m).
     """
 
     residual: Array
@@ -137,7 +141,7 @@ class Tree:
         arm_rates = vel.T[:, :, None] - v_joint[:, None, self._joint]
         turned_rate = _cross(turning_rate, arms) + _cross(turning, arm_rates)
         J_rate = self._twists(rates - turning_rate, turning_rate, turned_rate)
-        return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, *frames)
+        return BodyMotion(p, R, vel, w, J, J_rate @ v, p_joint, frames[0], frames[1], q)
 
     def _twists(self, sliding: Array, turning: Array, turned: Array) -> Array:
         """Jacobian of each body, (bodies + 1, 6, nv), from columns that slide and turn it and ω × arm."""
@@ -159,14 +163,22 @@ class Tree:
         )
 
     def loop_rows(self, motion: BodyMotion) -> Rows:
-        """Residuals and rows of all loops."""
+        """Residuals and rows of all loops, then of all couplings."""
         parts = [self._rows_of(motion, loop) for loop in self.mechanism.loops]
+        parts += [self._coupled(motion, coupling) for coupling in self.mechanism.couplings]
         if not parts:
             none, nv = np.zeros(0), self.mechanism.nv
             return Rows(none, np.zeros((0, nv)), none, np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, dtype=int))
         loop = np.repeat(np.arange(len(parts)), [len(part[0]) for part in parts])
         residual, C, bias, force, torque = (np.concatenate(columns) for columns in zip(*parts, strict=True))
         return Rows(residual, C, bias, force, torque, loop)
+
+    def _coupled(self, motion: BodyMotion, coupling: Coupling) -> tuple[Array, Array, Array, Array, Array]:
+        (q_a, v_a), (q_b, v_b) = (self.mechanism.place_of(name) for name in (coupling.joint_a, coupling.joint_b))
+        C = np.zeros((1, self.mechanism.nv))
+        C[0, v_b], C[0, v_a] = 1.0, -coupling.ratio
+        apart = motion.q[q_b] - coupling.ratio * motion.q[q_a] - coupling.offset
+        return np.array([apart]), C, np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3))
 
     def _rows_of(self, motion: BodyMotion, loop: Loop) -> tuple[Array, Array, Array, Array, Array]:
         a, b = self.mechanism.body_index[loop.body_a], self.mechanism.body_index[loop.body_b]

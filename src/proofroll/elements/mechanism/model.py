@@ -1,4 +1,4 @@
-"""The data of a mechanism: bodies, a tree of joints, loops that close it, springs, tracked points, gravity.
+"""The data of a mechanism: bodies, a tree of joints, loops, springs, tracked points, drives, gravity.
 
 SI units, angles in rad, world frame W with z up. Every body has a frame of its own; the frame of the world is the
 body ``world``. Each object checks itself and raises :class:`~proofroll.core.errors.InputError` with one line.
@@ -18,9 +18,11 @@ from proofroll.core.errors import InputError, require_known
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.checks import WORLD, Vector
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry, Pair, contacts_of
+from proofroll.elements.mechanism.drives import Actuator, Coupling, check_drives
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import Signal
 
 
 class JointOrLoop(NamedTuple):
@@ -45,6 +47,8 @@ class Mechanism:
         joints: sorted depth-first from the world, whatever order is given; q and v have this order.
         loops, springs, points, geometries, pairs: in the order of the scene.
         gravity: acceleration in the world's axes, m/s².
+        actuators: motors of joints.
+        couplings: pairs of joints that move together.
         unmodelled: what else its source has, in a few words each; every route and engine refuses it.
     """
 
@@ -57,9 +61,12 @@ class Mechanism:
     unmodelled: tuple[str, ...] = ()
     geometries: tuple[Geometry, ...] = ()
     pairs: tuple[Pair, ...] = ()
+    actuators: tuple[Actuator, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
 
     def __post_init__(self) -> None:
-        for key in ("bodies", "joints", "loops", "springs", "points", "geometries", "pairs"):
+        parts = ("bodies", "joints", "loops", "springs", "points", "geometries", "pairs", "actuators", "couplings")
+        for key in parts:
             checks.assign(self, **{key: tuple(getattr(self, key))})
             _check_unique(key, getattr(self, key))
         checks.assign(self, unmodelled=tuple(self.unmodelled))
@@ -71,6 +78,7 @@ class Mechanism:
                     field = f"{kind}.{item.name}.{key}"
                     require_known(field, getattr(item, key, WORLD), names, "there is no such body; choose from")
         checks.assign(self, joints=_depth_first(self.bodies, self.joints))
+        check_drives(self.joints, self.actuators, self.couplings)
         checks.assign(self, gravity=checks.vector("gravity", self.gravity))
         _check_masses(self.bodies, self.joints)
         _check_unique("pairs", (*self.joints, *self.loops, *self.contacts))  # their forces are named alike
@@ -138,6 +146,21 @@ class Mechanism:
     def v_slices(self) -> tuple[slice, ...]:
         """Slice of each joint's velocities in v."""
         return slices(joint.nv for joint in self.joints)
+
+    @cached_property
+    def joint_index(self) -> dict[str, int]:
+        """Position of each joint in :attr:`joints`."""
+        return {joint.name: number for number, joint in enumerate(self.joints)}
+
+    @cached_property
+    def signals(self) -> tuple[Signal, ...]:
+        """Drives of joints, then targets of actuators."""
+        return tuple(joint.torque for joint in self.joints) + tuple(item.target for item in self.actuators)
+
+    def place_of(self, joint: str) -> tuple[int, int]:
+        """Places in q and v of a joint with one coordinate."""
+        number = self.joint_index[joint]
+        return self.q_slices[number].start, self.v_slices[number].start
 
     def start(self) -> tuple[Array, Array]:
         """Coordinates (nq) and velocities (nv) of the tree at the start."""

@@ -8,6 +8,7 @@ expressions ``i``. A joint with ``dependent = true`` has its q0 and v0 found fro
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import fields
 from typing import Any
 
 from proofroll.core.errors import InputError, no_such_key
@@ -17,9 +18,11 @@ from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import check_contacts
+from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.signal import Table, read_signal
 
 KINDS: dict[str, type[Any]] = {
     "bodies": Body,
@@ -29,8 +32,11 @@ KINDS: dict[str, type[Any]] = {
     "points": Point,
     "geometries": Geometry,
     "pairs": Pair,
+    "actuators": Actuator,
+    "couplings": Coupling,
 }
-strict(*KINDS.values())
+strict(*KINDS.values(), Table)
+_SIGNALS = {kind: {item.name for item in fields(made) if "signal" in item.metadata} for kind, made in KINDS.items()}
 _MOST = 10_000  # repetitions: beyond it, a slip of the pen
 
 
@@ -90,6 +96,8 @@ def _made(kind: str, field: str, table: Any, numbers: Numbers) -> Any:
     if not isinstance(table, Mapping):
         raise InputError(field, table, "give a table")
     made = KINDS[kind]
+    for key in _SIGNALS[kind] & table.keys():
+        table = {**table, key: read_signal(f"{field}.{key}", table[key], numbers)}
     filled = numbers.filled(table, field, units_of_kind(made, table.get("kind")))
     try:
         return validated(made, filled, field)

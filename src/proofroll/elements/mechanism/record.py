@@ -29,6 +29,7 @@ class Record:
         q, v: coordinates (times, nq) and velocities (times, nv) of the tree.
         wrench: force and moment on the child (joints) or on body_b (loops), at the joint, of all that the joint
             transmits: constraint, spring, damper and drive; N, N m, (times, joints + loops, 6).
+        named: see :func:`~proofroll.elements.mechanism.named_forces.named_forces`, (times, forces).
         residual: largest violation of a constraint, m or 1, and of its rate, (times, 2).
     """
 
@@ -40,6 +41,7 @@ class Record:
     q: Array
     v: Array
     wrench: Array
+    named: Array
     residual: Array
 
     def placed(self, mechanism: Mechanism) -> Placed:

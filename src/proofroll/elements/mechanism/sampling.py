@@ -30,11 +30,19 @@ class MechanismSample(Sample):
             [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
         contact_force: on the body of the first geometry of each contact, world axes [N], shape (contacts, 3); zero
             where nothing touches, NaN where the engine cannot say.
+        effort: of each actuator at its joint, clamped [N m, N], shape (actuators,).
+        coupling: of each coupling on its joint_b [N m, N], shape (couplings,).
+        friction, stop: of dry friction and of a stop along each joint's coordinate [N m, N], shape (joints,); NaN for
+            joints that the engine cannot say it of.
     """
 
     joint_force: Array | None = None
     joint_torque: Array | None = None
     contact_force: Array | None = None
+    effort: Array | None = None
+    coupling: Array | None = None
+    friction: Array | None = None
+    stop: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,8 @@
-"""Dry friction and stops of joints: what holds, what pushes, and which of it follows from the forces.
+"""Laws that switch in a mechanism: what holds, what pushes, and which of it follows from the forces.
 
 A switched joint has one coordinate. Its mode is ``free``; ``forward`` or ``backward`` where it moves against dry
-friction; ``stick`` where friction holds it; ``low`` or ``high`` where a stop does, with its friction.
+friction; ``stick`` where friction holds it; ``low`` or ``high`` where a stop does, with its friction. An effort with a
+limit is ``least``, ``linear`` or ``greatest``.
 """
 
 from __future__ import annotations
@@ -16,10 +17,13 @@ from numpy.typing import NDArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import breaks
 
+# Of the switched joints, then of the actuators whose effort has a limit.
 Mode = tuple[str, ...]
 _MOST_PIVOTS = 1000  # of the complementarity problem; a few joints take as many as they are
-HOLDING = frozenset({"stick", "low", "high"})
+STOPPED = frozenset({"low", "high"})
+HOLDING = STOPPED | {"stick"}
 
 
 @dataclass(frozen=True)
@@ -126,9 +130,9 @@ def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -
 
 
 def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
-    """Kinetic friction along the velocities of the tree, (nv)."""
+    """Kinetic friction along the velocities of the tree, (nv); further modes are those of efforts."""
     load = np.zeros(nv)
-    for joint, own in zip(joints, mode, strict=True):
+    for joint, own in zip(joints, mode, strict=False):
         load[joint.velocity] += joint.push(own)
     return load
 
@@ -194,12 +198,17 @@ def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, respon
     return v, margin(returned, response[at], low, high, impulse, left)
 
 
-def refuse_dry(mechanism: Mechanism) -> None:
-    """Refuses dry friction where nothing follows its switching.
+def refuse_switching(mechanism: Mechanism) -> None:
+    """Refuses laws that switch where nothing follows it.
 
     Raises:
-        Refused: a joint has some.
+        Refused: a joint has dry friction, an effort a limit, or a drive or a target is a table.
     """
     for joint in mechanism.joints:
         if joint.friction:
             raise Refused(f"dry friction in joint {joint.name} switches, which one smooth integration does not follow")
+    for actuator in mechanism.actuators:
+        if actuator.limit is not None:
+            raise Refused(f"the limit of {actuator.name} switches, which one smooth integration does not follow")
+    if breaks(mechanism.signals):
+        raise Refused("a table of a drive or a target has breaks, which one smooth integration does not follow")

@@ -97,13 +97,13 @@ class Connections:
             made = items.ObjectConnectorRigidBodySpringDamper(damping=D, markerNumbers=markers)
         elif joint.kind == "prismatic":  # its force is a pull, as the spring's is
             made = items.ObjectConnectorLinearSpringDamper(
-                markerNumbers=markers, force=-joint.torque, axisMarker0=[0.0, 0.0, 1.0], **law
+                markerNumbers=markers, force=-joint.constant_drive, axisMarker0=[0.0, 0.0, 1.0], **law
             )
         else:  # its torque acts against the angle, as the spring's does; the node counts whole turns
             turns = items.NodeGenericData(initialCoordinates=[joint.q0[0]], numberOfDataCoordinates=1)
             node = self._system.AddNode(turns)
             made = items.ObjectConnectorTorsionalSpringDamper(
-                nodeNumber=node, torque=-joint.torque, **law, markerNumbers=markers
+                nodeNumber=node, torque=-joint.constant_drive, **law, markerNumbers=markers
             )
         return self._system.AddObject(made)
 

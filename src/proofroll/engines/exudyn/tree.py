@@ -78,7 +78,7 @@ class KinematicTree(ExudynModel):
             linkParents=[self._link.get(joint.parent, -1) for joint in joints],
             linkMasses=[data[joint.child].mass for joint in joints],
             gravity=list(mechanism.gravity),
-            jointForceVector=[joint.torque for joint in joints],
+            jointForceVector=[joint.constant_drive for joint in joints],
             jointPControlVector=[joint.stiffness for joint in joints],
             jointDControlVector=[joint.damping for joint in joints],
             jointPositionOffsetVector=[joint.rest for joint in joints],

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism import Joint
+from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.joint import child_in_parent
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
@@ -24,11 +24,13 @@ from proofroll.elements.mechanism.sampling import (
     mechanism_of,
     unsaid,
 )
+from proofroll.elements.mechanism.signal import Signal, value_at, varies
 from proofroll.engines.mujoco import mechanism_model
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, mass_matrix, silent
 from proofroll.engines.mujoco.settings import MujocoSettings, check
 
 _CAPABILITY = MechanismCapability
+_ROW = mujoco.mjtConstraint
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
 # The answer of hard loops has round-off of its own, most where rows depend on each other.
 _MARGIN = 1.1
@@ -37,6 +39,7 @@ PROVIDES = (
     | FORCES
     | {_CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT}
     | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.ARMATURE, _CAPABILITY.STOPS}
+    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.COUPLINGS, _CAPABILITY.SIGNALS}
 )
 _NO_ROWS = "MuJoCo's equality constraints hold points or whole frames together, and no single angle or direction"
 LACKING: Mapping[str, str] = {
@@ -63,6 +66,10 @@ class MujocoMechanism(SteppedModel):
         self._model.opt.disableflags |= _NO_SENSORS
         for number, joint in enumerate(mechanism.joints):
             self._start(number, joint)
+        signals = _signals(self._model, mechanism)
+        self._moving = signals
+        self._drive(self._model, self._data)
+        self._moving = [item for item in signals if varies(item[0])]
         with silent():
             mujoco.mj_forward(self._model, self._data)
 
@@ -70,13 +77,15 @@ class MujocoMechanism(SteppedModel):
         """MJCF, whose keyframe ``start`` is time 0.
 
         Raises:
-            Refused: a joint has a constant drive, which is no part of a model but of its state.
+            Refused: a joint has a drive or an actuator a target, which is no part of a model but of its state.
         """
+        if self._moving:
+            raise Refused("a drive or a target that changes is set from outside in every step, and in no MJCF")
         driven = [joint.name for joint in self._mechanism.joints if joint.torque]
         if driven:
             raise Refused(f"the constant drive of {driven[0]} is set from outside in every step, and in no MJCF")
         spec = mechanism_model.write(self._mechanism, self._settings)
-        spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel)
+        spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel, ctrl=self._data.ctrl)
         compiled(spec)
         return str(spec.to_xml())
 
@@ -98,8 +107,28 @@ class MujocoMechanism(SteppedModel):
         self._data.qpos[parts[0].qposadr[0] :][: len(q)] = q
         first = parts[0].dofadr[0]
         self._data.qvel[first : first + len(v)] = v
-        if joint.torque:
+        if joint.torque and not varies(joint.torque):
             self._data.qfrc_applied[first] = joint.torque
+
+    def _run(self, steps: int) -> None:
+        """Steps, with drives and targets that change set before each, and with RK4 at each of its stages."""
+        if not self._moving:
+            super()._run(steps)
+        elif self._settings.integrator == "RK4":
+            mujoco.set_mjcb_control(self._drive)
+            try:
+                super()._run(steps)
+            finally:
+                mujoco.set_mjcb_control(None)
+        else:
+            for _ in range(steps):
+                self._drive(self._model, self._data)
+                mujoco.mj_step(self._model, self._data)
+
+    def _drive(self, _: Any, data: Any) -> None:
+        """Sets drives and targets to what they are at the time of ``data``."""
+        for signal, field, place in self._moving:
+            getattr(data, field)[place] = float(value_at(signal, data.time))
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -108,6 +137,7 @@ class MujocoMechanism(SteppedModel):
         for row, body in zip(twists, self._bodies, strict=True):
             mujoco.mj_objectVelocity(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
         force, torque = self._reactions(data)
+        along = self._along(data)
         return MechanismSample(
             p_WB=data.xpos[self._bodies].copy(),
             v_WB=twists[:, 3:].copy(),
@@ -115,7 +145,35 @@ class MujocoMechanism(SteppedModel):
             q_WB=data.xquat[self._bodies].copy(),
             joint_force=force,
             joint_torque=torque,
+            **along,
         )
+
+    def _along(self, data: Any) -> dict[str, Array]:
+        """Efforts, and forces of couplings, dry friction and stops along coordinates."""
+        model, mechanism = self._model, self._mechanism
+        gears = [actuator.gear for actuator in mechanism.actuators]
+        friction, stop = np.full((2, len(mechanism.joints)), np.nan)
+        coupling = np.zeros(len(mechanism.couplings))
+        equalities = {
+            model.equality(mechanism_model.coupling_name(item)).id: k for k, item in enumerate(mechanism.couplings)
+        }
+        places = {int(model.joint(f"{k}.0").id): k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
+        dofs = {int(model.jnt_dofadr[own]): k for own, k in places.items()}
+        friction[list(dofs.values())] = stop[list(dofs.values())] = 0.0
+        kinds = data.efc_type[: data.nefc].tolist()
+        for row, (kind, own) in enumerate(zip(kinds, data.efc_id[: data.nefc].tolist(), strict=True)):
+            force = float(data.efc_force[row])
+            if kind == _ROW.mjCNSTR_EQUALITY and own in equalities:
+                coupling[equalities[own]] = force
+            elif kind == _ROW.mjCNSTR_FRICTION_DOF and own in dofs:
+                friction[dofs[own]] = force
+            elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in places:
+                stop[places[own]] += force * self._row_sign(data, row, int(model.jnt_dofadr[own]))
+        return {"effort": data.actuator_force * gears, "coupling": coupling, "friction": friction, "stop": stop}
+
+    def _row_sign(self, data: Any, row: int, dof: int) -> float:
+        """Sign of the coordinate in a row of a stop: 1 where its force pushes up."""
+        return float(np.sign(self._rows(data, data.nefc)[row, dof]))
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
         """Forces and moments of joints and loops on the child, about the joint, world axes.
@@ -178,12 +236,16 @@ class MujocoMechanism(SteppedModel):
 
     def _equality_rows(self, data: Any) -> Array:
         """Rows of the equality constraints on MuJoCo's velocities, shape (rows, nv)."""
+        return self._rows(data, data.ne)
+
+    def _rows(self, data: Any, count: int) -> Array:
+        """The first rows of all constraints on MuJoCo's velocities, shape (count, nv)."""
         J = np.zeros((data.nefc, self._model.nv))
-        if data.ne and mujoco.mj_isSparse(self._model):
+        if count and mujoco.mj_isSparse(self._model):
             mujoco.mju_sparse2dense(J, data.efc_J, data.efc_J_rownnz, data.efc_J_rowadr, data.efc_J_colind)
-        elif data.ne:
+        elif count:
             J[:] = np.reshape(data.efc_J, J.shape)
-        return J[: data.ne]
+        return J[:count]
 
     def _accelerations(self, data: Any) -> dict[str, Array]:
         """Accelerations of the bodies' origins, and angular ones, shape (bodies, 3) each."""
@@ -213,6 +275,16 @@ class MujocoMechanism(SteppedModel):
         return found
 
     def _evaluate(self, data: Any) -> None:
+        self._drive(self._model, data)
         self._model.opt.disableflags &= ~_NO_SENSORS
         super()._evaluate(data)
         self._model.opt.disableflags |= _NO_SENSORS
+
+
+def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:
+    """Signals with the field of MjData and the place in it where they act: targets, and drives that change."""
+    found = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
+    for number, joint in enumerate(mechanism.joints):
+        if varies(joint.torque):
+            found.append((joint.torque, "qfrc_applied", int(model.joint(f"{number}.0").dofadr[0])))
+    return found

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 from proofroll.elements.mechanism import WORLD, Body, Joint, Loop, Mechanism
+from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
 from proofroll.engines.mujoco.settings import MujocoSettings
@@ -65,6 +66,16 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
             tendon.wrap_site(f"spring{number}{end}")
         _set_law(tendon, spring.stiffness, spring.damping)
         tendon.springlength = [spring.length, spring.length]
+    for actuator in mechanism.actuators:
+        _add_actuator(spec, f"{mechanism.joint_index[actuator.joint]}.0", actuator)
+    for coupling in mechanism.couplings:
+        added = spec.add_equality(
+            name=coupling_name(coupling), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT
+        )
+        ends = (coupling.joint_b, coupling.joint_a)
+        added.name1, added.name2 = (f"{mechanism.joint_index[name]}.0" for name in ends)
+        added.data[:2] = coupling.offset, coupling.ratio
+        _set_softness(added, settings)
     return spec
 
 
@@ -98,6 +109,33 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, set
             objname=f"{number}",
         )
     return added
+
+
+def coupling_name(coupling: Coupling) -> str:
+    """Name of its equality constraint."""
+    return f"coupling.{coupling.name}"
+
+
+def _add_actuator(spec: Any, joint: str, actuator: Actuator) -> None:
+    """MuJoCo's motor, velocity or position actuator; its limits are those of the motor, before the gear."""
+    added = spec.add_actuator(name=actuator.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
+    added.gear[0] = actuator.gear
+    added.gaintype, added.gainprm[0] = mujoco.mjtGain.mjGAIN_FIXED, 1.0
+    if actuator.kind != "torque":
+        added.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        added.gainprm[0] = actuator.kp if actuator.kind == "position" else actuator.kd
+        added.biasprm[:3] = 0.0, -actuator.kp, -actuator.kd
+    if actuator.limit is not None:
+        most = actuator.limit / abs(actuator.gear)
+        added.forcelimited, added.forcerange = True, (-most, most)
+
+
+def _set_softness(item: Any, settings: MujocoSettings) -> None:
+    """Sets the softness of an equality constraint."""
+    if settings.time_constant is not None:
+        item.solref = (settings.contact_time, 1.0)
+    if settings.impedance is not None:
+        item.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)
 
 
 def _set_switches(made: Any, joint: Joint, settings: MujocoSettings) -> None:
@@ -136,7 +174,4 @@ def _add_loop(
             bodies[body].add_site(name=name, pos=position + along * frame[:, 2], quat=to_quaternion(frame))
         added = spec.add_equality(name=f"loop{number}.{point}", type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE)
         added.name1, added.name2 = names
-        if settings.time_constant is not None:
-            added.solref = (settings.contact_time, 1.0)
-        if settings.impedance is not None:
-            added.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)
+        _set_softness(added, settings)

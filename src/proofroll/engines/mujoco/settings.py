@@ -156,6 +156,9 @@ class MujocoSettings:
         return mu, turning, DEFAULT_ROLLING if self.condim >= ROLLS else 0.0
 
 
+_FIRST_ORDER = tuple(MechanismCapability[name] for name in ("JOINT_FRICTION", "STOPS", "COUPLINGS", "SATURATION"))
+
+
 def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
 
@@ -166,7 +169,7 @@ def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     if settings.formulation != "joints":
         return {BallCapability.ROLLING_RESISTANCE: 2, BallCapability.BOUNDED_FRICTION: 1}
     turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
-    return turning | dict.fromkeys((*ALL_LOOPS, MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS), 1)
+    return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
 
 
 def check(settings: MujocoSettings, *, bounded: bool) -> None:

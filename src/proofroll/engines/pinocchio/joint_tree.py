@@ -96,7 +96,7 @@ class JointTree:
         joints = self.mechanism.joints
         by_velocity = [joint for joint in joints for _ in range(joint.nv)]
         self.model.armature = np.array([joint.armature for joint in by_velocity])
-        self.drive = np.array([joint.torque for joint in by_velocity])
+        self.drive = np.array([joint.constant_drive for joint in by_velocity])
         self.damping = np.array([joint.damping for joint in by_velocity])
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         self.sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]

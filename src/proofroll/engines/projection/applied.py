@@ -129,4 +129,4 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
     if not (joint.stiffness or joint.damping or joint.torque) or joint.kind == "spherical":
         return []
     axes = {"revolute": ("z",), "prismatic": ("slide",), "universal": ("z", "x")}[joint.kind]
-    return [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.torque) for axis in axes]
+    return [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes]

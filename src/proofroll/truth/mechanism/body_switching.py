@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition, walked
 from proofroll.truth.mechanism.joint_switching import SETTLED, changes, guard_value, guards_of, left_by, noise_of
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
@@ -100,7 +100,9 @@ class SwitchedBodies:
         """What a mode does to the equations."""
         pairs = list(zip(self.joints, mode, strict=True))
         held = tuple(joint.number for joint, own in pairs if own in HOLDING)
-        return Switched(held, {joint.number: joint.push(own) for joint, own in pairs if joint.push(own)})
+        stopped = tuple(joint.number for joint, own in pairs if own in STOPPED)
+        push = {joint.number: joint.push(own) for joint, own in pairs if joint.push(own)}
+        return Switched(held, stopped, push, {})
 
     def holding(self, equations: NumericEquations, state: Array, mode: Mode) -> Array:
         """Force of what holds or rubs along each switched joint's coordinate, N or N m."""
@@ -170,7 +172,7 @@ class SwitchedBodies:
         direction = {"forward": 1.0, "backward": -1.0}.get(mode, 1.0 if q <= joint.low else -1.0)
         stuck = self.equations.switched(state, Switched((joint.number,)))
         needed = abs(float(stuck.solve(state).multipliers[-1]))
-        response = self._accelerations(self.equations.switched(state, Switched((), {joint.number: 1.0})), state)
+        response = self._accelerations(self.equations.switched(state, Switched(push={joint.number: 1.0})), state)
         free = self._accelerations(self.equations.switched(state, Switched()), state)
         inertia = 1.0 / float((response - free)[which])
         size = needed + abs(acceleration) * inertia + joint.friction

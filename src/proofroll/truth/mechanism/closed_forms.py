@@ -19,6 +19,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array, from_rpy
+from proofroll.elements.mechanism.signal import varies
 
 _SAME = 1e-12  # relative: quantities that are equal but for round-off
 
@@ -44,7 +45,8 @@ class ClosedForm:
 def closed_form(mechanism: Mechanism) -> ClosedForm | None:
     """The closed form of a mechanism's motion, or None where none is known here."""
     switched = any(joint.friction or joint.armature or joint.limits for joint in mechanism.joints)
-    plain = not switched and not mechanism.springs
+    driven = mechanism.actuators or mechanism.couplings or any(map(varies, mechanism.signals))
+    plain = not switched and not mechanism.springs and not driven
     if not plain:
         return None
     for recognised in (_oscillators, _swinging, _free_body, _heavy_top):
@@ -138,10 +140,10 @@ def _oscillators(mechanism: Mechanism) -> ClosedForm | None:
             if not joint.stiffness or (off_axis.any() and gravity.any()):
                 return None
             inertia = axis @ np.array(body.inertia) @ axis + body.mass * off_axis @ off_axis
-            drive = joint.torque
+            drive = joint.constant_drive
         else:
             inertia = body.mass
-            drive = joint.torque + body.mass * gravity @ from_rpy(joint.orientation) @ axis
+            drive = joint.constant_drive + body.mass * gravity @ from_rpy(joint.orientation) @ axis
         constant = (drive + joint.stiffness * joint.rest) / inertia
         systems.append(
             (np.array([[0, 1, 0], [-joint.stiffness / inertia, -joint.damping / inertia, constant], [0, 0, 0]]), joint)

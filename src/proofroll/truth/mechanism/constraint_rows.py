@@ -19,6 +19,7 @@ from proofroll.truth.scalars import (
     plus,
     product,
     scaled,
+    sub,
     turned,
 )
 
@@ -42,7 +43,10 @@ class Connection:
 
 @dataclass
 class ConstraintRow:
-    """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b."""
+    """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b.
+
+    ``besides``: what a coupling's row applies through its other joint: number, force, torque.
+    """
 
     residual: Scalar
     coefficients: dict[int, Scalar]
@@ -50,6 +54,16 @@ class ConstraintRow:
     connection: int
     force: Sequence[Scalar]
     torque: Sequence[Scalar]
+    besides: tuple[int, Sequence[Scalar], Sequence[Scalar]] | None = None
+
+    def less(self, ratio: float, other: ConstraintRow) -> ConstraintRow:
+        """This row minus another one times a ratio, as a row on rates."""
+        coefficients = dict(self.coefficients)
+        for place, value in other.coefficients.items():
+            coefficients[place] = sub(coefficients.get(place, 0.0), mul(ratio, value))
+        bias = sub(self.bias, mul(ratio, other.bias))
+        besides = (other.connection, scaled(-ratio, other.force), scaled(-ratio, other.torque))
+        return ConstraintRow(0.0, coefficients, bias, self.connection, self.force, self.torque, besides)
 
 
 class ConstraintRows:

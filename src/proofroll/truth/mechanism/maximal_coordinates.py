@@ -18,9 +18,10 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Missing
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import refuse_dry
+from proofroll.elements.mechanism.switches import refuse_switching
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
@@ -78,9 +79,9 @@ class NumericEquations:
             return []
         return sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist())
 
-    def solve(self, state: Array) -> Solved:
-        """Accelerations and multipliers, the smallest where rows depend on each other."""
-        found = self.equations.at(state.tolist(), switched=self._switched)
+    def solve(self, state: Array, time: float = 0.0) -> Solved:
+        """Accelerations and multipliers at a time [s], the smallest where rows depend on each other."""
+        found = self.equations.at(state.tolist(), switched=self._switched, time=time)
         C, (half, force) = self._matrix(found.rows), self._driven(found)
         free = half.T @ force
         residual = np.array([row.residual for row in found.rows], dtype=float)
@@ -140,10 +141,10 @@ class NumericEquations:
                 state[at][3:] /= np.linalg.norm(state[at][3:])
         return state
 
-    def rate(self, _: float, state: Array) -> Array:
+    def rate(self, time: float, state: Array) -> Array:
         """Right-hand side."""
         e, unit = self.equations, self.normalised(state)
-        found = self.solve(unit)
+        found = self.solve(unit, time)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
         moving = [
             value
@@ -214,7 +215,7 @@ class MaximalCoordinates:
             Missing: heyoka is not installed.
             Diverged: the integration stops.
         """
-        refuse_dry(self.mechanism)
+        refuse_switching(self.mechanism)
         return self.recorded(times, np.asarray(self.taylor(long_double).run(times), dtype=float))
 
     def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
@@ -224,7 +225,7 @@ class MaximalCoordinates:
             Refused: the mechanism has dry friction, which switches.
             Diverged: the integration stops.
         """
-        refuse_dry(self.mechanism)
+        refuse_switching(self.mechanism)
         return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance))
 
     def growth(self, times: Array) -> Array:
@@ -255,17 +256,17 @@ class MaximalCoordinates:
     def recorded(self, times: Array, states: Array, switched: Sequence[Switched] | None = None) -> Record:
         """Record of the states, with the modes of switched joints; reactions come from the complete rows."""
         modes = [None] * len(states) if switched is None else switched
-        pairs = zip(states, modes, strict=True)
-        found = gathered(times, [self._sample(self.lean.normalised(state), mode) for state, mode in pairs])
+        each = zip(times, states, modes, strict=True)
+        found = gathered(times, [self._sample(float(t), self.lean.normalised(y), mode) for t, y, mode in each])
         q, v = found.placed(self.mechanism).of_tree()
         return replace(found, q=q, v=v)
 
-    def _sample(self, state: Array, switched: Switched | None = None) -> dict[str, Any]:
+    def _sample(self, time: float, state: Array, switched: Switched | None = None) -> dict[str, Any]:
         lean = self.lean.equations
         views = lean.at(state.tolist()).views
         whole = self._complete(views, state[lean.nx + lean.nu :])
         equations = self._whole if switched is None else self._whole.switched(whole, switched)
-        found = equations.solve(whole)
+        found = equations.solve(whole, time)
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
         n = len(self.mechanism.bodies)
         arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]
@@ -277,6 +278,7 @@ class MaximalCoordinates:
             "q": [],  # they follow from the poses of all times
             "v": [],
             "wrench": self._wrenches(found),
+            "named": self._named(found, switched or Switched()),
             "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
         }
 
@@ -294,9 +296,23 @@ class MaximalCoordinates:
         wrenches = np.zeros((len(self._whole.equations.connections), 6))
         for row, multiplier in zip(found.equations.rows, found.multipliers, strict=True):
             wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
+            if row.besides is not None:
+                wrenches[row.besides[0]] += multiplier * np.array([*row.besides[1], *row.besides[2]])
         for row, inertia in found.equations.drives:
             rate = sum(value * found.acceleration[k] for k, value in row.coefficients.items()) + row.bias
             wrenches[row.connection] -= inertia * rate * np.array([*row.force, *row.torque])
         for number, (force, moment) in enumerate(found.equations.laws):
             wrenches[number] += np.array([*force, *moment])
         return wrenches
+
+    def _named(self, found: Solved, switched: Switched) -> Array:
+        fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
+        fields["effort"][:] = found.equations.efforts
+        held = len(found.multipliers) - len(switched.held)
+        fields["coupling"][:] = found.multipliers[held - len(fields["coupling"]) : held]
+        holding = dict(zip(switched.held, found.multipliers[held:], strict=True))
+        for number, joint in enumerate(self.mechanism.joints):
+            force = holding.get(number, switched.push.get(number, 0.0))
+            on = on_joint(number in switched.stopped, joint.friction, force)
+            fields["friction"][number], fields["stop"][number] = on
+        return taken(self.mechanism, fields)

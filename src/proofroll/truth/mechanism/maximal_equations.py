@@ -15,8 +15,11 @@ from scipy.linalg import block_diag
 
 from proofroll.core.arrays import slices
 from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism.drives import Coupling
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH
+from proofroll.elements.mechanism.signal import value_at
 from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.mechanism.rolling_rows import RollingContact
@@ -35,7 +38,7 @@ from proofroll.truth.scalars import (
     turned,
 )
 
-FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {"sin": math.sin, "cos": math.cos, "sqrt": math.sqrt}
+FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for name in SMOOTH}
 _NONE = (0.0, 0.0, 0.0)
 
 
@@ -47,15 +50,19 @@ class Drive(NamedTuple):
 
 
 class Switched(NamedTuple):
-    """Present state of joints with dry friction or stops.
+    """Present state of joints and efforts that switch.
 
     Attributes:
         held: numbers of the joints whose coordinates do not move.
+        stopped: those of them that a stop holds.
         push: number of a joint -> further force along its coordinate, N or N m.
+        clamped: number of an actuator -> its effort, which is at its limit.
     """
 
     held: tuple[int, ...] = ()
+    stopped: tuple[int, ...] = ()
     push: Mapping[int, float] = {}
+    clamped: Mapping[int, float] = {}
 
 
 @dataclass(frozen=True)
@@ -64,7 +71,7 @@ class ConstrainedEquations:
 
     ``drives``: the armature of joints. ``holders``: rows that hold a body without inertia, each as a drive; rows are
     obeyed, so that it changes nothing but M, which alone has no inverse. ``laws``: force and moment of each joint's own
-    spring, damper and drive on its child, at the joint, world axes.
+    spring, damper, drive and actuators on its child, at the joint, world axes. ``efforts``: of each actuator.
     """
 
     rows: list[ConstraintRow]
@@ -73,6 +80,7 @@ class ConstrainedEquations:
     angle_rate: list[Scalar]
     views: list[BodyInScalars]
     laws: list[tuple[list[Scalar], list[Scalar]]]
+    efforts: list[Scalar]
     drives: list[Drive]
     holders: list[Drive]
 
@@ -117,11 +125,15 @@ class MaximalEquations:
             (index[s.body_a], self._place(s.body_a, s.position_a), index[s.body_b], self._place(s.body_b, s.position_b))
             for s in mechanism.springs
         ]
+        self._motors: dict[int, list[int]] = {}
+        for number, actuator in enumerate(mechanism.actuators):
+            self._motors.setdefault(mechanism.joint_index[actuator.joint], []).append(number)
+        held = {mechanism.joint_index[actuator.joint] for actuator in mechanism.actuators if actuator.kp}
         # a spring on an angle needs its turns, which no attitude remembers
         self.angles = [
             (k, n)
             for k, joint in enumerate(mechanism.joints)
-            if (joint.stiffness or joint.limits) and joint.kind in {"revolute", "universal"}
+            if (joint.stiffness or joint.limits or k in held) and joint.kind in {"revolute", "universal"}
             for n in range(joint.nq)
         ]
 
@@ -136,11 +148,15 @@ class MaximalEquations:
         return np.array([s for x, _ in starts for s in x] + [s for _, u in starts for s in u] + angles)
 
     def at(
-        self, state: Sequence[Scalar], functions: Mapping[str, Any] = FUNCTIONS, switched: Switched | None = None
+        self,
+        state: Sequence[Scalar],
+        functions: Mapping[str, Any] = FUNCTIONS,
+        switched: Switched | None = None,
+        time: Scalar = 0.0,
     ) -> ConstrainedEquations:
         """The equations for a state as :meth:`start` gives it, of any scalars; quaternions of unit length.
 
-        Rows of ``switched`` joints that hold come last.
+        Rows of couplings come after those of connections, rows of ``switched`` joints that hold last.
         """
         switched = switched or Switched()
         x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
@@ -154,11 +170,24 @@ class MaximalEquations:
         made = ConstraintRows(self.bodies, self.u_slices, self.connections, self._rolling, views)
         rows: list[ConstraintRow] = []
         laws, angle_rate = [], []
+        efforts: list[Scalar] = [0.0] * len(self.mechanism.actuators)
+
+        def effort(number: int, q: Scalar, speed: Scalar) -> Scalar:
+            """Force along a joint's coordinate besides its spring and damper."""
+            for motor in self._motors.get(number, ()):
+                actuator = self.mechanism.actuators[motor]
+                clamped = switched.clamped.get(motor)
+                efforts[motor] = actuator.wanted(time, q, speed, functions) if clamped is None else clamped
+            drive = value_at(self.mechanism.joints[number].torque, time, functions)
+            own = [efforts[motor] for motor in self._motors.get(number, ())]
+            return add(drive, switched.push.get(number, 0.0), *own)
+
         for number, connection in enumerate(self.connections):
             rows += made.of(number)
             if number < len(self.mechanism.joints):
                 own = [angle for angle, (k, _) in zip(angles, self.angles, strict=True) if k == number]
-                law, rates = self._law(number, connection, views, own, force, switched.push.get(number, 0.0))
+                acts = bool(number in self._motors or number in switched.push)
+                law, rates = self._law(number, connection, views, own, force, effort, acts)
                 laws.append(law)
                 angle_rate += rates
         for spring, (a, place_a, b, place_b) in zip(self.mechanism.springs, self._ends, strict=True):
@@ -171,6 +200,7 @@ class MaximalEquations:
                 pull = add(pull, mul(spring.damping, dot(slide, d) / (length * length)))
             self._apply(force, views, a, scaled(pull, d), arm_a)
             self._apply(force, views, b, scaled(-1.0, scaled(pull, d)), arm_b)
+        rows += [self._coupled(made, coupling) for coupling in self.mechanism.couplings]
         rows += [made.of_rate(number, self.mechanism.joints[number].kind) for number in switched.held]
         drives = [
             Drive(made.of_rate(number, joint.kind), float(joint.armature))
@@ -182,7 +212,7 @@ class MaximalEquations:
             for row in rows
             if self._light & {self.connections[row.connection].a, self.connections[row.connection].b}
         ]
-        return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, drives, holders)
+        return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, efforts, drives, holders)
 
     def rate_rows(self, state: Sequence[Scalar], joints: Sequence[int]) -> list[ConstraintRow]:
         """Rates of revolute and prismatic joints as rows; of a prismatic one the residual is the coordinate."""
@@ -190,6 +220,12 @@ class MaximalEquations:
             self.bodies, self.u_slices, self.connections, self._rolling, self._views(state, FUNCTIONS)
         )
         return [made.of_rate(number, self.mechanism.joints[number].kind) for number in joints]
+
+    def _coupled(self, made: ConstraintRows, coupling: Coupling) -> ConstraintRow:
+        """A coupling as a row on rates; that it holds between coordinates follows from the start."""
+        a, b = (self.mechanism.joint_index[name] for name in (coupling.joint_a, coupling.joint_b))
+        one, two = (made.of_rate(number, self.mechanism.joints[number].kind) for number in (a, b))
+        return two.less(coupling.ratio, one)
 
     def _views(self, state: Sequence[Scalar], functions: Mapping[str, Any]) -> list[BodyInScalars]:
         """All bodies, the ground last."""
@@ -234,14 +270,18 @@ class MaximalEquations:
         views: list[BodyInScalars],
         angles: list[Scalar],
         force: list[Scalar],
-        further: float,
+        effort: Callable[[int, Scalar, Scalar], Scalar],
+        acts: bool,
     ) -> tuple[tuple[list[Scalar], list[Scalar]], list[Scalar]]:
-        """Force and moment of a joint's own spring, damper and drive on its child, added to the forces; angle rates."""
+        """Force and moment of a joint's own laws and its actuators on its child, added to the forces; angle rates.
+
+        ``effort`` says what acts along a coordinate besides spring and damper, ``acts`` whether more than a drive does.
+        """
         joint, a, b = self.mechanism.joints[number], views[c.a], views[c.b]
         push: list[Scalar] = [0.0, 0.0, 0.0]
         moment: list[Scalar] = [0.0, 0.0, 0.0]
         rates: list[Scalar] = []
-        if not (joint.stiffness or joint.damping or joint.torque or further or angles):
+        if not (joint.stiffness or joint.damping or joint.torque or acts or angles):
             return (push, moment), rates
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
@@ -251,21 +291,22 @@ class MaximalEquations:
             moment = scaled(-joint.damping, turning)
         elif joint.kind == "prismatic":
             slide = minus(minus(speed_at(b, arm_b), speed_at(a, arm_a)), cross(a.w, d))
-            push = scaled(add(_along(joint, dot(A[2], d), dot(A[2], slide)), further), A[2])
+            along, speed = dot(A[2], d), dot(A[2], slide)
+            push = scaled(add(_along(joint, along, speed), effort(number, along, speed)), A[2])
         else:
             axes = [A[2]] if joint.kind == "revolute" else [A[2], B[0]]
             speeds = [dot(axis, turning) for axis in axes]
             if angles:
                 rates = speeds
             for place, (axis, speed) in enumerate(zip(axes, speeds, strict=True)):
-                angle = angles[place] if joint.stiffness else 0.0
-                moment = plus(moment, scaled(add(_along(joint, angle, speed), further), axis))
+                angle = angles[place] if angles else 0.0
+                moment = plus(moment, scaled(add(_along(joint, angle, speed), effort(number, angle, speed)), axis))
         self._apply(force, views, c.b, push, arm_b, moment)
         self._apply(force, views, c.a, scaled(-1.0, push), plus(arm_a, d), scaled(-1.0, moment))
         return (push, moment), rates
 
 
 def _along(joint: Any, q: Scalar, speed: Scalar) -> Scalar:
-    """A joint's own force along its coordinate."""
+    """Force of a joint's own spring and damper along its coordinate."""
     spring = mul(-joint.stiffness, sub(q, float(joint.rest))) if joint.stiffness else 0.0
-    return add(float(joint.torque), spring, mul(-joint.damping, speed) if joint.damping else 0.0)
+    return add(spring, mul(-joint.damping, speed) if joint.damping else 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from proofroll.core.errors import Diverged, Missing
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
-from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations
+from proofroll.truth.mechanism.maximal_equations import FUNCTIONS, ConstrainedEquations, MaximalEquations
 from proofroll.truth.scalars import Scalar, add, is_zero, mul, sub
 
 try:
@@ -40,8 +40,8 @@ class MaximalTaylor:
             raise Missing("Taylor series need heyoka: pip install 'proofroll[fast]'")
         self._number = np.longdouble if long_double else float
         state = [heyoka.make_vars(f"s{place}") for place in range(len(equations.start()))]
-        functions = {"sin": heyoka.sin, "cos": heyoka.cos, "sqrt": heyoka.sqrt}
-        found = equations.at(state, functions)
+        functions = {name: getattr(heyoka, name) for name in FUNCTIONS}
+        found = equations.at(state, functions, time=heyoka.time)
         rates = [*found.rate, *accelerations(equations, found, [found.rows[k] for k in rows]), *found.angle_rate]
         self._start = np.array([self._number(value) for value in equations.start()])
         self._integrator = heyoka.taylor_adaptive(

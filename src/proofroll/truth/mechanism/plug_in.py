@@ -12,6 +12,7 @@ from proofroll.core.element import Element
 from proofroll.core.events import with_events
 from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.named_forces import FIELDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +24,7 @@ _BARS = {
     "energy_change": "energy", "drift": "drift",
 }  # fmt: skip
 _PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
+_PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
 
 class MechanismTruth:
@@ -45,7 +47,7 @@ class MechanismTruth:
         record = found.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         pressed = np.zeros((len(times), len(element.mechanism.contacts), 3))
-        dataset = columns(element, record.placed(element.mechanism), wrench, pressed).dataset()
+        dataset = columns(element, record.placed(element.mechanism), wrench, pressed, record.named).dataset()
         points = [point.name for point in element.mechanism.points]
         for name, variable in dataset.data_vars.items():
             field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)

@@ -73,7 +73,9 @@ def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:
     """
     bodies: list[Body] = []
     joints: list[Joint] = []
-    others: dict[str, list[Any]] = {"loops": [], "springs": [], "points": [], "unmodelled": []}
+    others: dict[str, list[Any]] = {
+        name: [] for name in ("loops", "springs", "points", "unmodelled", "actuators", "couplings")
+    }
     contacts = []
     gravity = None
     for element in scene.elements:

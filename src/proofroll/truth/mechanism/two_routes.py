@@ -32,7 +32,7 @@ BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only long after the horizon
 SAME_START = 1e-9  # m, 1: round-off of places leaves 1e-15 of them, a wrong formula much more
 AT_LIMIT = 1e-9  # rad, m: a joint that swings to its very limit passes it by round-off, 1e-14
 ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
-JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench")
+JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named")
 
 
 @dataclass(frozen=True)

@@ -224,7 +224,7 @@ BAD = {
     ),
     "dependent without a loop": (
         SLIDER_CRANK.split("[[bodies]]", maxsplit=1)[0] + ROD + joint("world", "extra", more="dependent = true"),
-        "joints.extra.dependent.*no loop that it could follow from",
+        "joints.extra.dependent.*no loop or coupling that it could follow from",
     ),
     "parameter of another unit": (
         SLIDER_CRANK.replace('mass = "$rod_mass"', 'mass = "$rod"'),

@@ -29,9 +29,15 @@ def test_a_mechanism_requires_what_it_holds_and_no_more():
     assert required(wheel(**stops)) == {MechanismCapability.REVOLUTE, MechanismCapability.STOPS}
     assert MechanismCapability.REBOUNDS in required(wheel(**stops, restitution=0.5))
     of_contact = {"CONTACT", "CONTACT_FRICTION", "CONTACT_REBOUNDS"}
-    assert of_contact | {"JOINT_SPRINGS", "JOINT_FRICTION", "ARMATURE", "REDUNDANT", "STOPS", "REBOUNDS"} == {
-        item.name for item in set(MechanismCapability) - every
-    }
+    of_drives = {"ACTUATORS", "SATURATION", "COUPLINGS", "SIGNALS"}
+    assert of_contact | of_drives | {
+        "JOINT_SPRINGS",
+        "JOINT_FRICTION",
+        "ARMATURE",
+        "REDUNDANT",
+        "STOPS",
+        "REBOUNDS",
+    } == {item.name for item in set(MechanismCapability) - every}
 
 
 def test_what_is_lacking_is_named_with_its_reason():

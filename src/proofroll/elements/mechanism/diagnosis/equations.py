@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews
+from proofroll.elements.mechanism.signal import varies
 
 _DEGREE, _ENDS, _SAMPLES = 7, 5, 16
 _DEPENDENT = 1e-7
@@ -184,7 +185,7 @@ class Change:
             weighted = np.concatenate([mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
             M = J.reshape(-1, m.nv).T @ weighted.reshape(-1, m.nv)
             terms.append(-(M * self.coupling) @ rate)
-        acts = acts + self.torque * np.array([j.torque for j in by_v])
+        acts = acts + self.torque * np.array([j.constant_drive for j in by_v])
         acts = acts - (self.damping * np.array([j.damping for j in by_v]) + self.added_damping) * state.v
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
@@ -221,9 +222,14 @@ def is_motion(dataset: Any) -> bool:
     )
 
 
+def _known(mechanism: Mechanism) -> bool:
+    """True if the equations here have all its laws."""
+    return not mechanism.actuators and not mechanism.couplings and not any(map(varies, mechanism.signals))
+
+
 def of_run(mechanism: Mechanism, dataset: Any) -> MechanismStates | None:
-    """The states of a run away from its ends; None: too few samples for its accelerations, or not all are numbers."""
-    if dataset.sizes["time"] <= _DEGREE + 2 * _ENDS or not is_motion(dataset):
+    """The states of a run away from its ends; None: too few samples, not all are numbers, or unknown laws."""
+    if not _known(mechanism) or dataset.sizes["time"] <= _DEGREE + 2 * _ENDS or not is_motion(dataset):
         return None
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
@@ -238,6 +244,8 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
     Those of the first steps alone if ``derived``, else where the engine does not say its own.
     """
     element = evidence.element
+    if not _known(element.mechanism):
+        return None
     lines = {line["quantity"]: line for line in evidence.lines}
     rows = []
     for name in ("acceleration", "angular acceleration"):

@@ -1,0 +1,161 @@
+"""Actuators of joints, and couplings of two joints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from proofroll.core.errors import InputError, require_known
+from proofroll.elements.mechanism import checks
+from proofroll.elements.mechanism.joint import LAWS, Joint
+from proofroll.elements.mechanism.signal import Formula, Table, checked, value_at
+
+ActuatorKind = Literal["torque", "velocity", "position"]
+# Which gains a kind has.
+_GAINS: Mapping[str, tuple[str, ...]] = {"torque": (), "velocity": ("kd",), "position": ("kp", "kd")}
+MODES = ("least", "linear", "greatest")  # of an effort with a limit
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """A motor at a joint with one coordinate, through a gear: the motor's coordinate is n q.
+
+    Its effort at the joint, with the target r of the motor, is n r (``torque``), n kd (r - n dq/dt) (``velocity``) or
+    n (kp (r - n q) - kd n dq/dt) (``position``); then ``limit`` clamps all of it.
+
+    Attributes:
+        name: unique among actuators.
+        joint: a revolute or prismatic joint.
+        kind: what its target is.
+        target: of the motor; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
+        kp: gain of a position [N m/rad, N/m, at the motor].
+        kd: gain of a velocity [N m s/rad, N s/m, at the motor].
+        gear: turns of the motor per turn of the joint, n.
+        limit: largest size of the whole effort at the joint [N m, N]; None: none.
+    """
+
+    name: str
+    joint: str
+    kind: ActuatorKind
+    target: float | Formula | Table = field(default=0.0, metadata={"signal": True})
+    kp: float = 0.0
+    kd: float = 0.0
+    gear: float = field(default=1.0, metadata=checks.RATIO)
+    limit: float | None = None
+
+    def __post_init__(self) -> None:
+        place = f"actuators.{checks.name(self.name, 'actuators')}"
+        require_known(f"{place}.kind", self.kind, _GAINS)
+        checks.assign(self, target=checked(f"{place}.target", self.target))
+        for key in ("kp", "kd"):
+            value = checks.number(f"{place}.{key}", getattr(self, key), at_least=0)
+            if value and key not in _GAINS[self.kind]:
+                advice = f"an actuator of kind {self.kind} has none; leave it out"
+                raise InputError(f"{place}.{key}", value, advice)
+            checks.assign(self, **{key: value})
+        first = next(iter(_GAINS[self.kind]), None)
+        if first and not getattr(self, first):
+            raise InputError(
+                f"{place}.{first}", 0.0, f"without it an actuator of kind {self.kind} does nothing; give it"
+            )
+        gear = checks.number(f"{place}.gear", self.gear)
+        if not gear:
+            raise InputError(f"{place}.gear", gear, "a motor that never turns does nothing; give a number other than 0")
+        checks.assign(self, gear=gear)
+        if self.limit is not None:
+            limit = checks.number(f"{place}.limit", self.limit)
+            if limit <= 0:
+                advice = "an effort that is clamped to nothing does nothing; give a positive limit or leave it out"
+                raise InputError(f"{place}.limit", limit, advice)
+            checks.assign(self, limit=limit)
+
+    @property
+    def bound(self) -> float:
+        """Largest size of the effort at the joint [N m, N]; inf: none."""
+        return math.inf if self.limit is None else self.limit
+
+    def wanted(self, time: Any, q: Any, v: Any, functions: Mapping[str, Any] | None = None) -> Any:
+        """Effort at the joint before it is clamped, for numbers, arrays or symbols [N m, N]."""
+        n, given = self.gear, () if functions is None else (functions,)
+        target = value_at(self.target, time, *given)
+        if self.kind == "torque":
+            return n * target
+        effort = (n * self.kd) * (target - n * v) if self.kind == "velocity" else (n * self.kp) * (target - n * q)
+        return effort - (n * n * self.kd) * v if self.kind == "position" and self.kd else effort
+
+    def effort(self, time: float, q: float, v: float, mode: str | None = None) -> float:
+        """Effort at the joint [N m, N]; clamped by its own size where no mode is given."""
+        if mode in {"least", "greatest"}:
+            return -self.bound if mode == "least" else self.bound
+        wanted = float(self.wanted(time, q, v))
+        return wanted if mode == "linear" else min(max(wanted, -self.bound), self.bound)
+
+    def mode(self, time: float, q: float, v: float) -> str:
+        """Mode, of :data:`MODES`, by the size of what is wanted."""
+        wanted = float(self.wanted(time, q, v))
+        return "least" if wanted < -self.bound else "greatest" if wanted > self.bound else "linear"
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Two joints that move together, as by gears, a belt, a rack: q_b = ratio q_a + offset.
+
+    Attributes:
+        name: unique among couplings.
+        joint_a, joint_b: revolute or prismatic joints.
+        ratio: of the rate of joint_b to that of joint_a.
+        offset: coordinate of joint_b where that of joint_a is zero [rad, m].
+    """
+
+    name: str
+    joint_a: str
+    joint_b: str
+    ratio: float
+    offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        place = f"couplings.{checks.name(self.name, 'couplings')}"
+        for key in ("ratio", "offset"):
+            checks.assign(self, **{key: checks.number(f"{place}.{key}", getattr(self, key))})
+        if not self.ratio:
+            raise InputError(
+                f"{place}.ratio", 0.0, "it would hold joint_b and leave joint_a free; fix the joint instead"
+            )
+        if self.joint_a == self.joint_b:
+            raise InputError(f"{place}.joint_b", self.joint_b, "a coupling connects two joints; these are the same")
+
+
+def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplings: Sequence[Coupling]) -> None:
+    """Check of all actuators and couplings: at joints with one coordinate, and none against another.
+
+    Raises:
+        InputError: one is not.
+    """
+    kinds = {joint.name: joint.kind for joint in joints}
+    named = [(f"actuators.{item.name}.joint", item.joint) for item in actuators]
+    named += [(f"couplings.{c.name}.{key}", getattr(c, key)) for c in couplings for key in ("joint_a", "joint_b")]
+    for field_name, name in named:
+        require_known(field_name, name, sorted(kinds), "there is no such joint; choose from")
+        if kinds[name] not in LAWS["torque"]:
+            raise InputError(
+                field_name, name, f"a {kinds[name]} joint has no single coordinate; it is for revolute, prismatic"
+            )
+    servos: dict[str, str] = {}
+    for item in actuators:
+        if item.kind == "torque":
+            continue
+        if other := servos.get(item.joint):
+            advice = (
+                f"{other} and {item.name} hold targets of the same joint and fight; make one of them, with kp and kd"
+            )
+            raise InputError(f"actuators.{item.name}.joint", item.joint, advice)
+        servos[item.joint] = item.name
+    group = {name: name for name in kinds}
+    for coupling in couplings:
+        a, b = group[coupling.joint_a], group[coupling.joint_b]
+        if a == b:
+            advice = "the couplings form a ring, so that one follows from the others; remove it"
+            raise InputError(f"couplings.{coupling.name}", f"{coupling.joint_a} to {coupling.joint_b}", advice)
+        group = {name: a if own == b else own for name, own in group.items()}

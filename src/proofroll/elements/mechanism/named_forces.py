@@ -1,0 +1,78 @@
+"""Forces along coordinates that have names: efforts of actuators, of couplings, of dry friction and of stops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.core.numbers import Unit
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+
+
+class NamedForce(NamedTuple):
+    """A force along a coordinate.
+
+    Attributes:
+        name: as files and commands write it, e.g. ``effort.motor``.
+        field: of a sample that has it: ``effort``, ``coupling``, ``friction`` or ``stop``.
+        place: in that field.
+        unit: N m about an axis, N along one.
+        meaning: one line for a person.
+    """
+
+    name: str
+    field: str
+    place: int
+    unit: Unit
+    meaning: str
+
+
+# Fields of a sample, in the order of the names.
+FIELDS = ("effort", "coupling", "friction", "stop")
+
+
+def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
+    """Named forces of a mechanism; arrays over them have this order."""
+    unit = {joint.name: "N" if joint.kind == "prismatic" else "N m" for joint in mechanism.joints}
+    found = [
+        NamedForce(f"effort.{item.name}", "effort", k, unit[item.joint], f"effort of {item.name} at {item.joint}")
+        for k, item in enumerate(mechanism.actuators)
+    ]
+    found += [
+        NamedForce(
+            f"coupling.{item.name}", "coupling", k, unit[item.joint_b], f"force of {item.name} on {item.joint_b}"
+        )
+        for k, item in enumerate(mechanism.couplings)
+    ]
+    rubbing = [joint.name for joint in mechanism.joints if joint.friction and joint.nq == 1]
+    stopped = [joint.name for joint in mechanism.joints if joint.limits is not None]
+    for key, what, names in (("friction", "dry friction", rubbing), ("stop", "force of a stop", stopped)):
+        found += [
+            NamedForce(f"{key}.{name}", key, mechanism.joint_index[name], unit[name], f"{what} along {name}")
+            for name in names
+        ]
+    return tuple(found)
+
+
+def lengths(mechanism: Mechanism) -> Mapping[str, int]:
+    """Length of each field of a sample: actuators, couplings, joints, joints."""
+    counts = (len(mechanism.actuators), len(mechanism.couplings), len(mechanism.joints), len(mechanism.joints))
+    return dict(zip(FIELDS, counts, strict=True))
+
+
+def taken(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
+    """The named forces from the fields of a sample, in order."""
+    return np.array([fields[item.field][item.place] for item in named_forces(mechanism)], dtype=float)
+
+
+def on_joint(at_stop: bool, friction: float, force: float) -> tuple[float, float]:
+    """Parts of the force that holds or rubs on a joint: that of dry friction, and that of a stop.
+
+    Where a stop and friction hold together, neither is determinate.
+    """
+    if not at_stop:
+        return force, 0.0
+    return (np.nan, np.nan) if friction else (0.0, force)

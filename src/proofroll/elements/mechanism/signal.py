@@ -1,0 +1,161 @@
+"""Numbers that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from simpleeval import InvalidExpression, SimpleEval
+
+from proofroll.core.errors import InputError, no_such_key
+from proofroll.core.numbers import Numbers
+from proofroll.elements.mechanism import checks
+
+TIME = "t"
+# Smooth functions that a formula may call; others evaluate them on arrays, on symbols, or in their own code.
+FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
+    name: getattr(np, {"asin": "arcsin", "atan": "arctan"}.get(name, name))
+    for name in ("sin", "cos", "tan", "asin", "atan", "exp", "log", "sqrt", "tanh")
+}
+_OPERATORS = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    # integers would grow for hours before they overflow
+    ast.Pow: lambda base, power: (float(base) if isinstance(base, int) else base) ** power,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_LONGEST = 500  # characters
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A smooth formula of the time ``t`` [s]: numbers, parameters, + - * / ^ ( ), ``pi`` and :data:`FUNCTIONS`.
+
+    Attributes:
+        text: the formula, without the sign that opens it in a file.
+        numbers: the parameters that it names, and their values.
+    """
+
+    text: str
+    numbers: tuple[tuple[str, float], ...] = ()
+
+    def __post_init__(self) -> None:
+        try:
+            value = float(self.at(0.0))
+        except (InvalidExpression, ArithmeticError, SyntaxError, TypeError, ValueError, RecursionError, MemoryError):
+            value = math.nan
+        if len(self.text) > _LONGEST or not math.isfinite(value):
+            advice = "is no finite number at t = 0; use t, parameters, + - * / ^ ( ), pi and " + ", ".join(FUNCTIONS)
+            raise InputError("formula", f"= {self.text}", advice)
+
+    def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
+        """Value at a time [s], an array of them, or a symbol, with what the functions are there."""
+        names = {"pi": math.pi, **dict(self.numbers), TIME: time}
+        evaluator = SimpleEval(operators=_OPERATORS, functions=dict(functions), names=names)
+        del evaluator.nodes[ast.Attribute]
+        with np.errstate(all="ignore"):
+            return evaluator.eval("", previously_parsed=self._parsed)
+
+    @cached_property
+    def _parsed(self) -> Any:
+        return SimpleEval.parse(self.text.replace("^", "**").strip())
+
+    def __str__(self) -> str:
+        return f"= {self.text}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Values at times, with straight lines between; before the first and after the last they stay.
+
+    Attributes:
+        times: growing [s].
+        values: as many.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        count = max(len(self.times), 1)
+        checks.assign(self, times=checks.numbers("times", self.times, count))
+        checks.assign(self, values=checks.numbers("values", self.values, count))
+        late = np.flatnonzero(np.diff(self.times) <= 0)
+        if len(late):
+            advice = "the times of a table grow; sort them, and give each time once"
+            raise InputError(f"times.{late[0] + 1}", self.times[late[0] + 1], advice)
+
+    def at(self, time: Any) -> Any:
+        """Value at a time [s], or at an array of them."""
+        return np.interp(time, self.times, self.values)
+
+
+Signal = float | Formula | Table
+
+
+def value_at(signal: Signal, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
+    """Value of a signal at a time [s]; of a formula also where the time is an array or a symbol."""
+    if isinstance(signal, Formula):
+        return signal.at(time, functions)
+    return signal.at(time) if isinstance(signal, Table) else signal
+
+
+def varies(signal: Signal) -> bool:
+    """True if it changes in time."""
+    return not isinstance(signal, float | int)
+
+
+def breaks(signals: Sequence[Signal]) -> list[float]:
+    """Times at which one of them is not smooth [s]."""
+    return sorted({time for signal in signals if isinstance(signal, Table) for time in signal.times})
+
+
+def checked(field: str, given: Any) -> Signal:
+    """Signal of a part of a mechanism.
+
+    Raises:
+        InputError: it is none.
+    """
+    return given if isinstance(given, Formula | Table) else checks.number(field, given)
+
+
+def read_signal(field: str, given: Any, numbers: Numbers) -> Any:
+    """Signal of a file; a number or a formula without time stays what it is.
+
+    Raises:
+        InputError: a formula or a table is wrong.
+    """
+    try:
+        if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
+            used = _names(given[1:])
+            if TIME in used:
+                own = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
+                return Formula(given[1:].strip(), own)
+        if isinstance(given, dict):
+            for key in given:
+                if key not in {"times", "values"}:
+                    raise no_such_key(key, given[key], ("times", "values"))
+            filled = {key: numbers.filled(given.get(key, []), key, {}) for key in ("times", "values")}
+            return Table(**filled)
+    except InputError as error:
+        inside = "" if error.field == "formula" else f".{error.field}"
+        raise InputError(f"{field}{inside}", error.value, error.advice) from None
+    return given
+
+
+def _names(text: str) -> set[str]:
+    """Names in a formula; none where it cannot be read, which its evaluation tells."""
+    try:
+        nodes = ast.walk(ast.parse(text.replace("^", "**").strip(), mode="eval"))
+        return {node.id for node in nodes if isinstance(node, ast.Name)}
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
+        return set()

@@ -1,0 +1,185 @@
+"""Actuators, couplings and what changes in time, as scene files give them."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.capabilities import MechanismCapability, required
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.signal import Formula, value_at
+from proofroll.files.scene_file import load_scene
+
+ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+PLAIN = """
+title = "t"
+source = "s"
+[parameters.size]
+value = 0.3
+unit = "m"
+meaning = "amplitude"
+source = "s"
+[gravity]
+magnitude = 0
+[[bodies]]
+name = "b"
+mass = 1
+inertia = [1, 1, 1]
+[[bodies]]
+name = "c"
+mass = 1
+inertia = [1, 1, 1]
+[[joints]]
+name = "j"
+kind = "prismatic"
+parent = "world"
+child = "b"
+[[joints]]
+name = "k"
+kind = "revolute"
+parent = "b"
+child = "c"
+"""
+
+
+def mechanism(tmp_path: Path, more: str) -> Mechanism:
+    """The mechanism of a scene with two joints and this besides."""
+    (tmp_path / "scene.toml").write_text(PLAIN + more)
+    return load_scene(str(tmp_path)).elements[0].mechanism  # type: ignore[attr-defined,no-any-return]
+
+
+def slider(**more: object) -> Mechanism:
+    """A mass on a slide, with one actuator."""
+    return Mechanism(
+        (Body("b", 1.0, inertia=ONES),),
+        (Joint("j", "prismatic", "world", "b", q0=(0.2,), v0=(0.5,)),),
+        actuators=(Actuator("a", "j", **more),),  # type: ignore[arg-type]
+        gravity=(0, 0, 0),
+    )
+
+
+def test_targets_are_numbers_formulas_and_tables(tmp_path: Path) -> None:
+    """A target is a number, a formula of t with parameters, or a table; a formula without t is a number."""
+    made = mechanism(
+        tmp_path,
+        """
+[[actuators]]
+name = "a"
+joint = "j"
+kind = "position"
+kp = 100
+target = "= size*sin(2*pi*t)^2"
+[[actuators]]
+name = "b"
+joint = "j"
+kind = "torque"
+target = {times = [0, 1], values = ["$size", 2]}
+[[actuators]]
+name = "c"
+joint = "k"
+kind = "torque"
+target = "= 2*size"
+""",
+    )
+    formula, table, number = (item.target for item in made.actuators)
+    assert isinstance(formula, Formula)
+    assert formula.at(np.array([0.0, 0.25, 0.125])) == pytest.approx([0.0, 0.3, 0.15])
+    assert value_at(table, np.array([-1.0, 0.5, 3.0])) == pytest.approx([0.3, 1.15, 2.0])
+    assert number == 0.6
+    assert {MechanismCapability.ACTUATORS, MechanismCapability.SIGNALS} <= required(made)
+
+
+@pytest.mark.parametrize(
+    ("more", "effort"),
+    [
+        ({"kind": "torque", "target": 3.0, "gear": -2.0}, -6.0),
+        ({"kind": "velocity", "target": 3.0, "kd": 5.0, "gear": 2.0}, 2 * 5 * (3 - 2 * 0.5)),
+        ({"kind": "position", "target": 3.0, "kp": 7.0, "kd": 5.0, "gear": 2.0}, 2 * (7 * (3 - 0.4) - 5 * 2 * 0.5)),
+        ({"kind": "position", "target": 3.0, "kp": 7.0, "kd": 5.0, "gear": 2.0, "limit": 9.0}, 9.0),
+    ],
+)
+def test_efforts_go_through_the_gear_and_the_limit_is_at_the_joint(more: dict[str, object], effort: float) -> None:
+    """A target and its gains are of the motor; the limit clamps the whole effort at the joint."""
+    made = slider(**more)
+    assert JointCoordinates(made).solve(*made.start()).acceleration == pytest.approx([effort])
+    assert JointCoordinates(made).sample(*made.start())["named"] == pytest.approx([effort])
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        ('[[actuators]]\nname = "a"\njoint = "x"\nkind = "torque"', "actuators.a.joint = 'x': there is no such joint"),
+        ('[[actuators]]\nname = "a"\njoint = "j"\nkind = "force"', "actuators.0.kind"),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\nkp = 1',
+            "actuators.a.kp = 1.0: an actuator of kind torque",
+        ),
+        ('[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkd = 1', "actuators.a.kp = 0.0: without it"),
+        ('[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\nlimit = 0', "actuators.a.limit = 0.0: an effort"),
+        ('[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ngear = 0', "actuators.a.gear = 0.0: a motor"),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkp = 1\n'
+            '[[actuators]]\nname = "b"\njoint = "j"\nkind = "velocity"\nkd = 1',
+            "actuators.b.joint = 'j': a and b hold targets of the same joint and fight",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = {times = [0, 2, 1], values = [0, 0, 0]}',
+            "actuators.0.target.times.2 = 1.0: the times of a table grow",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = {times = [0, 2], values = [0]}',
+            "actuators.0.target.values",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = {time = [0, 2], values = [0]}',
+            "actuators.0.target.time",
+        ),
+        (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = "= log(t)"',
+            "actuators.0.target = '= log(t)': is no finite number",
+        ),
+        (
+            '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "j"\nratio = 1',
+            "couplings.g.joint_b = 'j': a coupling connects",
+        ),
+        ('[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 0', "couplings.g.ratio = 0.0"),
+        (
+            '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 1\n'
+            '[[couplings]]\nname = "h"\njoint_a = "k"\njoint_b = "j"\nratio = 1',
+            "couplings.h = 'k to j': the couplings form a ring",
+        ),
+        (
+            '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 1\noffset = 0.1',
+            "couplings.g = 'j to k': q0 of k is -0.1 rad (or m) off",
+        ),
+    ],
+)
+def test_bad_drives_are_one_line(tmp_path: Path, more: str, said: str) -> None:
+    """Each impossible actuator, target or coupling names its field and what to do."""
+    with pytest.raises(InputError) as raised:
+        mechanism(tmp_path, more)
+    assert said in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize("text", ["t.real", "__import__('os')", "9**9**9**9*t", "sin(t", "foo(t)"])
+def test_formulas_do_nothing_but_compute(text: str) -> None:
+    """What is no smooth formula of numbers is refused, quickly."""
+    with pytest.raises(InputError, match="is no finite number at t = 0"):
+        Formula(text)
+
+
+def test_a_coupled_joint_takes_its_start_from_the_other(tmp_path: Path) -> None:
+    """A dependent joint starts where its coupling has it, and the coupling takes a degree of freedom."""
+    more = PLAIN.replace('child = "c"', 'child = "c"\ndependent = true').replace('child = "b"', 'child = "b"\nv0 = 2.0')
+    coupling = '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "k"\nratio = 3\noffset = 0.5'
+    (tmp_path / "scene.toml").write_text(more + coupling)
+    made = load_scene(str(tmp_path)).elements[0].mechanism  # type: ignore[attr-defined]
+    q, v = made.start()
+    assert q == pytest.approx([0.0, 0.5])
+    assert v == pytest.approx([2.0, 6.0])
+    assert MechanismCapability.COUPLINGS in required(made)
+    assert JointCoordinates(made).rank == 1
