@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,16 @@ import numpy as np
 import pytest
 import yaml
 
+from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.files.trajectory_file import read
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.studies.comparison.compare import compare
 from proofroll_drill.arithmetic import matrix as the_matrix
 from proofroll_drill.arithmetic.differences import beyond_bars, differences
 from proofroll_drill.arithmetic.kinds import PYTHONS, REPOSITORY, Arithmetic, kinds, took_effect
 from proofroll_drill.arithmetic.matrix import Tried, comparison_files, matrix
-from proofroll_drill.arithmetic.record import WRONG, until_wrong
+from proofroll_drill.arithmetic.record import WRONG, decided, until_wrong
 
 # A ball that rolls, one that slips and sticks, one on a curved wall; a body in space, a tree, a loop.
 SCENES = ("sphere_in_cylinder", "inclined_plane", "bowl", "heavy_top", "four_bar")
@@ -96,6 +101,23 @@ def test_a_decision_that_differs_is_told(changes: dict[str, Any], tmp_path: Path
 def test_what_follows_a_wrong_event_is_no_decision(found: list[str], kept: list[str]) -> None:
     """An engine whose events are not the truth's may chatter on as round-off has it; where they part counts."""
     assert until_wrong(found, ["slip", "stick"]) == kept
+
+
+def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
+    """A run with its verdict, its events and its limits, and the truth that it is held against."""
+    row = Row("mujoco[formulation=free]", "loose", ladder=[1.0, 0.5, 0.25])
+    claim = Comparison("claim", "A claim", "Does it hold?", "inclined_plane", 0.1, 0.02, rows=[row])
+    bands = {"loose": Band("as any", {"down": Tolerance(0.01, True, "m")})}
+    claim = replace(claim, bands=bands, vary={"mu_static": [0.1]}, timed=False)
+    runner = Runner(Store(tmp_path), jobs=1)
+    outcome = compare(claim, runner)
+    found = decided(outcome, runner.store)
+    ((place, run),) = found["decisions"].items()
+    assert (run["status"], run["verdict"]) == ("done", outcome.runs[0].verdict)
+    assert found["truths"]["point 0"]["decisions"]["events"] == {"ball": ["slip"]}
+    assert run["events"]["ball"][0] == "slip"
+    assert found["limits"][place]["down"][1] > 0
+    assert (tmp_path / found["truths"]["point 0"]["file"]).exists()
 
 
 def test_a_run_that_is_lacking_is_told(tmp_path: Path) -> None:

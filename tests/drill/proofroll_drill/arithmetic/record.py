@@ -17,7 +17,6 @@ from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, round_off_of
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running import process
 from proofroll.running.case import Status
@@ -69,10 +68,9 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
 def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
     events: Any = None
     if run.case is not None and run.result.status == Status.DONE and run.result.trajectory is not None:
-        scene = load_scene(outcome.comparison.scene, **run.parameters)
-        path = outcome.points[point_name(run.parameters)].file
-        true = _events(scene, read(path)) if path.exists() else {}
-        found = _events(scene, read(store.trajectory(run.case)))
+        point = outcome.points[point_name(run.parameters)]
+        true = _events(point.scene, point.reference.dataset) if point.reference else {}
+        found = _events(point.scene, read(store.trajectory(run.case)))
         events = {name: until_wrong(kinds, true.get(name, kinds)) for name, kinds in found.items()}
     return {
         "status": run.result.status,
