@@ -9,7 +9,7 @@ from pathlib import Path
 from markdown_tables import caveat_list, remark_list, verdict_table
 
 from proofroll.core.comparison import Comparison
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.verdict import Verdict
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder

@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.tables import remarks
 from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, step, verdict_text
 from proofroll.report.terminal.tables import columns
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Wish
+from proofroll.studies.tradeoff.requirements import Requirements
 
 
 def verdict_table(content: ReportedComparison) -> str:
@@ -57,7 +57,9 @@ def cheapest_table(study: TradeoffStudy, tolerances: Sequence[float]) -> str:
     for tolerance in tolerances:
         cells = [f"{number(tolerance)} {unit}"]
         for _, levels in _AMONG:
-            choice = recommend(study, Wish(name, Tolerance(tolerance, False, unit), levels=levels)).answer.choice
+            choice = recommend(
+                study, Requirements(name, Tolerance(tolerance, False, unit), levels=levels)
+            ).answer.choice
             cells.append(_cell(choice.point) if choice else "none")
         lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.plugins import parse_engine
 from proofroll.files.comparison_file import load_comparison
 from proofroll.report.labels import step

@@ -8,7 +8,7 @@ from typing import Any
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 
 _MEANING = {

@@ -22,7 +22,7 @@ from proofroll.core.observable import Role
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Judgement, LimitFinding, Verdict, judge
+from proofroll.core.verdict import Judgement, LimitFinding, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.studies.judging.judge import judge as judge_run
@@ -181,7 +181,7 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
         true, bar = reference.true(item, curve)
         size = reference.sizes.get(item, 1.0)
         judgements.append(
-            judge(
+            judge_curve(
                 item,
                 scene.observables[item].unit,
                 curve,

@@ -30,7 +30,7 @@ _MODULE = "proofroll.running.worker"
 # What runs, truths and certificates need of proofroll and of libraries; no engine, scene or kind of element.
 _IMPORTED = (
     "proofroll.core.first_steps",
-    "proofroll.core.several",
+    "proofroll.core.multi_element",
     "proofroll.core.truth",
     "proofroll.files.scene_file",
     "proofroll.running.loading",

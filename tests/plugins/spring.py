@@ -19,8 +19,8 @@ from proofroll.core.element import Element, FirstMotion, OptionalTerm, Sign, Ste
 from proofroll.core.engine import Sample, whole_steps
 from proofroll.core.engine_abilities import Level, Term
 from proofroll.core.gravity import Gravity
-from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable, Role
+from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 
 SPRUNG = "a mass on a spring"
@@ -119,7 +119,7 @@ class SpringKind:
     units: ClassVar[Mapping[str, str]] = {"mass": "kg", "stiffness": "N/m", "x0": "m"}
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[Spring]:
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Spring]:
         """One element for each."""
         return [Spring(**table) for table in numbers.filled(tables["masses"], where, SpringKind.units)]
 

@@ -23,7 +23,7 @@ from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.dataset import observe, scales
 from proofroll.core.events import Event
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Verdict, judge
+from proofroll.core.verdict import Verdict, judge_curve
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.plots import PointCurves
@@ -89,7 +89,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                 dataset = dataset.drop_vars(["N", "F2", "F3", "needed_friction"])
             write(dataset, store.trajectory(run_case))
             judgements = [
-                judge(
+                judge_curve(
                     name,
                     scene.observables[name].unit,
                     curve,

@@ -18,7 +18,7 @@ from proofroll.report.tradeoff.tables import answer_lines
 from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
 from proofroll.studies.tradeoff.recommend import recommend
-from proofroll.studies.tradeoff.requirements import Wish
+from proofroll.studies.tradeoff.requirements import Requirements
 
 OURS = "proofroll's own integrator"
 
@@ -73,7 +73,7 @@ def test_advice_and_silent_failures_carry_the_caveat() -> None:
     offered, mapped = tradeoff_study(), stability_study()
     offered = replace(offered, points=[replace(point, caveat=mine) for point in offered.points])
     mapped = replace(mapped, points=[replace(point, caveat=mine) for point in mapped.points])
-    answer = recommend(offered, Wish("z", Tolerance(1e-2, False, "m")))
+    answer = recommend(offered, Requirements("z", Tolerance(1e-2, False, "m")))
     chosen = next(line for line in answer_lines(answer) if "use rough" in line)
     assert "somebody else's steps" in chosen
     (blamed,) = silent_lines(mapped)

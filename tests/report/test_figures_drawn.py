@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from browsing import Drawn, Visit
 
-from proofroll.core.number_text import error
+from proofroll.core.number_format import error
 
 FIGURE = 'figure[data-p="0"][data-o="1"] .canvas'  # z at the first point
 

@@ -13,7 +13,7 @@ import pytest
 from poison import Poison
 
 import proofroll.report.page.html
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.files.json_data import plain
 from proofroll.report.comparison.plots import EngineCurve, point_curves
 from proofroll.report.comparison.scores import Score, recommendation

@@ -13,7 +13,7 @@ import pytest
 from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
-from proofroll.core.verdict import Verdict, judge
+from proofroll.core.verdict import Verdict, judge_curve
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.sentences import findings
@@ -36,7 +36,7 @@ WRONG_WITHIN = Limit(TRUE + 4e-4, 1e-7, 2.0)
 
 def answered(run: Run, error: float = 0.0, limit: Limit | None = None, **changes: Any) -> Run:
     """The run with one judgement, of z to a millimetre."""
-    item = judge("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
+    item = judge_curve("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
     done = Result(Status.DONE, "done", trajectory=run.result.trajectory)
     return dataclasses.replace(run, result=done, judgements=[item], contradictions=[], **{"missing": []} | changes)
 

@@ -60,7 +60,7 @@ def _onset_table(study: OnsetStudy) -> Table:
     from rich.text import Text
 
     from proofroll.ball_studies.onset import first_slip_told
-    from proofroll.core.number_text import number
+    from proofroll.core.number_format import number
     from proofroll.report.terminal.screen import numeric, plain_table, unbroken
     from proofroll.running.case import Status
 

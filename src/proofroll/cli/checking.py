@@ -10,7 +10,7 @@ from pathlib import Path
 from proofroll.cli import options
 from proofroll.core.announced import announced
 from proofroll.core.errors import InputError, choices, require_known
-from proofroll.core.number_text import counted
+from proofroll.core.number_format import counted
 
 # What reads the files of a study: the name of the entry point is the file's ``study``; it is given the path as text.
 READERS = "proofroll.study_readers"

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 
 from proofroll.cli import options
-from proofroll.core.number_text import counted
+from proofroll.core.number_format import counted
 
 
 def findings(

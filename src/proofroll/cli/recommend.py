@@ -49,19 +49,21 @@ def recommend(
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff.tables import answer_lines
     from proofroll.studies.tradeoff.recommend import recommend as answered
-    from proofroll.studies.tradeoff.requirements import Wish
+    from proofroll.studies.tradeoff.requirements import Requirements
 
     claims, question = question_of(scene, settings, [quantity] if quantity else None, until)
     require_observables(question, [question.quantity])  # before minutes are spent on measuring
     for text in engine or []:
         require_engine(parse_engine(text).name)
     unit = question.loaded().observables[question.quantity].unit
-    wish = Wish(question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ()))
+    required = Requirements(
+        question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ())
+    )
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     known = {*study.absent, *(point.engine for point in study.points)}
     not_measured = [] if engine else [name for name in engine_names() if name not in known]
-    found = replace(answered(study, wish), not_measured=not_measured)
+    found = replace(answered(study, required), not_measured=not_measured)
     options.show(found, as_json, lambda: answer_lines(found))
     raise typer.Exit(options.OK if found.answer.choice and found.affordable else options.CONTRADICTED)
 

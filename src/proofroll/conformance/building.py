@@ -16,8 +16,8 @@ from proofroll.core.element_abilities import HasOptionalCapabilities
 from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Refused
+from proofroll.core.multi_element import REQUIRED
 from proofroll.core.scene import Scene
-from proofroll.core.several import REQUIRED
 
 
 def builds_or_refuses(subject: Subject) -> None:

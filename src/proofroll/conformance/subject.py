@@ -18,9 +18,9 @@ from proofroll.core.dataset import from_samples
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.engine import EPSILON, Sample, precision_of
 from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.multi_element import build
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
-from proofroll.core.several import build
 
 # Simulated time of a check of the motion [s]: the ball goes a sixth of a turn round the cylinder.
 _SPAN = 0.05

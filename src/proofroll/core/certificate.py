@@ -12,9 +12,9 @@ import numpy as np
 
 from proofroll.core.engine import EPSILON, Regularised, precision_of
 from proofroll.core.errors import Diverged
-from proofroll.core.number_text import number
+from proofroll.core.multi_element import sample_of, shaped
+from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
-from proofroll.core.several import sample_of, shaped
 
 # Engines that compute in double precision reproduce the scene's numbers to this relative difference.
 EXACT = 1e-12

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 
 # A ladder is asymptotic if its observed order is the scheme's to this much.
 _ASYMPTOTIC = 0.1

@@ -12,8 +12,8 @@ from proofroll.core.columns import Columns, Variable
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.events import Event, event_columns, events_of
+from proofroll.core.multi_element import AnySample, sample_of
 from proofroll.core.scene import Scene
-from proofroll.core.several import AnySample, sample_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -18,8 +18,8 @@ import numpy.typing as npt
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.gravity import Gravity
-from proofroll.core.numbers import Numbers
 from proofroll.core.observable import Observable
+from proofroll.core.parameters import Parameters
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -205,7 +205,7 @@ class ElementKind(Protocol):
     units: ClassVar[Mapping[str, str]]
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[Element]:
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[Element]:
         """The elements that the tables of a scene file hold.
 
         Args:

@@ -14,9 +14,9 @@ from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import EPSILON, fixed_step, precision_of
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError, Refused
-from proofroll.core.number_text import number
+from proofroll.core.multi_element import build, sample_of, shaped
+from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
-from proofroll.core.several import build, sample_of, shaped
 
 # Derivative at the first of equally spaced values, over the spacing: by a parabola, by a cubic.
 _PARABOLA = np.array([-3.0, 4.0, -1.0, 0.0]) / 2

@@ -12,7 +12,7 @@ from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 
 from proofroll.core.bounds import OutOfBounds
 from proofroll.core.errors import InputError, no_such_key
-from proofroll.core.numbers import Unit
+from proofroll.core.parameters import Unit
 
 _T = TypeVar("_T")
 # JSON has no infinity, which a parameter may be (friction without a bound): there it is null.

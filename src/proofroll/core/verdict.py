@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import Limit
 from proofroll.core.engine import EPSILON
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 
 # A ladder whose rungs differ by less than this part of the tolerance needs no order: were the differences never to
 # shrink, twenty further halvings, a step a million times finer, would move the curve by the tolerance at most.
@@ -93,7 +93,7 @@ class Judgement:
     remarks: tuple[str, ...] = ()
 
 
-def judge(
+def judge_curve(
     name: str,
     unit: str,
     values: FloatArray,

@@ -17,7 +17,7 @@ from typing import Any
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError, no_such_key
 from proofroll.core.gravity import Gravity
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, units_of, validated
@@ -151,7 +151,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
     file, values, path = _read(name, parameters)
     own = path.name == "scene.toml"
     where = str(path)
-    numbers = Numbers(values, {name: item.unit for name, item in file.parameters.items()})
+    numbers = Parameters(values, {name: item.unit for name, item in file.parameters.items()})
     gravity = {"gravity": numbers.filled(file.gravity, f"{where}: gravity", units_of(Gravity))}
     wanted = _names(asks)
     try:
@@ -167,7 +167,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
         raise error if error.field == "asks" and error.value in wanted else error.of(where) from None
 
 
-def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> tuple[Element, ...]:
+def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> tuple[Element, ...]:
     """Elements of the tables of a file, each read by its kind of element."""
     kinds = load_element_kinds()
     known = [name for kind in kinds for name in kind.tables]

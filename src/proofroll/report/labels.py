@@ -6,7 +6,7 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
     from proofroll.core.verdict import Judgement

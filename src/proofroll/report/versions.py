@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import environment, rendered
 from proofroll.report.terminal.screen import plain_table, unbroken

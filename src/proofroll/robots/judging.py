@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, fromstring, tostring
 import numpy as np
 
 from proofroll.core.errors import InputError
-from proofroll.core.number_text import counted
+from proofroll.core.number_format import counted
 from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots import defining, reading
 from proofroll.robots.explain import Search

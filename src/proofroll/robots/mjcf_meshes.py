@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from proofroll.core.number_text import counted
+from proofroll.core.number_format import counted
 from proofroll.robots.robot_file import LintFinding, file_inside, required_file
 
 # The default class of what names none.

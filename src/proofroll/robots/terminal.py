@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import counted, error
+from proofroll.core.number_format import counted, error
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal.tables import STYLES

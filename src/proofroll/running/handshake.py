@@ -18,7 +18,7 @@ from proofroll.running.program import path_of
 PROTOCOL = 2
 
 
-def hello(place: str) -> dict[str, Any]:
+def identify_and_settle(place: str) -> dict[str, Any]:
     """Identity of this worker, which becomes the one for engines ``NAME@place`` alone."""
     from proofroll.running import loading
 

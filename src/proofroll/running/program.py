@@ -16,9 +16,9 @@ import numpy as np
 
 from proofroll.core.engine import Sample, fixed_step, whole_steps
 from proofroll.core.errors import Diverged, InputError, ProofrollError, Refused
+from proofroll.core.multi_element import REQUIRED
 from proofroll.core.plugins import place_of, plain_name
 from proofroll.core.scene import Scene
-from proofroll.core.several import REQUIRED
 from proofroll.files.json_data import plain
 
 PREFIX = "program:"

@@ -19,8 +19,8 @@ from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import TellsRemarks
 from proofroll.core.errors import Diverged, lack_behind
 from proofroll.core.events import Event
+from proofroll.core.multi_element import AnySample, arrays, events_of_engine, sample_of
 from proofroll.core.scene import Scene
-from proofroll.core.several import AnySample, arrays, events_of_engine, sample_of
 
 if TYPE_CHECKING:
     import xarray as xr

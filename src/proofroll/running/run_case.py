@@ -50,7 +50,7 @@ def _require_untouched(engine: str) -> None:
 def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     from proofroll.core.certificate import first_difference
     from proofroll.core.first_steps import certificate
-    from proofroll.core.several import build, step_of
+    from proofroll.core.multi_element import build, step_of
     from proofroll.core.time_grid import off_grid, require_whole_steps, time_grid
     from proofroll.core.turns import samples_between
     from proofroll.files.trajectory_file import write

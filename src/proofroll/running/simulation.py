@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core import several
+from proofroll.core import multi_element
 from proofroll.core.certificate import first_difference
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
@@ -41,7 +41,7 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
         Refused: the engine cannot represent the scene.
     """
     kind, resolved = _resolved(scene, engine, settings)
-    return several.build(kind, scene, resolved)
+    return multi_element.build(kind, scene, resolved)
 
 
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
@@ -103,8 +103,8 @@ def simulate(
         return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
     kind, resolved = _resolved(scene, engine, settings)
     times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)
-    built = several.build(kind, scene, resolved)
-    step = several.step_of(built, resolved)
+    built = multi_element.build(kind, scene, resolved)
+    step = multi_element.step_of(built, resolved)
     require_whole_steps(times, step)
     lines = certificate(kind, built, scene, resolved)
     difference = first_difference(lines)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.arrays import largest_difference
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.number_text import number
+from proofroll.core.multi_element import AnySample, build, sample_of
+from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
-from proofroll.core.several import AnySample, build, sample_of
 from proofroll.running.case import Case
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from typing import Any
 from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, place, require_known
 from proofroll.running.case import Case
 from proofroll.running.ending import end_with, end_with_pipe
-from proofroll.running.handshake import hello
+from proofroll.running.handshake import identify_and_settle
 from proofroll.running.identity import describe, resolve
 from proofroll.running.integrity import watch
 from proofroll.running.memory import volunteer
@@ -47,7 +47,7 @@ def main(answers: int, parent: int, life: int) -> None:
 
 def _answer(request: dict[str, Any]) -> dict[str, Any]:
     actions: dict[str, Callable[..., dict[str, Any]]] = {
-        "hello": hello,
+        "hello": identify_and_settle,
         "describe": describe,
         "resolve": resolve,
         "run": run,

@@ -101,7 +101,7 @@ class Yardstick:
         return cls(scene, truth, name, true, float(np.max(np.ptp(true, axis=0))) or 1.0)
 
 
-def judge(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
+def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
     """Outcome of a run from its end and its trajectory, held against the yardstick of its place."""
     early = {
         Status.CRASHED: CRASHED,

@@ -13,8 +13,8 @@ from proofroll.core.certificate import certify, first_difference
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.first_steps import MOST, certificate, derivable, first_steps
+from proofroll.core.multi_element import build
 from proofroll.core.scene import Scene
-from proofroll.core.several import build
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.sampling import BallBuilt
 from proofroll.files.scene_file import load_scene

@@ -3,10 +3,10 @@
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.core.quantity import Quantity, UnitsDiffer, powers_of
 
-GIVEN = Numbers(
+GIVEN = Parameters(
     {"mass": 2.0, "length": 3.0, "time": 0.5, "angle": 1.0, "count": 4.0},
     {"mass": "kg", "length": "m", "time": "s", "angle": "rad", "count": "1"},
 )

@@ -6,7 +6,7 @@ import pytest
 from nonconforming import Lazy
 from tiny import Tiny, TinySettings
 
-from proofroll.core.several import build
+from proofroll.core.multi_element import build
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene

@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.natural import natural_time
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
-from proofroll.studies.failure import LOST_PHASE, Yardstick, judge, meanings
+from proofroll.studies.failure import LOST_PHASE, Yardstick, meanings, run_outcome
 
 SCENE = load_scene("sphere_in_cylinder")
 TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
@@ -45,7 +45,7 @@ def slower(factor: float) -> Any:
 
 def test_the_truth_is_accurate() -> None:
     """A run that is right is stable, accurate and has no failure."""
-    outcome = judge(DONE, run(), YARDSTICK)
+    outcome = run_outcome(DONE, run(), YARDSTICK)
     assert (outcome.stable, outcome.accurate, outcome.failure, outcome.silent) == (True, True, None, False)
 
 
@@ -63,7 +63,7 @@ def test_the_truth_is_accurate() -> None:
 )
 def test_a_bad_run_that_says_it_is_done(dataset: Any, failure: str, stable: bool) -> None:
     """A run that reached the end and is wrong is a silent failure of the kind that was put into it."""
-    outcome = judge(DONE, dataset, YARDSTICK)
+    outcome = run_outcome(DONE, dataset, YARDSTICK)
     assert (outcome.failure, outcome.stable, outcome.accurate, outcome.silent) == (failure, stable, False, True)
 
 
@@ -71,7 +71,7 @@ def test_what_came_first() -> None:
     """Of two failures the earlier one counts, for the later may be its consequence."""
     later = (np.arange(len(TIMES)) >= 18)[:, None]
     normal = rolling_ball(SCENE).surface.normal(P)
-    outcome = judge(DONE, run(P + later * 0.005 * normal, V * (1 + 0.2 * LATE)), YARDSTICK)
+    outcome = run_outcome(DONE, run(P + later * 0.005 * normal, V * (1 + 0.2 * LATE)), YARDSTICK)
     assert outcome.failure == "energy gain"
     assert outcome.time == pytest.approx(TIMES[12])
 
@@ -91,23 +91,23 @@ def test_what_came_first() -> None:
 def test_runs_that_ended_early(status: Status, message: str, failure: str, silent: bool) -> None:
     """A run that ended early is never stable; only a NaN that the engine did not mention is silent."""
     dataset = run(upto=6) if status == Status.DIVERGED else None
-    outcome = judge(Result(status, message), dataset, YARDSTICK)
+    outcome = run_outcome(Result(status, message), dataset, YARDSTICK)
     assert (outcome.failure, outcome.silent, outcome.stable, outcome.accurate) == (failure, silent, False, False)
 
 
 def test_a_lift_off_that_ends_a_run() -> None:
     """An engine that stops because the ball leaves the wall has said so, and that is what happened."""
     dataset = with_events(run(upto=6), [Event("lift_off", 0.3, 0.2, 0.3)])
-    outcome = judge(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, YARDSTICK)
+    outcome = run_outcome(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, YARDSTICK)
     assert (outcome.failure, outcome.silent) == ("left the surface", False)
 
 
 def test_without_a_truth() -> None:
     """Without a truth a run is judged by what needs none: surface and energy."""
     alone = Yardstick.of(SCENE, None)
-    assert judge(DONE, slower(0.5), alone).stable
-    assert judge(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == "energy gain"
-    assert judge(DONE, slower(0.5), alone).error is None
+    assert run_outcome(DONE, slower(0.5), alone).stable
+    assert run_outcome(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == "energy gain"
+    assert run_outcome(DONE, slower(0.5), alone).error is None
 
 
 def test_every_kind_has_a_meaning() -> None:
@@ -146,7 +146,7 @@ def rolling_down(after_rest: float) -> tuple[Any, Yardstick]:
 def test_resistance_stops_a_ball_and_does_not_drive_it_back(after: float, failure: str | None) -> None:
     """A ball that moves back where it should rest has been reversed; the little that a step goes too far has not."""
     dataset, yardstick = rolling_down(after)
-    outcome = judge(DONE, dataset, yardstick)
+    outcome = run_outcome(DONE, dataset, yardstick)
     assert (outcome.failure, outcome.stable, outcome.silent) == (failure, failure is None, failure is not None)
 
 
@@ -158,7 +158,7 @@ def test_a_path_of_several_components() -> None:
     yardstick = Yardstick.of(scene, true)
     run = true.copy(deep=True)
     run[scene.deciding][3] += 1.5 * yardstick.scale
-    outcome = judge(DONE, run, yardstick)
+    outcome = run_outcome(DONE, run, yardstick)
     assert yardstick.scale == float(np.max(np.ptp(true[scene.deciding].to_numpy(), axis=0)))
     assert (outcome.failure, outcome.time) == (LOST_PHASE, times[3])
     assert outcome.error == pytest.approx(1.5)

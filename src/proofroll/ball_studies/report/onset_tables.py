@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from proofroll.ball_studies.report.onsets import TrueSlips, first_slip
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -16,7 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -16,7 +16,7 @@ from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, above_round_of
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
 from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import Reported
-from proofroll.core.several import REQUIRED
+from proofroll.core.multi_element import REQUIRED
 
 if TYPE_CHECKING:
     import xarray as xr

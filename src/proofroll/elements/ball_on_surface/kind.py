@@ -11,7 +11,7 @@ from pydantic import Field
 
 from proofroll.core.errors import InputError, require_known
 from proofroll.core.gravity import Gravity
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import strict, units_of, validated
 from proofroll.elements.ball_on_surface.element import BallOnSurface, changed
@@ -47,7 +47,7 @@ class BallOnSurfaceKind:
     units: ClassVar[Mapping[str, str]] = units_of(Ball, Contact, InitialMotion, *surface_kinds())
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[BallOnSurface]:
+    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[BallOnSurface]:
         """One element for each contact, with the ball, the surface and the start that it names."""
         units = BallOnSurfaceKind.units
         filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}

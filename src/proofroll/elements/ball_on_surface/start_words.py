@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.core.number_text import place
+from proofroll.core.number_format import place
 from proofroll.elements.ball_on_surface.mechanics import initial_response, normal_force
 from proofroll.elements.ball_on_surface.model import RollingBall
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.numbers import Unit
+from proofroll.core.parameters import Unit
 from proofroll.elements.mechanism import checks, rotations
 from proofroll.elements.mechanism.checks import METRES, RADIANS, RATIO, WORLD, ZERO, Numbers, Vector, Z
 from proofroll.elements.mechanism.rotations import Array

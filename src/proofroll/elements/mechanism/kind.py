@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from proofroll.core.errors import InputError
 from proofroll.core.gravity import Gravity
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
 from proofroll.elements.mechanism.element import MechanismElement
@@ -48,7 +48,9 @@ class MechanismKind:
     units: ClassVar[Mapping[str, str]] = all_units_of(*KINDS.values())
 
     @staticmethod
-    def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Numbers, where: str) -> Sequence[MechanismElement]:
+    def read(
+        tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str
+    ) -> Sequence[MechanismElement]:
         """All bodies, joints, loops and springs of a file are one mechanism."""
         x, y, z = gravity.vector.tolist()
         try:

@@ -12,7 +12,7 @@ from dataclasses import fields
 from typing import Any
 
 from proofroll.core.errors import InputError, no_such_key
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.core.validation import strict, units_of_kind, validated
 from proofroll.elements.mechanism import checks
 from proofroll.elements.mechanism.assembly import assembled, check_start
@@ -40,7 +40,7 @@ _SIGNALS = {kind: {item.name for item in fields(made) if "signal" in item.metada
 _MOST = 10_000  # repetitions: beyond it, a slip of the pen
 
 
-def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: Numbers) -> Mechanism:
+def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: Parameters) -> Mechanism:
     """The mechanism of a scene file, its loops closed, able to move.
 
     Args:
@@ -67,7 +67,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
     return mechanism
 
 
-def _repeated(field: str, repeat: Any, numbers: Numbers) -> Iterator[tuple[str, Any]]:
+def _repeated(field: str, repeat: Any, numbers: Parameters) -> Iterator[tuple[str, Any]]:
     """Kind and part of the mechanism of every table that a [[repeat]] stands for."""
     if not isinstance(repeat, Mapping):
         raise InputError(field, repeat, "give a table with count and what repeats")
@@ -91,7 +91,7 @@ def _repeated(field: str, repeat: Any, numbers: Numbers) -> Iterator[tuple[str, 
                 yield kind, _made(kind, f"{field}.{kind}.{place}", table, here)
 
 
-def _made(kind: str, field: str, table: Any, numbers: Numbers) -> Any:
+def _made(kind: str, field: str, table: Any, numbers: Parameters) -> Any:
     """The part of a mechanism that a table says."""
     if not isinstance(table, Mapping):
         raise InputError(field, table, "give a table")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.number_text import place
+from proofroll.core.number_format import place
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement

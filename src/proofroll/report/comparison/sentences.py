@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.events import EVENT_ORDER
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import (
     EVERYDAY,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.core.certificate import Standing, not_reported
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.labels import names, symbol

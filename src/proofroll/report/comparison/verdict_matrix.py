@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from proofroll.core.number_text import counted as told
-from proofroll.core.number_text import error, number
+from proofroll.core.number_format import counted as told
+from proofroll.core.number_format import error, number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.comparison.tables import observables

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from proofroll.core.arrays import largest_difference
 from proofroll.core.errors import ProofrollError
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.files.json_data import MERGED
 from proofroll.running.case import EngineDescription, Status
 from proofroll.running.timing import Interval, machine, ratio

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.report.labels import step
 from proofroll.report.ladder.ladder import LadderContent, label
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from proofroll.core import number_text
+from proofroll.core import number_format
 from proofroll.files.json_data import plain
 from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
@@ -94,8 +94,8 @@ def templates() -> jinja2.Environment:
 def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Environment:
     made = environment(*(Path(inspect.getfile(kind)).parent / "templates" for kind in kinds))
     made.filters |= {
-        "number": number_text.number,
-        "error": number_text.error,
+        "number": number_format.number,
+        "error": number_format.error,
         "symbol": labels.symbol,
         "unit": labels.unit,
         "values": labels.values,

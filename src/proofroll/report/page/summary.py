@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import log
 from typing import Any
 
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import EVERYDAY, cheapest, closest, furthest_off, scores
 from proofroll.report.labels import name_of, off_by, step, symbol, unit, with_caveat

@@ -12,8 +12,8 @@ import numpy as np
 from proofroll.core.dataset import part
 from proofroll.core.element import Element
 from proofroll.core.errors import InputError
+from proofroll.core.multi_element import each_alone
 from proofroll.core.scene import Scene
-from proofroll.core.several import each_alone
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
 from proofroll.files.trajectory_file import STORED, write

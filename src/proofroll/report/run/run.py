@@ -9,7 +9,7 @@ from typing import Any
 from proofroll.core.columns import SMALLEST, UNCERTAIN
 from proofroll.core.diagnosis.of_scene import Diagnosis, diagnosed
 from proofroll.core.events import Event, events_of
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.files.json_data import OPTIONAL
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read_columns

@@ -9,7 +9,7 @@ import textwrap
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import name_of, step
 from proofroll.studies.failure import CRASHED, DIVERGED, GAVE_UP, LOST_PHASE, NOT_RUN, REFUSED, TOO_SLOW, WRONG_MODEL

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.report.parts import Part, PartEntry, Tell, held
 from proofroll.report.stability import map as stability_map
 from proofroll.report.stability.tables import silent_lines

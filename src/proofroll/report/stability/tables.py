@@ -9,7 +9,7 @@ from pathlib import Path
 from rich.table import Table
 from rich.text import Text
 
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.report.labels import name_of, step, with_caveat
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.tables import observables, remarks
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text

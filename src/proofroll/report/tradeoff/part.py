@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
-from proofroll.core.number_text import counted
+from proofroll.core.number_format import counted
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.work_precision import svg
 from proofroll.report.kinds import group_of
@@ -25,7 +25,7 @@ from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
 from proofroll.studies.tradeoff.cost_claims import ClaimJudgement
 from proofroll.studies.tradeoff.recommend import Answer, by_hand, recommend
 from proofroll.studies.tradeoff.records import TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Wish
+from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff
 from proofroll.studies.tradeoff.tradeoff import stored
 
@@ -150,7 +150,7 @@ def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
     own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
     parts = [Tolerance(part, True) for part in PARTS]
     return [
-        Advice(tolerance.value if tolerance.relative else None, recommend(study, Wish(name, tolerance)).answer)
+        Advice(tolerance.value if tolerance.relative else None, recommend(study, Requirements(name, tolerance)).answer)
         for name in default_quantities(study)
         if study.quantities[name].scale is not None  # a part of nothing
         for tolerance in (own if own and name == study.quantity else parts)

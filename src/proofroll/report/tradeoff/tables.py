@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.table import Column, Table
 from rich.text import Text
 
-from proofroll.core.number_text import error, number
+from proofroll.core.number_format import error, number
 from proofroll.report.labels import listed, name_of, step, with_caveat
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE

@@ -15,7 +15,7 @@ from proofroll.core.convergence import Limit, floor_text, richardson, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
-from proofroll.core.verdict import Judgement, Verdict, judge
+from proofroll.core.verdict import Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
@@ -180,7 +180,7 @@ def _judgements(
         true, bar = reference.true(name, curve)
         scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
         limit = _with_floor(run, name, _limit(run, name, curves), curves, true, unit)
-        judgement = judge(
+        judgement = judge_curve(
             name,
             unit,
             curve,

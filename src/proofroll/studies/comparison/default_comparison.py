@@ -8,10 +8,10 @@ from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.errors import InputError, ProofrollError
+from proofroll.core.multi_element import each_alone, represents
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
-from proofroll.core.several import each_alone, represents
 from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.asking import described, resolve

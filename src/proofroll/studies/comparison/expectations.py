@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from proofroll.core.comparison import Comparison
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.studies.comparison.outcome import SEVERITY, worst
 from proofroll.studies.comparison.planning import Planned, at_point

@@ -10,9 +10,9 @@ import numpy as np
 
 from proofroll.core.comparison import Comparison, Edge, Row
 from proofroll.core.errors import InputError, ProofrollError, told_of
+from proofroll.core.multi_element import represents
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
-from proofroll.core.several import represents
 from proofroll.core.time_grid import off_grid, time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene

@@ -12,9 +12,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import BETWEEN, from_samples, observe
 from proofroll.core.errors import Diverged, InputError
+from proofroll.core.multi_element import REQUIRED
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.several import REQUIRED
 from proofroll.files.trajectory_file import CSV, STORED
 from proofroll.running.recording import require_unit
 

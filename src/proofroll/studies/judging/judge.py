@@ -14,13 +14,12 @@ from proofroll.core.columns import UNCERTAIN
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.turns import samples_between
-from proofroll.core.verdict import Doubt, Judgement, Verdict
-from proofroll.core.verdict import judge as judge_curve
+from proofroll.core.verdict import Doubt, Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.judging.given_run import GivenRun, Run, read_run
 from proofroll.studies.judging.reference import Reference, turned_alike

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.dataset import part
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import ProofrollError
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.running.case import EngineDescription
 from proofroll.running.timing import Interval, named

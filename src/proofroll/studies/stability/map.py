@@ -17,7 +17,7 @@ from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
-from proofroll.studies.failure import TOO_SLOW, RunOutcome, judge
+from proofroll.studies.failure import TOO_SLOW, RunOutcome, run_outcome
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.bisection import SearchResult, search
 from proofroll.studies.stability.places import PER_PERIOD, Place, case_at, measure, places_of
@@ -195,7 +195,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         if result.status == Status.TIMEOUT:  # a faster machine would have seen what came of it
             return _send(point, searching, None)
         dataset = None if result.trajectory is None else read(runner.store.trajectory(case))
-        return _send(point, searching, judge(result, dataset, point.place.yardstick))
+        return _send(point, searching, run_outcome(result, dataset, point.place.yardstick))
 
     def arrived(case: Case, result: Result) -> list[Case]:
         known[case.key] = result

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.validation import FloatOrInf
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.step_numbers import Explanation

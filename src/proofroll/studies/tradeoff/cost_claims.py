@@ -15,7 +15,7 @@ from proofroll.core.engine_abilities import Level
 from proofroll.running.timing import FACTOR, Timing, named, ratio
 from proofroll.studies.tradeoff.recommend import fits, holding
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Wish
+from proofroll.studies.tradeoff.requirements import Requirements
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Holds:
         said = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(said, self.because, None, unknown)
-        held = holding(study, Wish(quantity, self.tolerance, engines=(self.engine,)), here=True)
+        held = holding(study, Requirements(quantity, self.tolerance, engines=(self.engine,)), here=True)
         steps = [point.step for point in held if point.step is not None]
         if not steps:
             return ClaimJudgement(said, self.because, False, "no step of the sweep does")
@@ -120,13 +120,13 @@ class Cheapest:
         among = f" among {', '.join(self.levels)}" if self.levels else ""
         said = f"the cheapest that holds {_to(quantity, self.tolerance)}{among} is {' or '.join(self.engine)}"
         return ClaimJudgement(
-            said, self.because, *self._found(study, Wish(quantity, self.tolerance, levels=tuple(self.levels)))
+            said, self.because, *self._found(study, Requirements(quantity, self.tolerance, levels=tuple(self.levels)))
         )
 
-    def _found(self, study: TradeoffStudy, wish: Wish) -> tuple[bool | None, str]:
+    def _found(self, study: TradeoffStudy, required: Requirements) -> tuple[bool | None, str]:
         if unknown := _unknown(study, self.engine):
             return None, unknown
-        held = holding(study, wish)
+        held = holding(study, required)
         mine = [point for point in held if any(fits(point, text) for text in self.engine)]
         others = [point for point in held if point not in mine]
         if not mine:

@@ -16,7 +16,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, size, tightest
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 from proofroll.core.verdict import round_off_of
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 from proofroll.studies.tradeoff.records import CurveBudget

@@ -13,7 +13,7 @@ from proofroll.files.json_data import MERGED, OPTIONAL
 from proofroll.studies.study_store import Measured
 from proofroll.studies.tradeoff.pareto import tied
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import MARGIN, Wish, absolute_tolerance, why_it_fails
+from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolute_tolerance, why_it_fails
 
 # What of a measured point is told.
 _OF_A_POINT = (
@@ -105,38 +105,38 @@ class Recommendation:
     not_measured: list[str] | None = field(default=None, metadata=OPTIONAL)
 
 
-def recommend(study: TradeoffStudy, wish: Wish) -> Recommendation:
+def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
     """The cheapest point that holds a tolerance, and what else a person should know.
 
     Raises:
         InputError: a quantity or an engine that was not measured, or a percentage of what has no size.
     """
-    absolute = absolute_tolerance(study, wish)
-    timed = [p for p in study.points if p.seconds_per_second is not None and wish.quantity in p.envelope]
+    absolute = absolute_tolerance(study, required)
+    timed = [p for p in study.points if p.seconds_per_second is not None and required.quantity in p.envelope]
     timed.sort(key=lambda p: p.cost)
-    _require_measured(study, wish)
+    _require_measured(study, required)
 
     def why_not(point: MeasuredPoint) -> str | None:
-        return why_it_fails(study, point, wish, absolute)
+        return why_it_fails(study, point, required, absolute)
 
     def told(point: MeasuredPoint | None, reason: str = "") -> Choice | None:
         if point is None:
             return None
-        return Choice(point, point.error.get(wish.quantity), reason or _holds(study, point, wish, absolute))
+        return Choice(point, point.error.get(required.quantity), reason or _holds(study, point, required, absolute))
 
     def best(points: Iterable[MeasuredPoint], reason: str) -> Choice | None:
-        return told(min(points, key=lambda p: p.held(wish.quantity), default=None), reason)
+        return told(min(points, key=lambda p: p.held(required.quantity), default=None), reason)
 
-    asked = [p for p in timed if _asked(p, wish)]
+    asked = [p for p in timed if _asked(p, required)]
     choice = next((p for p in asked if why_not(p) is None), None)
-    affordable = choice is not None and (wish.budget is None or choice.cost <= wish.budget)
+    affordable = choice is not None and (required.budget is None or choice.cost <= required.budget)
     others = [p for p in asked if choice is not None and p.id != choice.id and why_not(p) is None]
     cheaper = asked if choice is None else asked[: asked.index(choice)]
-    failing = min(cheaper, key=lambda p: p.held(wish.quantity), default=None)
+    failing = min(cheaper, key=lambda p: p.held(required.quantity), default=None)
     hand = next((p for p in timed if by_hand(p.level) and why_not(p) is None), None)
     answer = Answer(
-        quantity=wish.quantity,
-        unit=study.quantities[wish.quantity].unit,
+        quantity=required.quantity,
+        unit=study.quantities[required.quantity].unit,
         tolerance=absolute,
         margin=MARGIN,
         choice=told(choice),
@@ -146,12 +146,12 @@ def recommend(study: TradeoffStudy, wish: Wish) -> Recommendation:
         least_model=None if hand is not None and choice is not None and hand.id == choice.id else told(hand),
         closest=best(asked, "the most accurate that was measured; nothing beyond is guessed") if not choice else None,
     )
-    within = [p for p in asked if wish.budget is not None and p.cost <= wish.budget]
+    within = [p for p in asked if required.budget is not None and p.cost <= required.budget]
     return Recommendation(
         answer,
         study.scene,
         study.parameters,
-        wish.budget,
+        required.budget,
         affordable,
         None if affordable else best(within, "the most accurate within the budget"),
         CheckedOver(
@@ -163,31 +163,31 @@ def recommend(study: TradeoffStudy, wish: Wish) -> Recommendation:
     )
 
 
-def holding(study: TradeoffStudy, wish: Wish, *, here: bool = False) -> list[MeasuredPoint]:
+def holding(study: TradeoffStudy, required: Requirements, *, here: bool = False) -> list[MeasuredPoint]:
     """Every point among those asked for that holds the tolerance with margin, the cheapest first, untimed ones last.
 
     With ``here`` the scene's own parameters are enough, whatever happens at the corners of the range.
     """
-    absolute = absolute_tolerance(study, wish)
+    absolute = absolute_tolerance(study, required)
     within = replace(study, over={}) if here else study
-    found = [p for p in study.points if _asked(p, wish) and why_it_fails(within, p, wish, absolute) is None]
+    found = [p for p in study.points if _asked(p, required) and why_it_fails(within, p, required, absolute) is None]
     return sorted(found, key=lambda p: p.cost)
 
 
-def _require_measured(study: TradeoffStudy, wish: Wish) -> None:
+def _require_measured(study: TradeoffStudy, required: Requirements) -> None:
     measured = list(dict.fromkeys(point.engine for point in study.points))
-    for text in wish.engines:
+    for text in required.engines:
         if parse_engine(text).name not in measured:
             absent = study.absent.get(parse_engine(text).name)
             raise InputError("engine", text, absent or f"measured are {', '.join(measured)}")
 
 
-def _asked(point: MeasuredPoint, wish: Wish) -> bool:
-    if wish.levels and point.level not in wish.levels:
+def _asked(point: MeasuredPoint, required: Requirements) -> bool:
+    if required.levels and point.level not in required.levels:
         return False
-    if not wish.engines:
-        return not by_hand(point.level) or bool(wish.levels)
-    return any(fits(point, text) for text in wish.engines)
+    if not required.engines:
+        return not by_hand(point.level) or bool(required.levels)
+    return any(fits(point, text) for text in required.engines)
 
 
 def fits(point: MeasuredPoint, text: str) -> bool:
@@ -213,16 +213,16 @@ def _same(value: object, text: str) -> bool:
         return str(value).lower() == text.lower()
 
 
-def _holds(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str:
+def _holds(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str:
     """Margin by which a point holds the tolerance, as text."""
-    held, bar = point.held(wish.quantity), study.quantities[wish.quantity].truth_error_bar or 0.0
+    held, bar = point.held(required.quantity), study.quantities[required.quantity].truth_error_bar or 0.0
     if not max(held, bar):
         return "no error is seen"
     # Of an error below the truth's error bar no more is known than that.
     said = f"{_times(absolute / max(held, bar), at_least=held < bar)} better than asked"
     if point.corners:
-        worst = max(corner.off(wish.tolerance.relative)[wish.quantity] for corner in point.corners)
-        there = wish.tolerance.value if wish.tolerance.relative else absolute
+        worst = max(corner.off(required.tolerance.relative)[required.quantity] for corner in point.corners)
+        there = required.tolerance.value if required.tolerance.relative else absolute
         said += f", and {_times(there / worst)} at the worst of {len(point.corners)} corners" if worst else ""
     return said
 

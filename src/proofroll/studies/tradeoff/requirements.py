@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from proofroll.core.comparison import Tolerance
 from proofroll.core.convergence import floor_text
 from proofroll.core.errors import InputError, require_known
-from proofroll.core.number_text import number
+from proofroll.core.number_format import number
 
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff.records import MeasuredPoint, SparseRun, TradeoffStudy
@@ -18,7 +18,7 @@ MARGIN = 2.0
 
 
 @dataclass(frozen=True)
-class Wish:
+class Requirements:
     """Requirements of a recommendation.
 
     Attributes:
@@ -36,25 +36,25 @@ class Wish:
     levels: tuple[str, ...] = ()
 
 
-def absolute_tolerance(study: TradeoffStudy, wish: Wish) -> float:
+def absolute_tolerance(study: TradeoffStudy, required: Requirements) -> float:
     """The tolerance in the quantity's unit."""
     known = study.quantities
-    require_known("quantity", wish.quantity, known, "measured are")
-    scale = known[wish.quantity].scale
-    if wish.tolerance.relative and scale is None:
-        advice = f"{wish.quantity} has no size here; give it in {known[wish.quantity].unit}"
-        raise InputError("tolerance", f"{number(100 * wish.tolerance.value, 3)} %", advice)
-    return wish.tolerance.absolute(scale or 1.0)
+    require_known("quantity", required.quantity, known, "measured are")
+    scale = known[required.quantity].scale
+    if required.tolerance.relative and scale is None:
+        advice = f"{required.quantity} has no size here; give it in {known[required.quantity].unit}"
+        raise InputError("tolerance", f"{number(100 * required.tolerance.value, 3)} %", advice)
+    return required.tolerance.absolute(scale or 1.0)
 
 
-def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str | None:
+def why_it_fails(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
     """Reason that a point does not hold the tolerance, in one sentence; None if it does."""
     sparse = point.sparse
-    lives = _lives_on_the_grid(study, sparse, wish.quantity, absolute) if sparse else None
+    lives = _lives_on_the_grid(study, sparse, required.quantity, absolute) if sparse else None
     return (
         lives
-        or _why_not_here(study, point, wish.quantity, absolute)
-        or (_why_not_there(study, point, wish, absolute) if study.over else None)
+        or _why_not_here(study, point, required.quantity, absolute)
+        or (_why_not_there(study, point, required, absolute) if study.over else None)
     )
 
 
@@ -89,13 +89,13 @@ def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absol
     )
 
 
-def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, wish: Wish, absolute: float) -> str | None:
+def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
     """Reason that it does not hold it at some corner of the range."""
-    name, unit = wish.quantity, study.quantities[wish.quantity].unit
+    name, unit = required.quantity, study.quantities[required.quantity].unit
     if point.corners is None:
         return "it was not checked over the range of the parameters"
-    relative = wish.tolerance.relative
-    allowed = wish.tolerance.value if relative else absolute
+    relative = required.tolerance.relative
+    allowed = required.tolerance.value if relative else absolute
     for corner in point.corners:
         where = ", ".join(f"{parameter} = {value:g}" for parameter, value in corner.parameters.items())
         there = corner.off(relative).get(name)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.convergence import floor_text
-from proofroll.core.number_text import counted, number
+from proofroll.core.number_format import counted, number
 from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status, hosts, told_hosts

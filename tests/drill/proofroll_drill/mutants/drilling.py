@@ -19,7 +19,7 @@ from proofroll.core.first_steps import certificate as certificate_of
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Judgement, Verdict, judge
+from proofroll.core.verdict import Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.studies.judging.reference import Reference
@@ -130,7 +130,9 @@ def judged(reference: Reference, dataset: Any) -> list[Judgement]:
         size = reference.sizes.get(name, 1.0)
         unit = reference.scene.observables[name].unit
         allowed = max(_TOLERANCE * size, 4 * bar)
-        found.append(judge(name, unit, values, true, truth_error_bar=bar, tolerance=allowed, scale=size, limit=None))
+        found.append(
+            judge_curve(name, unit, values, true, truth_error_bar=bar, tolerance=allowed, scale=size, limit=None)
+        )
     return found
 
 

@@ -53,20 +53,20 @@ def parallelogram(damping):
     return Mechanism(tuple(rods.values()), joints, loops, gravity=(0.0, -9.81, 0.0))
 
 
-SAID = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank, where the motion may branch"
+REPORTING_ERRORS = r"near t = 0.2\d*, 0.7\d* s the rows of the loops lose rank, where the motion may branch"
 
 
 def test_a_parallelogram_in_closed_form_says_where_it_may_branch():
     """It goes on as the formula does, and the truth says from where on lengths decide; before that it says nothing."""
     element = MechanismElement(parallelogram(0.0))
     found = MechanismTruth.truth(element, np.array([0.0, 0.5, 1.0]), ())
-    assert re.match(SAID, found.attrs["ill_posed"])
+    assert re.match(REPORTING_ERRORS, found.attrs["ill_posed"])
     assert "ill_posed" not in MechanismTruth.truth(element, np.array([0.0, 0.2]), ()).attrs
 
 
 def test_a_parallelogram_without_a_closed_form_ends_there_with_the_same_words():
     """Damped, no formula tells the branch."""
-    with pytest.raises(Refused, match=SAID):
+    with pytest.raises(Refused, match=REPORTING_ERRORS):
         find_truth(parallelogram(0.1), np.array([0.0, 0.5, 1.0]))
 
 

@@ -15,7 +15,7 @@ from proofroll.report.tradeoff.tables import answer_lines, corner_table, default
 from proofroll.studies.tradeoff.recommend import covers
 from proofroll.studies.tradeoff.recommend import recommend as recommended
 from proofroll.studies.tradeoff.records import Corner, MeasuredPoint, MeasuredQuantity, SparseRun, TradeoffStudy
-from proofroll.studies.tradeoff.requirements import Wish
+from proofroll.studies.tradeoff.requirements import Requirements
 
 
 def point(  # noqa: D103 -- one measured point
@@ -44,12 +44,12 @@ def study(*points: MeasuredPoint, **more: Any) -> TradeoffStudy:
     return invented_study(*points, **({"over": {"speed": [2.0, 6.0]}} | more))
 
 
-def wish(value: float, *, relative: bool = False, **more: Any) -> Wish:
+def required(value: float, *, relative: bool = False, **more: Any) -> Requirements:
     """An error of z."""
-    return Wish("z", Tolerance(value, relative, "%" if relative else "m"), **more)
+    return Requirements("z", Tolerance(value, relative, "%" if relative else "m"), **more)
 
 
-def recommend(measured: TradeoffStudy, wanted: Wish) -> dict[str, Any]:
+def recommend(measured: TradeoffStudy, wanted: Requirements) -> dict[str, Any]:
     """The recommendation as JSON has it."""
     return dict(plain(recommended(measured, wanted)))
 
@@ -59,21 +59,21 @@ FAST, MIDDLE, SLOW = point(1, "fast", 1e-3, 1e-2), point(2, "middle", 1e-2, 1e-4
 
 def test_the_cheapest_that_holds_with_margin() -> None:
     """The cheapest whose error is half the tolerance or less is chosen, between a runner-up and a failure."""
-    answer = recommend(study(SLOW, FAST, MIDDLE), wish(1e-3))
+    answer = recommend(study(SLOW, FAST, MIDDLE), required(1e-3))
     assert answer["choice"]["engine"] == "middle"
     assert answer["runner_up"]["engine"] == "slow"
     assert answer["first_failure"]["engine"] == "fast"
     assert "off by 0.01 m" in answer["first_failure"]["reason"]
     assert answer["choice"]["error"] == 1e-4
     assert answer["choice"]["seconds_per_second"] == 1e-2
-    assert recommend(study(FAST, MIDDLE, SLOW), wish(1.5e-4))["choice"]["engine"] == "slow"
+    assert recommend(study(FAST, MIDDLE, SLOW), required(1.5e-4))["choice"]["engine"] == "slow"
 
 
 def test_what_holds_only_on_the_grid_of_samples_is_excluded() -> None:
     """A tolerance that many samples alone make good is no choice, and the reason names both intervals and the error."""
     sparse = SparseRun(1.0, {"z": 3e-2}, {"z": 5e-10}, "reached 2 s")
     lucky = point(1, "fast", 1e-3, 3e-2, sparse=sparse)
-    answer = recommend(study(lucky, MIDDLE), wish(1e-3))
+    answer = recommend(study(lucky, MIDDLE), required(1e-3))
     assert answer["choice"]["engine"] == "middle"
     said = answer["first_failure"]["reason"]
     assert said.startswith(
@@ -81,9 +81,9 @@ def test_what_holds_only_on_the_grid_of_samples_is_excluded() -> None:
     )
     assert "off by 0.03 m" in said
     lost = replace(lucky, sparse=replace(sparse, error={}, message="the steps became too short"))
-    assert "the steps became too short" in recommend(study(lost, MIDDLE), wish(1e-3))["first_failure"]["reason"]
+    assert "the steps became too short" in recommend(study(lost, MIDDLE), required(1e-3))["first_failure"]["reason"]
     honest = point(1, "fast", 1e-3, 1e-5, sparse=replace(sparse, error={"z": 1e-5}))
-    assert recommend(study(honest, MIDDLE), wish(1e-3))["choice"]["engine"] == "fast"
+    assert recommend(study(honest, MIDDLE), required(1e-3))["choice"]["engine"] == "fast"
 
 
 def test_costs_that_cannot_be_told_apart_are_ties() -> None:
@@ -91,17 +91,17 @@ def test_costs_that_cannot_be_told_apart_are_ties() -> None:
     near, far = point(4, "near", 1.15e-2, 1e-5), point(5, "far", 1.3e-2, 1e-5)
     failing = point(6, "failing", 1.05e-2, 1e-2)
     measured = study(FAST, MIDDLE, near, far, failing, SLOW)
-    answer = recommend(measured, wish(1e-3))
+    answer = recommend(measured, required(1e-3))
     assert answer["choice"]["engine"] == "middle"
     assert [tie["engine"] for tie in answer["ties"]] == ["near"]
     assert answer["ties"][0]["reason"]
-    assert recommend(study(FAST, SLOW), wish(1e-3))["ties"] == []
-    assert any("tie" in line and "near only" in line for line in answer_lines(recommended(measured, wish(1e-3))))
+    assert recommend(study(FAST, SLOW), required(1e-3))["ties"] == []
+    assert any("tie" in line and "near only" in line for line in answer_lines(recommended(measured, required(1e-3))))
 
 
 def test_a_factor_is_a_number_as_a_person_writes_it() -> None:
     """What holds a tolerance thousands of times over is said without powers of ten."""
-    reason = recommend(study(point(1, "fine", 1e-3, 2.5e-7)), wish(1e-3))["choice"]["reason"]
+    reason = recommend(study(point(1, "fine", 1e-3, 2.5e-7)), required(1e-3))["choice"]["reason"]
     assert reason.startswith("more than 1000 times better than asked, and more than 1000 times at the worst of ")
 
 
@@ -115,31 +115,32 @@ def test_the_range_is_shown_with_its_digits() -> None:
 
 def test_a_percentage_is_of_the_scale() -> None:
     """One percent of a range of 0.1 m is 1 mm."""
-    assert recommend(study(FAST, MIDDLE), wish(0.01, relative=True))["tolerance"] == pytest.approx(1e-3)
+    assert recommend(study(FAST, MIDDLE), required(0.01, relative=True))["tolerance"] == pytest.approx(1e-3)
 
 
 def test_a_percentage_of_what_has_no_size() -> None:
     """Where a quantity has no size, as the first slip of a ball that does not slip, a percentage of it is refused."""
     sizeless = {"z": MeasuredQuantity("m", None, 1e-13, "z", column=True)}
     with pytest.raises(InputError, match="z has no size here; give it in m"):
-        recommend(study(FAST, MIDDLE, quantities=sizeless), wish(0.01, relative=True))
-    assert recommend(study(FAST, MIDDLE, quantities=sizeless), wish(1e-3))["choice"]["engine"] == "middle"
+        recommend(study(FAST, MIDDLE, quantities=sizeless), required(0.01, relative=True))
+    assert recommend(study(FAST, MIDDLE, quantities=sizeless), required(1e-3))["choice"]["engine"] == "middle"
 
 
 def test_no_error_is_seen_below_the_truths_own() -> None:
     """Nothing holds a tolerance that the truth does not resolve, not even a run that shows no error at all."""
     exact = point(4, "exact", 1e-2, 0.0)
-    assert recommend(study(exact), wish(1.9e-13))["choice"] is None
+    assert recommend(study(exact), required(1.9e-13))["choice"] is None
     assert (
-        "the truth itself is known only to 1e-13 m" in recommend(study(exact), wish(1.9e-13))["first_failure"]["reason"]
+        "the truth itself is known only to 1e-13 m"
+        in recommend(study(exact), required(1.9e-13))["first_failure"]["reason"]
     )
-    assert recommend(study(exact), wish(1e-12))["choice"]["reason"].startswith("at least 10 times better")
+    assert recommend(study(exact), required(1e-12))["choice"]["reason"].startswith("at least 10 times better")
 
 
 def test_luck_is_not_believed() -> None:
     """A coarse run with a small error does not pass while finer runs of the same curve are worse."""
     lucky = point(1, "fast", 1e-3, 1e-6, envelope={"z": 1e-2})
-    answer = recommend(study(lucky, MIDDLE), wish(1e-3))
+    answer = recommend(study(lucky, MIDDLE), required(1e-3))
     assert answer["choice"]["engine"] == "middle"
     assert "luck" in answer["first_failure"]["reason"]
 
@@ -150,7 +151,7 @@ def test_luck_is_not_believed() -> None:
 )
 def test_what_fails_elsewhere_in_the_range_is_not_chosen(corners: Any, said: str) -> None:
     """A point that is off, or ends, or was never run at a corner of the range is not recommended, and it says why."""
-    answer = recommend(study(point(1, "fast", 1e-3, 1e-4, corners=corners), SLOW), wish(1e-3))
+    answer = recommend(study(point(1, "fast", 1e-3, 1e-4, corners=corners), SLOW), required(1e-3))
     assert answer["choice"]["engine"] == "slow"
     assert said in answer["first_failure"]["reason"]
     assert answer["checked"]["parameters"] == {"speed": [2.0, 6.0]}
@@ -176,7 +177,7 @@ def test_a_study_answers_about_each_of_its_engines(measured: list[str], engines:
 
 def test_nothing_beyond_what_was_measured() -> None:
     """Where nothing holds the tolerance there is no choice, and the closest point is named as such."""
-    answer = recommend(study(FAST, MIDDLE), wish(1e-9))
+    answer = recommend(study(FAST, MIDDLE), required(1e-9))
     assert answer["choice"] is None
     assert answer["closest"]["engine"] == "middle"
     assert "nothing beyond is guessed" in answer["closest"]["reason"]
@@ -184,39 +185,39 @@ def test_nothing_beyond_what_was_measured() -> None:
 
 def test_a_budget_that_is_too_small() -> None:
     """A choice dearer than the budget is named as such, with the most accurate that the budget allows."""
-    answer = recommend(study(FAST, MIDDLE, SLOW), wish(1e-5, budget=0.02))
+    answer = recommend(study(FAST, MIDDLE, SLOW), required(1e-5, budget=0.02))
     assert answer["choice"]["engine"] == "slow"
     assert not answer["affordable"]
     assert answer["best_within_budget"]["engine"] == "middle"
-    assert recommend(study(FAST, MIDDLE, SLOW), wish(1e-5, budget=0.2))["affordable"]
+    assert recommend(study(FAST, MIDDLE, SLOW), required(1e-5, budget=0.2))["affordable"]
 
 
 def test_equations_worked_out_by_hand_are_named_apart() -> None:
     """A closed form is not an engine: it is told as the least model, unless it is asked for."""
     closed = point(0, "least", 1e-6, 1e-14, level="closed form")
-    answer = recommend(study(closed, MIDDLE), wish(1e-3))
+    answer = recommend(study(closed, MIDDLE), required(1e-3))
     assert answer["choice"]["engine"] == "middle"
     assert answer["least_model"]["engine"] == "least"
-    assert recommend(study(closed, MIDDLE), wish(1e-3, engines=("least",)))["choice"]["engine"] == "least"
+    assert recommend(study(closed, MIDDLE), required(1e-3, engines=("least",)))["choice"]["engine"] == "least"
 
 
 def test_restricted_to_engines_settings_and_levels() -> None:
     """Only what is asked for is chosen from; an engine that was not measured is an error that says what was."""
     soft = point(4, "soft", 1e-2, 1e-5, level="engine contact", formulation="free")
     measured = study(MIDDLE, SLOW, soft)
-    assert recommend(measured, wish(1e-3, levels=("engine contact",)))["choice"]["engine"] == "soft"
-    assert recommend(measured, wish(1e-3, engines=("soft[formulation=free]",)))["choice"]["engine"] == "soft"
-    assert recommend(measured, wish(1e-3, engines=("soft[formulation=chart]",)))["choice"] is None
+    assert recommend(measured, required(1e-3, levels=("engine contact",)))["choice"]["engine"] == "soft"
+    assert recommend(measured, required(1e-3, engines=("soft[formulation=free]",)))["choice"]["engine"] == "soft"
+    assert recommend(measured, required(1e-3, engines=("soft[formulation=chart]",)))["choice"] is None
     with pytest.raises(InputError, match="measured are middle, slow, soft"):
-        recommend(measured, wish(1e-3, engines=("other",)))
+        recommend(measured, required(1e-3, engines=("other",)))
     with pytest.raises(InputError, match="measured are z"):
-        recommend(measured, Wish("y", Tolerance(1e-3, False, "m")))
+        recommend(measured, Requirements("y", Tolerance(1e-3, False, "m")))
 
 
 def test_why_a_finer_step_would_not_do() -> None:
     """Where the limit of small steps is off by more than the tolerance, the reason says that no step would do."""
     budgets = [invented_budget(curve=FAST.curve, model_form=5e-3, model_form_bar=1e-5)]
-    answer = recommend(study(FAST, MIDDLE, budgets=budgets), wish(1e-3))
+    answer = recommend(study(FAST, MIDDLE, budgets=budgets), required(1e-3))
     assert "no step would do" in answer["first_failure"]["reason"]
 
 

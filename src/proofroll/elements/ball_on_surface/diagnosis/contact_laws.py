@@ -14,8 +14,8 @@ from proofroll.elements.ball_on_surface.diagnosis.equations import (
     COVERED,
     Law,
     has_resistance,
-    held_against,
     is_bounded,
+    residuals_of,
 )
 from proofroll.elements.ball_on_surface.mechanics import resistance_moment
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -38,7 +38,7 @@ def other_law(
     def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
         if applies(body):
-            for held in held_against(evidence):
+            for held in residuals_of(evidence):
                 yield held.cause(name, says, law(body), remedy, 0)
 
     return test

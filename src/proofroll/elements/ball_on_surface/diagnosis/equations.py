@@ -151,7 +151,7 @@ def response(
 
 
 @once
-def held_against(evidence: Evidence) -> Iterator[Residuals[Law]]:
+def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
     """The certificate, if something in it differs; the run, unless the equations hold there as for the truth.
 
     Nothing where the certificate names a number that was built otherwise: that is the cause.

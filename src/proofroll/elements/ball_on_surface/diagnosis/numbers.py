@@ -12,7 +12,7 @@ import numpy as np
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import known_factor, possible, said_factor, telling
 from proofroll.core.errors import InputError
-from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, held_against, is_bounded
+from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, is_bounded, residuals_of
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 
@@ -69,7 +69,7 @@ def number(
             except InputError:
                 return None  # there is no such ball
 
-        for held in held_against(evidence):
+        for held in residuals_of(evidence):
             factor, fitted = _snapped(held.fit(law, 1.0))
             if possible(factor, signed):
                 said = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
@@ -91,7 +91,7 @@ def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy:
     @hypothesis(name, "the load with one coefficient closes accelerations and forces at every sample")
     def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
-        for held in held_against(evidence):
+        for held in residuals_of(evidence):
             value = held.fit(lambda x: law(body, x), 0.0)
             if value > 0:
                 yield held.cause(name, says.format(value=value), law(body, value), remedy, 1)

@@ -9,20 +9,20 @@ import numpy as np
 from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.elements.mechanism.diagnosis.equations import Change
-from proofroll.elements.mechanism.diagnosis.held import COVERED, GIVEN, held_against
 from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
-from proofroll.elements.mechanism.diagnosis.said import SAID
+from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, residuals_of
 from proofroll.elements.mechanism.diagnosis.structure import loop_lacks_row, lost_coupling, other_axis
 
 GRAVITY = any_gravity(
-    held_against,
+    residuals_of,
     lambda element: np.array(element.mechanism.gravity),
     lambda element, gravity: Change(element.mechanism, gravity=gravity),
 )
 BUILT = built_otherwise([name for name in GIVEN if name != "joint axes"], COVERED)
 HYPOTHESES: tuple[Any, ...] = (
-    *SAID,
+    *REPORTING_ERRORS,
     reactions,
     reactions_at_start,
     BUILT,

@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 from proofroll.core.diagnosis.fitting import Residuals, possible, said_factor, telling
 from proofroll.elements.mechanism.diagnosis.equations import Change
-from proofroll.elements.mechanism.diagnosis.held import best, held_against
+from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
 from proofroll.elements.mechanism.model import Mechanism
 
 
@@ -32,7 +32,7 @@ def factor_of_all(
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
     def test(evidence: Evidence) -> Iterator[Cause]:
         mechanism = evidence.element.mechanism
-        for held in held_against(evidence) if has(mechanism) else ():
+        for held in residuals_of(evidence) if has(mechanism) else ():
             factor, fitted = best(held, lambda x: change(mechanism, x))
             if possible(factor, signed):
                 says = f"the engine moves it with {what} {said_factor(factor)}" if telling(factor) else ""
@@ -127,7 +127,7 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
     mechanism = evidence.element.mechanism
     mass = np.array([body.mass for body in mechanism.bodies])
     inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
-    for held in held_against(evidence):
+    for held in residuals_of(evidence):
         for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
             one = np.arange(len(mass)) == i
 
@@ -189,7 +189,7 @@ def _about_origin(
 def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Damping or armature in one joint or in all, that the scene does not have."""
     mechanism = evidence.element.mechanism
-    for held in held_against(evidence):
+    for held in residuals_of(evidence):
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
         each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
         own = {key: [getattr(j, key) for j in mechanism.joints for _ in range(j.nv)] for key in ("armature", "damping")}

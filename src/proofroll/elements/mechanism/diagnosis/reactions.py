@@ -17,7 +17,7 @@ from proofroll.core.diagnosis import Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.samples import both
 from proofroll.core.diagnosis.vectors import Reported, product
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
-from proofroll.elements.mechanism.diagnosis.said import BODY
+from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews

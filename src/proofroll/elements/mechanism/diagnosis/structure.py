@@ -11,7 +11,7 @@ from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, h
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import both
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of
-from proofroll.elements.mechanism.diagnosis.held import COVERED, held_against
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 
@@ -88,7 +88,7 @@ def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
         return
     says = "the mass matrix lacks terms between a body and those that hang on it, as when a tree is not depth-first"
     remedy = "add bodies depth-first, or take the mass matrix from an algorithm that does not need that order"
-    for held in held_against(evidence):
+    for held in residuals_of(evidence):
         singles = []
         for row, column in np.argwhere(np.triu(pairs)):
             single = np.zeros_like(pairs)

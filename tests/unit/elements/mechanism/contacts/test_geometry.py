@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.reader import made_mechanism
 from proofroll.files.scene_file import load_scene
@@ -30,7 +30,7 @@ def made(
         {"name": "k", "kind": "fixed", "parent": "world", "child": "c", "position": [3, 0, 1]},
     ]
     tables = {"bodies": bodies, "joints": joints, "geometries": list(geometries), "pairs": list(pairs)}
-    return made_mechanism(tables, (0, 0, -9.81), Numbers({}, {}))
+    return made_mechanism(tables, (0, 0, -9.81), Parameters({}, {}))
 
 
 @pytest.mark.parametrize(

@@ -70,7 +70,7 @@ def _attitudes(evidence: Evidence) -> FloatArray:
 
 
 CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))
-SAID: tuple[Any, ...] = (
+REPORTING_ERRORS: tuple[Any, ...] = (
     CLOCK,
     reported_vectors(_UNITS, _frames, CLOCK, _size, _of_centres),
     at_start(_axes_at_start, frozenset()),

@@ -18,7 +18,7 @@ _NUMBERED = re.compile(r"\{([^{}]*)\}")
 
 
 @dataclass(frozen=True)
-class Numbers:
+class Parameters:
     """The parameters of a scene.
 
     Attributes:
@@ -66,9 +66,9 @@ class Numbers:
             return evaluated(where, content[1:], self._quantities, own)
         return _NUMBERED.sub(lambda found: f"{evaluated(where, found[1], self._quantities):g}", content)
 
-    def beside(self, name: str, value: float) -> Numbers:
+    def beside(self, name: str, value: float) -> Parameters:
         """These numbers and a plain one of this name."""
-        return Numbers({**self.values, name: value}, self.units)
+        return Parameters({**self.values, name: value}, self.units)
 
     @cached_property
     def _quantities(self) -> dict[str, Quantity]:

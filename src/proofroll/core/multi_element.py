@@ -25,7 +25,7 @@ AnySample = Sample | Mapping[str, Sample]
 REQUIRED = ("p_WB", "v_WB", "w_WB")
 
 
-class EachAlone:
+class IndependentElements:
     """The elements of a scene in models of their own, advanced together; by the names of the elements."""
 
     def __init__(self, kind: Any, scene: Scene, settings: Any) -> None:
@@ -102,7 +102,7 @@ def build(kind: Any, scene: Scene, settings: Any) -> Any:
         Refused: the formulation does not provide what the scene requires, or cannot represent it.
     """
     if len(scene.elements) > 1:
-        return EachAlone(kind, scene, settings)
+        return IndependentElements(kind, scene, settings)
     require_provided(kind, settings.formulation, scene)
     return kind.build(scene.for_an_engine, settings)
 
@@ -112,7 +112,7 @@ def step_of(engine: Any, settings: Any) -> float | None:
 
     Beside an element that adapts its steps there may be one in a formulation that has a fixed one.
     """
-    steps = engine.steps if isinstance(engine, EachAlone) else [fixed_step(settings)]
+    steps = engine.steps if isinstance(engine, IndependentElements) else [fixed_step(settings)]
     return max((step for step in steps if step is not None), default=None)
 
 
@@ -177,5 +177,5 @@ def shaped(scene: Scene, sample: AnySample, t: float) -> AnySample:
 
 def events_of_engine(engine: Any, element: Element) -> Sequence[Event] | None:
     """Events located by the engine for an element (:class:`proofroll.core.engine_abilities.LocatesEvents`), or None."""
-    part = engine.parts[element.name] if isinstance(engine, EachAlone) else engine
+    part = engine.parts[element.name] if isinstance(engine, IndependentElements) else engine
     return list(part.events()) if isinstance(part, LocatesEvents) else None

@@ -30,7 +30,7 @@ _KNOWN = 10.0
 
 
 @once
-def held_against(evidence: Evidence) -> Iterator[Residuals[Change]]:
+def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     """The start by the certificate, if its accelerations differ; the run, if it does not balance as the truth.
 
     Nothing where the certificate names a number that was built otherwise: that is the cause.

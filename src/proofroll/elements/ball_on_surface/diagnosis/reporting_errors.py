@@ -198,7 +198,7 @@ def _attitudes(evidence: Evidence) -> FloatArray:
     return np.asarray(Rotation.from_matrix(turned).as_quat(scalar_first=True))
 
 
-SAID: tuple[Any, ...] = (
+REPORTING_ERRORS: tuple[Any, ...] = (
     CLOCK,
     starts_late,
     reported_vectors(_UNITS, _frames, CLOCK),

@@ -10,8 +10,8 @@ import pytest
 
 from proofroll.core.dataset import observe
 from proofroll.core.errors import Refused
+from proofroll.core.multi_element import formulation_for
 from proofroll.core.scene import Scene
-from proofroll.core.several import formulation_for
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 
