@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.numbers import Unit
+from proofroll.core.parameters import Unit
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 

@@ -1,4 +1,4 @@
-"""Numbers that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
+"""Parameters that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from simpleeval import InvalidExpression, SimpleEval
 
 from proofroll.core.errors import InputError, no_such_key
-from proofroll.core.numbers import Numbers
+from proofroll.core.parameters import Parameters
 from proofroll.elements.mechanism import checks
 
 TIME = "t"
@@ -128,7 +128,7 @@ def checked(field: str, given: Any) -> Signal:
     return given if isinstance(given, Formula | Table) else checks.number(field, given)
 
 
-def read_signal(field: str, given: Any, numbers: Numbers) -> Any:
+def read_signal(field: str, given: Any, numbers: Parameters) -> Any:
     """Signal of a file; a number or a formula without time stays what it is.
 
     Raises:
