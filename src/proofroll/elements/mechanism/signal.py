@@ -1,4 +1,4 @@
-"""Parameters that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
+"""Numbers that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
 
 from __future__ import annotations
 
