@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.plugins import parse_engine
 from proofroll.robots import defining, reading
 from proofroll.robots.against import reading_of
+from proofroll.robots.check import check
 from proofroll.robots.judging import judged
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
@@ -71,6 +72,8 @@ MESHED = '<geom type="mesh" mesh="t" mass="0.1" pos="0.1 0.2 0.3" euler="10 20 3
 RODS = '<geom class="k" type="capsule" size="0.05 0.2"/><geom type="box" size="0.1 0.2 0.3" pos="0 0.1 0" mass="2"/>'
 GROUPS = '<geom type="box" size=".1 .2 .3"/><geom type="box" size=".1 .2 .1" pos=".3 0 0" group="3"/>'
 HAND = f'<body name="b" pos="0.3 0 0" euler="20 30 40"><joint name="k2" axis="0 0.6 0.8"/>{_OWN.format(_SLIM)}</body>'
+BALL = 'type="sphere" size="0.05"'
+BOUNDED = held_by(f"{{}}{HAND}", outside='<compiler boundmass="0.01" boundinertia="1e-4"/>' + PLAIN_CLASS, inertial="")
 ARMED = """<mujoco model="m"><worldbody><body name="a" pos="0 0 1"><joint name="f" type="free" armature="0.1"/>
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/><body name="b" pos="0.4 0 0">
 <joint name="k" axis="0 1 0"/><geom type="box" size="0.1 0.2 0.1"/></body></body></worldbody></mujoco>"""
@@ -122,6 +125,15 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "mujoco", set()),
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "exudyn", set()),
     ("hidden shape", mjcf(shape=HIDDEN), "pinocchio", {"noncolliding_shapes_weightless"}),
+    (
+        "shapes that hit something and weigh nothing",
+        held_by(f'<geom {HIDDEN} {BALL}/><geom {BALL} density="0"/>{HAND}', outside=PLAIN_CLASS, inertial=""),
+        "pinocchio",
+        {"noncolliding_shapes_weightless"},
+    ),
+    ("bounds", BOUNDED.format(""), "pinocchio", {"bounds_ignored"}),
+    ("bounds", BOUNDED.format(f'<geom {BALL} mass="0.001"/>'), "pinocchio", {"bounds_ignored"}),
+    ("bounds", BOUNDED.format('<inertial pos="0 0 0" mass="0.001" diaginertia="1e-6 1e-6 1e-6"/>'), "pinocchio", set()),
     (
         "posed base",
         held_by("", outside=PLAIN_CLASS, root='pos="0 0 .3" quat="1 0 1 0"'),
@@ -264,6 +276,16 @@ def test_real_engines(
     assert row.status == ("explained" if expected else "holds")
     for cause in row.causes:
         assert cause.after < cause.before
+
+
+def test_round_off_of_what_cancels_is_no_difference(tmp_path: Path) -> None:
+    """Moments of a round body without mass that turns cancel in the file's reading; what is left accuses no engine."""
+    pytest.importorskip("pinocchio")
+    path = tmp_path / "ball.urdf"
+    link = '<inertial><mass value="0"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+    path.write_text(f'<robot name="r"><link name="a">{link}</link></robot>')
+    (row,) = check(path, ["pinocchio"], base="free").engines
+    assert row.status == "holds", row.layers
 
 
 def _defect(pattern: str, instead: str) -> Callable[[str], str]:

@@ -67,12 +67,15 @@ class RobotTruth:
         groups = self.robot.groups.values()
         mass = sum(group.mass for group in groups)
         floor = _FLOOR * mass * float(np.linalg.norm(self.robot.gravity) or 1.0)
+        inertia = float(np.abs(self.dynamics.M).max())
+        fastest = float(np.abs(self.states.stacked(self.states.velocity, self.robot)).max(initial=0.0))
+        turning = _FLOOR * inertia * fastest**2  # moments of a body that turns, which cancel where it is round
         sizes = {
             "mass": mass,
             "bodies": max((float(np.abs(group.inertia).max()) for group in groups), default=0.0),
-            "mass matrix": float(np.abs(self.dynamics.M).max()),
+            "mass matrix": inertia,
             "gravity": max(float(np.abs(self.dynamics.g).max()), floor),
-            "bias": max(float(np.abs(self.dynamics.h).max()), floor),
+            "bias": max(float(np.abs(self.dynamics.h).max()), floor, turning),
             "inverse dynamics": max(float(np.abs(self.inverse).max()), floor),
             "forward dynamics": max(float(np.abs(self.inverse + self.passive).max()), floor),
         }

@@ -23,6 +23,8 @@ from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
 
 _Part = TypeVar("_Part", RobotBody, RobotJoint)
+# The least mass and moment with which MuJoCo compiles a body that moves: it stands for none [kg], [kg m²].
+LEAST = 1e-14
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
@@ -68,7 +70,7 @@ class RobotEvidence:
         if not edit(root):
             return None
         before, after = self.recompiled(self.root), self.recompiled(root)
-        found = None if before is None or after is None else self.carried_over(before, after)
+        found = None if before is None or after is None else self.carried_over(before, with_weightless(after))
         return None if found is None else EditedRobot.of(found, root)
 
     def carried_over(self, before: Robot, after: Robot) -> Robot | None:
@@ -81,6 +83,13 @@ class RobotEvidence:
         if all(one is other for one, other in parts):
             return None
         return robot.with_bodies(bodies).change(joints=joints)
+
+
+def with_weightless(robot: Robot) -> Robot:
+    """The robot without the mass that only lets a body be compiled."""
+    none = np.zeros((3, 3))
+    light = (name for name, body in robot.bodies.items() if 0 < body.mass <= LEAST)
+    return robot.with_bodies(RobotBody(name, 0.0, np.zeros(3), none) for name in light)
 
 
 def _moved(part: _Part, before: _Part | None, after: _Part | None) -> _Part:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 from collections.abc import Callable, Iterator
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import LEAST, RobotEvidence, hypothesis, with_weightless
 from proofroll.robots.model import Array, Robot, RobotBody
 
 
@@ -63,6 +65,8 @@ def water_sphere(evidence: RobotEvidence) -> Robot | None:
     return _replaced(evidence, _sphere_of_water)
 
 
+_BOUNDS = ("boundmass", "boundinertia")  # attributes of <compiler>
+
 # As URDF importers of MuJoCo are commonly asked for, and as our option asks [kg], [kg m²].
 _MASS, _MOMENT = 1e-6, 1e-8
 
@@ -85,6 +89,28 @@ def mass_bounded(evidence: RobotEvidence) -> Robot | None:
             given = robot.sources.get(body.name, {}).get("inertial", True)
             small.append(_raised(body, body.com if given else joint.position))
     return robot.with_bodies(small) if small else None
+
+
+def bounded_from_below(root: Element, *, replace: bool) -> None:
+    """Lets bodies that nothing weighs be compiled, as weightless; ``replace`` the bounds of the file, or keep them."""
+    compilers = list(root.iter("compiler")) or [SubElement(root, "compiler")]
+    for name in _BOUNDS:
+        if replace or not any(float(compiler.get(name) or 0) for compiler in compilers):
+            for compiler in compilers:
+                compiler.set(name, str(LEAST))
+
+
+@hypothesis({"pinocchio": "4.1.0"}, "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML)")
+def bounds_ignored(evidence: RobotEvidence) -> Robot | None:
+    """Bounds on masses and inertias (boundmass, boundinertia) are ignored where a body has no <inertial>."""
+    root = copy.deepcopy(evidence.root)
+    bounded_from_below(root, replace=True)
+    before, lowered = evidence.recompiled(evidence.root), evidence.recompiled(root)
+    if before is None or lowered is None:
+        return None
+    given = {str(body.get("name")) for body in root.iter("body") if body.find("inertial") is not None}
+    bare = (body for name, body in lowered.bodies.items() if name not in given)
+    return evidence.carried_over(before, with_weightless(before.with_bodies(bare)))
 
 
 @hypothesis({"mujoco": "3.1.3 to 3.13.0"}, "update the engine, or write the inertia in the axes of the link with rpy 0")

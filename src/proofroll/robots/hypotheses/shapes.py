@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import math
 from collections.abc import Mapping
 from typing import Any
-from xml.etree.ElementTree import SubElement
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.hypotheses import EditedRobot, RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses.inertias import bounded_from_below
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 
 # Bullet's margin around shapes, also around none [m].
@@ -58,38 +58,29 @@ def inertia_from_collision(evidence: RobotEvidence) -> Robot | None:
     return robot.with_bodies(bodies) if bodies else None
 
 
-# A body must weigh something to be compiled; what it weighs is taken away again.
-_STAND_IN = {"pos": "0 0 0", "mass": "1", "diaginertia": "1 1 1"}
-
-
 @hypothesis(
     {"pinocchio": "4.1.0"},
     "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML) to get one",
 )
 def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
     """Shapes that collide with nothing (contype 0, conaffinity 0) give no mass."""
-    root = copy.deepcopy(evidence.root)
-    bare, touched = set(), False
-    for body in root.iter("body"):
-        name, shapes = str(body.get("name")), body.findall("geom")
-        collides = evidence.robot.sources.get(name, {}).get("collides", [])
-        if len(shapes) != len(collides) or all(collides):
-            continue
-        touched = True
-        for shape, hits in zip(shapes, collides, strict=True):
-            if not hits:
-                body.remove(shape)
-        if not any(collides) and body.find("inertial") is None:
-            SubElement(body, "inertial", _STAND_IN)
-            bare.add(name)
-    before = evidence.recompiled(evidence.root) if touched else None
-    compiled = evidence.recompiled(root) if touched else None
-    if before is None or compiled is None:
-        return None
-    nothing = np.zeros((3, 3))
-    lighter = (RobotBody(name, 0.0, np.zeros(3), nothing) for name in bare if name in compiled.bodies)
-    found = evidence.carried_over(before, compiled.with_bodies(lighter))
-    return None if found is None else EditedRobot.of(found, root)
+    sources = evidence.robot.sources
+
+    def edit(root: Element) -> bool:
+        touched = False
+        for body in root.iter("body"):
+            shapes = body.findall("geom")
+            collides = sources.get(str(body.get("name")), {}).get("collides", [])
+            if len(shapes) != len(collides) or all(collides):
+                continue
+            touched = True
+            for shape, hits in zip(shapes, collides, strict=True):
+                if not hits:
+                    body.remove(shape)
+        bounded_from_below(root, replace=False)
+        return touched
+
+    return evidence.edited(edit)
 
 
 _DENSITY = 1000.0
