@@ -1,13 +1,14 @@
-"""Rows of the holonomic constraints on dependent coordinates: every joint and loop cuts the bodies apart.
+"""Connections of a mechanism, and the rows of their holonomic constraints: every joint and loop cuts the bodies apart.
 
-The dependent velocities of a body are v of its centre of mass along the world's axes and ω along its own, so that the
-mass matrix is constant and a fast spin costs no digits. A connection of body a (point a, axes A) with body b (point b,
-axes B), d from point a to b, gives rows of two kinds:
+Poses and twists are matrices of four rows: a pose [R r; 0 1] takes a point of a body to the world, a twist [ω× v; 0 0]
+takes a point of the world to its velocity. A connection of body a (point a, axes A) with body b (point b, axes B), d
+from point a to b, gives rows of two kinds:
 
-* n·d = 0, two points do not separate along n: each direction of the world where all three are locked, else axes of A;
+* n·d = 0, two points do not separate along n, an axis of A;
 * x·y = 0, an axis x of A and an axis y of B stay perpendicular.
 
-Both have the form n·(v_b − v_a) + m_b·ω_b − m_a·ω_a, so that all rows are found at once from n, m_a and m_b.
+Their rates are n·e and t·w, with e the velocity of b relative to a at point b, w the relative angular velocity, and
+t = y × x. Both depend on the difference of two twists alone, and so do the null spaces of joints.
 """
 
 from __future__ import annotations
@@ -19,44 +20,120 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.checks import Vector
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.rotations import Array
 
+# Matrix of ω × from ω, its nine elements in a row; and back, from any matrix by its part that changes sign.
+SKEW = np.array([[0.0, 0, 0, 0, 0, -1, 0, 1, 0], [0.0, 0, 1, 0, 0, 0, -1, 0, 0], [0.0, -1, 0, 1, 0, 0, 0, 0, 0]])
+
 
 class Bodies(NamedTuple):
-    """Motion of the bodies' centres of mass, the world last: r, R, v, ω along the world's axes; (bodies + 1, …)."""
+    """Motion of the bodies' centres of mass, the world last, (bodies + 1, …).
 
-    r: Array
-    R: Array
-    v: Array
-    w: Array
+    Attributes:
+        pose, inverse: [R r; 0 1] and its inverse; r from :attr:`Bodies.origin`.
+        own: twist along the body's own axes, [ω× v; 0 0].
+        twist: along the world's axes, at the origin.
+        origin: place in the world from which places are measured here, so that digits are lost by none that is far.
+    """
+
+    pose: Array
+    inverse: Array
+    own: Array
+    twist: Array
+    origin: Array
+
+    @property
+    def rotation(self) -> Array:
+        """R without the world's, (bodies, 3, 3)."""
+        return self.pose[:-1, :3, :3]
+
+    @property
+    def spin(self) -> Array:
+        """ω along the world's axes, without the world's, (bodies, 3)."""
+        return np.asarray(0.5 * self.twist[:-1, :3, :3].reshape(-1, 9) @ SKEW.T)
 
 
 class Ends(NamedTuple):
-    """Connections now, world axes: arms from the centres of mass, d and its rate, axes A and B, (connections, …).
+    """Connections now, world axes, (connections, …).
 
-    ``turning_a`` and ``turning_b`` have axes and arm of an end as columns, then ω × them, then ω × (ω × them),
-    (3, connections, 3, 4).
+    Attributes:
+        A, B: axes as columns.
+        place: of point b, from the origin of :class:`Bodies`.
+        d: from point a to b.
+        relative: twist of b less that of a.
+        e: velocity of b relative to a at point b.
     """
 
-    arm_a: Array
-    arm_b: Array
-    d: Array
-    d_rate: Array
     A: Array
     B: Array
-    turning_a: Array
-    turning_b: Array
+    place: Array
+    d: Array
+    relative: Array
+    e: Array
 
 
 class ConnectionRows(NamedTuple):
-    """Φ (rows,), C of the dependent velocities (rows, 6 bodies), Ċ times them (rows,), n and x × y (rows, 3)."""
+    """Constraint rows, (rows, …).
+
+    Attributes:
+        residual, rate: Φ and Φ̇.
+        form: what takes the relative twist to Φ̇, (rows, 16).
+        force, torque: of a unit multiplier on body b at its point.
+        x, y: the axes of rows of angles; none of those of points, which are first.
+        twist: that of which the row is the rate 1 and other rows of the connection, where it is closed, 0; (rows, 16).
+    """
 
     residual: Array
-    C: Array
-    drift: Array
+    rate: Array
+    form: Array
     force: Array
     torque: Array
+    x: Array
+    y: Array
+    twist: Array
+
+
+class ProjectedConnections:
+    """All joints, then all loops, of a mechanism.
+
+    Attributes:
+        a, b: index of the bodies of each connection; the world is the last body.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        count, index = len(mechanism.bodies), mechanism.body_index
+        com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
+        self._kinds = [item.kind for item in mechanism.connections]
+        cut = mechanism.connections
+        self.a = np.array([index[item.a] % (count + 1) for item in cut], dtype=np.intp)
+        self.b = np.array([index[item.b] % (count + 1) for item in cut], dtype=np.intp)
+        self.at_a = _frames([item.frame_a for item in cut], [item.position_a for item in cut], com[self.a])
+        self.at_b = _frames([item.frame_b for item in cut], [item.position_b for item in cut], com[self.b])
+
+    def ends(self, bodies: Bodies, chosen: slice = slice(None)) -> Ends:
+        """Positions, orientations and relative motion of the connections' ends."""
+        a, b = self.a[chosen], self.b[chosen]
+        of_a, of_b = bodies.pose[a] @ self.at_a[chosen], bodies.pose[b] @ self.at_b[chosen]
+        relative, place = bodies.twist[b] - bodies.twist[a], of_b[:, :, 3:]
+        e = (relative @ place)[:, :3, 0]
+        return Ends(of_a[:, :3, :3], of_b[:, :3, :3], place[:, :3, 0], of_b[:, :3, 3] - of_a[:, :3, 3], relative, e)
+
+    def constraints(self, chosen: slice = slice(None)) -> Constraints:
+        """The rows of some connections."""
+        return Constraints(self._kinds[chosen])
+
+    def on_bodies(self, bodies: Bodies, ends: Ends, rows: ConnectionRows, owner: NDArray[np.intp]) -> Array:
+        """Rows on the velocities (v, ω along their own axes) of all bodies, shape (rows, 6 bodies)."""
+        number, count = np.arange(len(owner)), len(bodies.pose)
+        C, place = np.zeros((len(owner), count, 6)), ends.place[owner]
+        for body, sign in ((self.a[owner], -1.0), (self.b[owner], 1.0)):
+            pose = bodies.pose[body]
+            moment = cross(place - pose[:, :3, 3], rows.force) + rows.torque
+            C[number, body, :3] += sign * rows.force
+            C[number, body, 3:] += sign * turned(pose[:, :3, :3].swapaxes(1, 2), moment)
+        return C[:, :-1].reshape(len(owner), 6 * (count - 1))
 
 
 def turned(R: Array, a: Array) -> Array:
@@ -65,78 +142,56 @@ def turned(R: Array, a: Array) -> Array:
     return found
 
 
-# Matrix of ω × from ω, its nine elements in a row.
-_SKEW = np.array([[0.0, 0, 0, 0, 0, -1, 0, 1, 0], [0.0, 0, 1, 0, 0, 0, -1, 0, 0], [0.0, -1, 0, 1, 0, 0, 0, 0, 0]])
-
-
-class ProjectedConnections:
-    """All joints, then all loops, of a mechanism.
+class Constraints:
+    """Rows of connections of some kinds: those of points, then those of angles.
 
     Attributes:
-        a, b: index of the bodies of each connection; the world is the last body.
         owner: the connection of each row.
+        points: the number of rows of points.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        count, index = len(mechanism.bodies), mechanism.body_index
-        self._count = count
-        com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
-        cut = mechanism.connections
-        self.a = np.array([index[item.a] % (count + 1) for item in cut], dtype=np.intp)
-        self.b = np.array([index[item.b] % (count + 1) for item in cut], dtype=np.intp)
-        at_a = np.array([item.position_a for item in cut]) - com[self.a]
-        at_b = np.array([item.position_b for item in cut]) - com[self.b]
-        self._at_a = np.concatenate([np.array([item.frame_a for item in cut]), at_a[:, :, None]], axis=2)
-        self._at_b = np.concatenate([np.array([item.frame_b for item in cut]), at_b[:, :, None]], axis=2)
-        points = [(number, k) for number, item in enumerate(cut) for k in FACTS[item.kind].translations]
-        angles = [(number, *pair) for number, item in enumerate(cut) for pair in FACTS[item.kind].rotations]
+    def __init__(self, kinds: list[str]) -> None:
+        points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
+        angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
         self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
         self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
-        locked = np.array([len(FACTS[item.kind].translations) for item in cut], dtype=np.intp)
-        # whether a row's direction moves with body a
-        self._moves = (locked[self._point] < 3)[:, None]
-        self._moving, self._fixed = self._moves.astype(float), np.eye(3)[self._axis]
-        self.owner = np.concatenate([self._point, self._angle])
+        self.owner, self.points = np.concatenate([self._point, self._angle]), len(points)
+        self._sums = (self.owner == np.arange(len(kinds))[:, None]).astype(float)
 
-    def ends(self, bodies: Bodies) -> Ends:
-        """Positions and orientations of the connections' ends."""
-        (r, R, v, w), a, b = bodies, self.a, self.b
-        turning = np.empty((3, *R.shape))
-        spin = (w @ _SKEW).reshape(R.shape)
-        turning[0] = R
-        np.matmul(spin, R, out=turning[1])
-        np.matmul(spin, turning[1], out=turning[2])
-        of_a, of_b = turning[:, a] @ self._at_a, turning[:, b] @ self._at_b
-        arm_a, arm_b = of_a[0, :, :, 3], of_b[0, :, :, 3]
-        d = r[b] + arm_b - r[a] - arm_a
-        d_rate = v[b] + of_b[1, :, :, 3] - v[a] - of_a[1, :, :, 3]
-        return Ends(arm_a, arm_b, d, d_rate, of_a[0, :, :, :3], of_b[0, :, :, :3], of_a, of_b)
+    def at(self, ends: Ends) -> ConnectionRows:
+        """The rows now."""
+        i, j, points = self._point, self._angle, self.points
+        n, x, y = ends.A[i, :, self._axis], ends.A[j, :, self._x], ends.B[j, :, self._y]
+        t = cross(y, x)
+        force, torque = np.zeros((2, len(self.owner), 3), dtype=n.dtype)
+        force[:points], torque[points:] = n, t
+        residual = np.concatenate([n * ends.d[i], x * y]).sum(1)
+        form = np.zeros((len(self.owner), 4, 4), dtype=n.dtype)
+        form[:points, :3, :3] = n[:, :, None] * ends.place[i][:, None, :]
+        form[:points, :3, 3] = n
+        form[points:, :3, :3] = (0.5 * t @ SKEW).reshape(-1, 3, 3)
+        twist = np.zeros_like(form)
+        twist[:points, :3, 3], twist[points:, :3, :3] = n, 2 * form[points:, :3, :3]
+        twist[points:, :3, 3] = -turned(twist[points:, :3, :3], ends.place[j])
+        rate = (form * ends.relative[self.owner]).sum((1, 2))
+        return ConnectionRows(residual, rate, form.reshape(-1, 16), force, torque, x, y, twist.reshape(-1, 16))
 
-    def rows(self, bodies: Bodies, ends: Ends) -> ConnectionRows:
-        """The rows of all connections: those of points, then those of angles."""
-        i, moving = self._point, self._moving
-        d, bent = ends.d[i], ends.turning_b[2, i, :, 3] - ends.turning_a[2, i, :, 3]
-        along, along_rate, along_bent = ends.turning_a[:, i, :, self._axis].swapaxes(0, 1)
-        n = np.where(self._moves, along, self._fixed)
-        bending = n * bent + moving * (2 * along_rate * ends.d_rate[i] + along_bent * d)
-        j = self._angle
-        x, x_rate, x_bent = ends.turning_a[:, j, :, self._x].swapaxes(0, 1)
-        y, y_rate, y_bent = ends.turning_b[:, j, :, self._y].swapaxes(0, 1)
-        turning = x_bent * y + 2 * x_rate * y_rate + x * y_bent
-        arms = np.concatenate([y, ends.arm_b[i], ends.arm_a[i] + moving * d])
-        moments = cross(arms, np.concatenate([x, n, n]))
-        t, m_b, m_a = np.split(moments, [len(x), len(x) + len(n)])
-        none = np.zeros_like(t)
-        force, torque = np.concatenate([n, none]), np.concatenate([np.zeros_like(n), t])
-        residual = np.concatenate([n * d, x * y]).sum(1)
-        drift = np.concatenate([bending, turning]).sum(1)
-        C = self.spread(bodies, self.owner, force, np.concatenate([m_a, t]), np.concatenate([m_b, t]))
-        return ConnectionRows(residual, C, drift, force, torque)
+    def bending(self, ends: Ends, rows: ConnectionRows) -> Array:
+        """Φ̈ of a motion in which each relative twist stands still in body a."""
+        points = self.points
+        w = (ends.relative[:, :3, :3].reshape(-1, 9) @ SKEW.T) / 2
+        turning = w[self._angle]
+        of_points = (rows.force[:points] * cross(w, ends.e)[self._point]).sum(1)
+        wx, wy = (turning * rows.x).sum(1), (turning * rows.y).sum(1)
+        return np.concatenate([of_points, wx * wy - (turning * turning).sum(1) * rows.residual[points:]])
 
-    def spread(self, bodies: Bodies, connection: NDArray[np.intp], n: Array, m_a: Array, m_b: Array) -> Array:
-        """n·(v_b − v_a) + m_b·ω_b − m_a·ω_a on the dependent velocities of all bodies, shape (rows, 6 bodies)."""
-        rows, a, b = np.arange(len(n)), self.a[connection], self.b[connection]
-        C = np.zeros((len(n), self._count + 1, 6))
-        C[rows, b] = np.concatenate([n, np.matmul(m_b[:, None, :], bodies.R[b])[:, 0]], axis=1)
-        C[rows, a] = -np.concatenate([n, np.matmul(m_a[:, None, :], bodies.R[a])[:, 0]], axis=1)
-        return C[:, : self._count].reshape(len(n), 6 * self._count)
+    def twists(self, rows: ConnectionRows, rates: Array) -> Array:
+        """Relative twists of the connections that give the rows these rates (…, rows), (…, connections, 16)."""
+        return np.asarray(self._sums @ (rows.twist * rates[..., None]))
+
+
+def _frames(axes: list[Array], places: list[Vector], com: Array) -> Array:
+    """Poses of ends in the axes of their bodies, from the centres of mass."""
+    found = np.zeros((len(axes), 4, 4))
+    found[:, :3, :3], found[:, :3, 3], found[:, 3, 3] = np.array(axes), np.array(places) - com, 1.0
+    return found

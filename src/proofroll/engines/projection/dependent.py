@@ -2,9 +2,12 @@
 
 With M u̇ = h + Cᵀλ and C u̇ = −γ, the velocities u of the bodies are split by the constraints into two subspaces that
 are orthogonal in the metric of M: the constrained one, spanned by M⁻¹Cᵀ, in which the constraints alone decide, and the
-one tangent to them, spanned by D with C D = 0, in which the applied forces alone decide. Projection on the first gives
-the reactions, on the second the motion. The singular vectors of C M^(-1/2) span both, whether rows are redundant or
-not; the number of independent ones is found at the start and kept.
+one tangent to them, spanned by D with C D = 0, in which the applied forces alone decide. Projection on the second,
+DᵀM D ν̇ = Dᵀ(h − M u̇₀) with any u̇₀ that obeys the constraints, gives the motion; what is left, M u̇ − h, lies in the
+first and gives the reactions, joint by joint from the tips of the tree.
+
+D comes from elimination along the tree (see :mod:`proofroll.engines.projection.elimination`); loops are projected once
+more, in the velocities ν. The number of their independent rows is found at the start and kept.
 
 Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, for the projections; W. Blajer, Multibody
 Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
@@ -12,7 +15,8 @@ Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,17 +25,26 @@ from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.projection.applied import Applied
-from proofroll.engines.projection.connections import Bodies, ConnectionRows, Ends, ProjectedConnections
+from proofroll.engines.projection.connections import SKEW, Bodies, ConnectionRows, ProjectedConnections
+from proofroll.engines.projection.elimination import Elimination, Loads, LoopSplit, Space
 
 
 class SolvedState(NamedTuple):
-    """Accelerations u̇ and multipliers, with what they were found from."""
+    """Accelerations of the bodies, with what they were found from.
 
-    acceleration: Array
-    multipliers: Array
+    Attributes:
+        bodies: motion.
+        linear: of the centres of mass, world axes, (bodies, 3).
+        angular: along the bodies' own axes, (bodies, 3).
+        forces: that the bodies need besides their weight, matrices as in :meth:`Elimination.forces`.
+        multipliers: of the rows of loops.
+    """
+
     bodies: Bodies
-    ends: Ends
-    rows: ConnectionRows
+    linear: Array
+    angular: Array
+    forces: Array
+    multipliers: Array
 
 
 class DependentCoordinates:
@@ -41,24 +54,34 @@ class DependentCoordinates:
         mass, inertia: of the bodies, about their centres of mass and along their axes.
         com: in their frames.
         rank: number of independent rows.
+        gravity: acceleration of it.
         start: the state at time 0.
+        regularity: of the rows of loops where the equations were solved last: the least singular value that counts
+            over the largest; 1 without loops.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, elimination: type[Elimination] = Elimination) -> None:
         self.mass = np.array([body.mass for body in mechanism.bodies])
         self.inertia = np.array([body.inertia for body in mechanism.bodies])
         self.com = np.array([body.com for body in mechanism.bodies])
-        self._count = n = len(self.mass)
-        self.connections = ProjectedConnections(mechanism)
-        self.applied = Applied(mechanism, self.connections)
-        # M^(-1/2), block by block: it is constant, since ω is along the bodies' own axes
-        self._root = np.zeros((6 * n, 6 * n))
-        for i in range(n):
-            at = slice(6 * i, 6 * i + 3), slice(6 * i + 3, 6 * i + 6)
-            self._root[at[0], at[0]] = np.eye(3) / np.sqrt(self.mass[i])
-            self._root[at[1], at[1]] = np.linalg.inv(np.linalg.cholesky(self.inertia[i])).T
+        self._count, self._joints = len(self.mass), len(mechanism.joints)
+        self.connections = connections = ProjectedConnections(mechanism)
+        self.tree = elimination(mechanism, connections)
+        self.applied = Applied(mechanism)
+        self._loops_at = slice(self._joints, None)
+        self._joint_rows = connections.constraints(slice(0, self._joints))
+        self._loop_rows = connections.constraints(self._loops_at)
+        ends = np.stack([connections.a, connections.b])[:, self._loops_at]
+        self._loop_a, self._loop_b = ends[:, self._loop_rows.owner]
+        self._between = self.tree.moves[self._loop_b] - self.tree.moves[self._loop_a]
+        # of other joints the axes stand still in one of the two bodies
+        self._bent = any(joint.kind == "universal" for joint in mechanism.joints)
+        self.gravity = np.array(mechanism.gravity)
+        self.regularity = 1.0
+        self._mean = np.full(self._count, 1.0 / self._count)
         self.start = self._start(mechanism)
-        self.rank = independent_anywhere(self.start, self._residual_and_rows, self._moved)
+        self._locked = _rank_of_loops(mechanism)
+        self.rank = 6 * self._count - mechanism.nv + self._locked
 
     def _start(self, mechanism: Mechanism) -> Array:
         motion = Tree(mechanism).at(*mechanism.start())
@@ -83,58 +106,113 @@ class DependentCoordinates:
         """Motion of the bodies, and of the world."""
         n = self._count
         r, q, v, w = self.parts(x)
-        R = np.empty((n + 1, 3, 3))
-        R[:n], R[n] = rotations(q), np.eye(3)
-        padded = np.zeros((3, n + 1, 3))
-        padded[0, :n], padded[1, :n] = r, v
-        padded[2, :n] = np.matmul(R[:n], w[:, :, None])[:, :, 0]
-        return Bodies(padded[0], R, padded[1], padded[2])
-
-    def _residual_and_rows(self, x: Array) -> tuple[Array, Array]:
-        bodies = self.bodies(x)
-        rows = self.connections.rows(bodies, self.connections.ends(bodies))
-        return rows.residual, rows.C
+        origin, R = self._mean @ r, rotations(q)
+        back = R.swapaxes(1, 2)
+        pose, inverse, own = np.zeros((3, n + 1, 4, 4), dtype=x.dtype)
+        pose[:n, :3, :3], pose[:n, :3, 3], pose[n, :3, :3], pose[n, :3, 3] = R, r - origin, np.eye(3), -origin
+        pose[:, 3, 3] = inverse[:, 3, 3] = 1.0
+        inverse[:, :3, :3] = pose[:, :3, :3].swapaxes(1, 2)
+        inverse[:, :3, 3:] = -inverse[:, :3, :3] @ pose[:, :3, 3:]
+        own[:n, :3, :3] = (w @ SKEW).reshape(n, 3, 3)
+        own[:n, :3, 3:] = back @ v[:, :, None]
+        return Bodies(pose, inverse, own, pose @ own @ inverse, origin)
 
     def solve(self, x: Array) -> SolvedState:
         """Projections of the equations of motion at a state."""
-        bodies = self.bodies(x)
-        ends = self.connections.ends(bodies)
-        rows = self.connections.rows(bodies, ends)
-        free = self._root.T @ self.applied(bodies, self.parts(x)[3], ends)
-        if not self.rank:
-            return SolvedState(self._root @ free, np.zeros(len(rows.C)), bodies, ends, rows)
-        locked, back = self._split(rows.C)
-        normal = -back @ rows.drift - locked @ free  # what the constraints change in their own subspace
-        return SolvedState(self._root @ (free + locked.T @ normal), back.T @ normal, bodies, ends, rows)
+        bodies, joints = self.bodies(x), self._joints
+        pose, inverse, own = bodies.pose[:-1], bodies.inverse[:-1], bodies.own[:-1]
+        bent = own @ own
+        bent[:, :3, 3:] -= inverse[:, :3, :3] @ self.gravity[:, None]
+        of_a, of_b = bodies.twist[self.connections.a], bodies.twist[self.connections.b]
+        # rates of relative twists that stand still in body a
+        still = (of_a @ of_b - of_b @ of_a).reshape(-1, 16)
+        relative, loads, closing = still[:joints], Loads(bent), None
+        if self._bent or self.applied.laws:
+            ends = self.connections.ends(bodies, slice(0, joints))
+            if self._bent:
+                rows = self._joint_rows.at(ends)
+                relative = relative - self._joint_rows.twists(rows, self._joint_rows.bending(ends, rows))
+            if self.applied.laws:
+                loads = loads._replace(drives=self.tree.of_joints(bodies, *self.applied.of_joints(ends)))
+        if self.applied.springs:
+            loads = loads._replace(pulls=self.applied.pulls(bodies))
+        if self._locked:
+            ends = self.connections.ends(bodies, self._loops_at)
+            rows = self._loop_rows.at(ends)
+            drift = self._loop_rows.bending(ends, rows)
+            drift -= (rows.form * still[joints:][self._loop_rows.owner]).sum(1)
+            closing = partial(self._closed, rows, -drift)
+        found, multipliers = self.tree.motions(bodies, relative, loads, closing)
+        rates = inverse @ found[:-1] @ pose
+        linear = (pose @ (rates + bent))[:, :3, 3] + self.gravity
+        angular = 0.5 * rates[:, :3, :3].reshape(-1, 9) @ SKEW.T
+        return SolvedState(bodies, linear, angular, rates + bent, multipliers)
 
-    def _split(self, C: Array) -> tuple[Array, Array]:
-        """Unit vectors of the constrained subspace, (rank, 6 bodies), and what takes values of rows to them."""
-        from scipy.linalg.lapack import dgesdd  # here: whoever runs a ball need not wait for it
-
-        U, S, Vt, failed = dgesdd(C @ self._root, full_matrices=0)
-        if failed:
-            raise np.linalg.LinAlgError("the singular values were not found")
-        r = self.rank
-        return Vt[:r], U[:, :r].T / S[:r, None]
+    def _closed(self, rows: ConnectionRows, wanted: Array, space: Space, given: Array, push: Array) -> Any:
+        """Velocities (…, nv) and multipliers by which the rows of loops have the rates that are wanted, (…, rows)."""
+        flat = given.reshape(*given.shape[:-2], 16)
+        of_given = (rows.form * (flat[..., self._loop_b, :] - flat[..., self._loop_a, :])).sum(-1)
+        split = LoopSplit(space.H, rows.form @ space.S.T * self._between, self._locked)
+        self.regularity = split.least
+        velocities, multipliers = split(push.T, (wanted - of_given).T)
+        return velocities.T, multipliers.T
 
     def rates(self, x: Array) -> Array:
         """ẋ."""
         _, q, v, w = self.parts(x)
-        acceleration = self.solve(x).acceleration.reshape(self._count, 6)
-        return _joined(v, quaternion_rates(q, w), acceleration[:, :3], acceleration[:, 3:])
+        found = self.solve(x)
+        return _joined(v, quaternion_rates(q, w), found.linear, found.angular)
 
     def eliminated(self, x: Array) -> Array:
         """The state with its violations taken away within the constrained subspace; quaternions of unit length."""
         x = self._with_unit_quaternions(x)
         if not self.rank:
             return x
-        residual, C = self._residual_and_rows(x)
-        locked, back = self._split(C)
-        into = self._root @ locked.T
+        bodies, closing = self.bodies(x), None
+        rows = self._joint_rows.at(self.connections.ends(bodies, slice(0, self._joints)))
+        # of places and of velocities: motions that take the violations away, then these without what D allows
+        relative = -self._joint_rows.twists(rows, np.stack([rows.residual, rows.rate]))
+        if self._locked:
+            rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
+            closing = partial(self._closed, rows, -np.stack([rows.residual, rows.rate]))
+        motion = self.tree.motions(bodies, relative, Loads(), closing)[0][:, :-1]
+        pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
+        linear = (motion @ pose[:, :, 3:])[:, :, :3, 0]
+        angular = 0.5 * (inverse @ motion @ pose)[:, :, :3, :3].reshape(2, -1, 9) @ SKEW.T
         r, q, v, w = self.parts(x)
-        u = np.concatenate([v, w], axis=1).ravel()
-        u = (u - into @ (back @ (C @ u))).reshape(self._count, 6)
-        return self._moved(_joined(r, q, u[:, :3], u[:, 3:]), -into @ (back @ residual))
+        v += linear[1]
+        w += angular[1]
+        q += quaternion_rates(q, angular[0])
+        r += linear[0]
+        return self._with_unit_quaternions(x)
+
+    def reactions(self, solved: SolvedState) -> tuple[Array, Array]:
+        """Forces and moments on the child of each joint, and on body b of each loop, at their points, world axes."""
+        bodies = solved.bodies
+        forces = self.tree.forces(bodies, solved.forces)
+        if self.applied.springs:
+            forces -= self.applied.pulls(bodies)
+        ends = self.connections.ends(bodies)
+        force, torque = np.zeros((2, len(ends.d), 3))
+        if self._locked:
+            rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
+            np.add.at(force, self._joints + self._loop_rows.owner, solved.multipliers[:, None] * rows.force)
+            np.add.at(torque, self._joints + self._loop_rows.owner, solved.multipliers[:, None] * rows.torque)
+            pulls = np.zeros((len(bodies.pose), 4, 4))
+            on_b = (solved.multipliers[:, None] * rows.form).reshape(-1, 4, 4)
+            np.add.at(pulls, self._loop_b, on_b)
+            np.add.at(pulls, self._loop_a, -on_b)
+            forces -= pulls[:-1]
+        total = (self.tree.behind @ forces.reshape(-1, 16)).reshape(-1, 4, 4)
+        at = slice(0, self._joints)
+        force[at] = total[:, :3, 3]
+        torque[at] = total[:, :3, :3].reshape(-1, 9) @ SKEW.T - cross(ends.place[at], force[at])
+        return force, torque
+
+    def constraint_rows(self, bodies: Bodies) -> Array:
+        """Rows of all connections on the velocities of the bodies, (rows, 6 bodies)."""
+        ends, every = self.connections.ends(bodies), self.connections.constraints()
+        return self.connections.on_bodies(bodies, ends, every.at(ends), every.owner)
 
     def accept(self, x: Array) -> None:
         """Tells the forces that the motion goes on from a state."""
@@ -144,16 +222,20 @@ class DependentCoordinates:
     def _with_unit_quaternions(self, x: Array) -> Array:
         x = x.copy()
         q = self.parts(x)[1]
-        q /= np.sqrt((q * q).sum(1))[:, None]
+        q /= ((q * q).sum(1) ** 0.5)[:, None]
         return x
 
-    def _moved(self, x: Array, step: Array) -> Array:
-        """The state after a small motion of the bodies, to first order."""
-        x, step = x.copy(), step.reshape(self._count, 6)
-        r, q, _, _ = self.parts(x)
-        q += quaternion_rates(q, step[:, 3:])
-        r += step[:, :3]
-        return self._with_unit_quaternions(x)
+
+def _rank_of_loops(mechanism: Mechanism) -> int:
+    if not mechanism.loops:
+        return 0
+    tree, (q, v) = Tree(mechanism), mechanism.start()
+
+    def of_loops(q: Array) -> tuple[Array, Array]:
+        rows = tree.loop_rows(tree.at(q, 0.0 * v))
+        return rows.residual, rows.C
+
+    return independent_anywhere(q, of_loops, tree.moved)
 
 
 def _joined(*parts: Array) -> Array:

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FOR
 from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, independent, mechanism_of
-from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
+from proofroll.engines.projection.dependent import DependentCoordinates
 from proofroll.engines.projection.settings import ProjectionSettings
 
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
@@ -23,6 +23,9 @@ LACKING: Mapping[str, str] = {
     MechanismCapability.JOINT_FRICTION: "these equations have no law that switches",
     MechanismCapability.ARMATURE: "the mass matrix of dependent coordinates is that of the bodies alone",
 }
+# Regularity of the loops' rows over the largest on the way: accelerations lose as many digits as it has zeros. Loops
+# that pass a singular pose by a hundredth of a radian have some hundredth.
+SINGULAR = 1e-6
 
 
 class ProjectionMechanism:
@@ -37,7 +40,7 @@ class ProjectionMechanism:
                     f"{body.name} has no mass or no moment of inertia about an axis; here each body needs both"
                 )
         self._mechanism, self._equations = mechanism, DependentCoordinates(mechanism)
-        self._eliminates = settings.eliminates
+        self._eliminates, self._most_regular = settings.eliminates, 0.0
         start = self._equations.start
         resolution = float(getattr(settings, settings.resolution))
         integrator = INTEGRATORS[settings.integrator]
@@ -49,6 +52,9 @@ class ProjectionMechanism:
         if self._eliminates:
             x = self._equations.eliminated(x)
         self._equations.accept(x)
+        if self._equations.regularity < SINGULAR * self._most_regular:
+            raise Stalled(f"a singular pose at t = {t:.6g} s, where the rows of loops become dependent")
+        self._most_regular = max(self._most_regular, self._equations.regularity)
         return x
 
     def advance(self, t: float) -> None:
@@ -62,39 +68,33 @@ class ProjectionMechanism:
         except Stalled as error:
             raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
-    def _solved(self) -> tuple[SolvedState, Array, Array, Array]:
-        """The equations now; of the bodies rotation, angular velocity, and centre of mass from their origins."""
-        answer = self._equations.solve(self._motion.x)
-        R = answer.bodies.R[:-1]
-        return answer, R, answer.bodies.w[:-1], np.einsum("nij,nj->ni", R, self._equations.com)
-
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._motion.x
-        answer, R, w, arm = self._solved()
-        bodies, count = answer.bodies, len(R)
-        force, torque = equations.applied.of_joints(bodies, answer.ends)
-        np.add.at(force, equations.connections.owner, answer.multipliers[:, None] * answer.rows.force)
-        np.add.at(torque, equations.connections.owner, answer.multipliers[:, None] * answer.rows.torque)
-        q = equations.parts(x)[1]
+        solved = equations.solve(x)
+        force, torque = equations.reactions(solved)
+        r, q, v, _ = equations.parts(x)
+        R, w = solved.bodies.rotation, solved.bodies.spin
+        arm = np.einsum("nij,nj->ni", R, equations.com)
         return MechanismSample(
-            p_WB=bodies.r[:count] - arm,
-            v_WB=bodies.v[:count] - cross(w, arm),
-            w_WB=w.copy(),
+            p_WB=r - arm,
+            v_WB=v - cross(w, arm),
+            w_WB=w,
             q_WB=q / np.linalg.norm(q, axis=1, keepdims=True),
             joint_force=force,
             joint_torque=torque,
         )
 
     def built(self) -> MechanismBuilt:
-        """See :class:`proofroll.core.engine.Engine`; gravity from the forces on the bodies at rest."""
+        """See :class:`proofroll.core.engine.Engine`."""
         equations = self._equations
-        answer, R, w, arm = self._solved()
-        bodies, count = answer.bodies, len(R)
-        of_com = answer.acceleration.reshape(count, 6)
-        turning = np.einsum("nij,nj->ni", R, of_com[:, 3:])
-        joints = len(self._mechanism.joints)
-        ends, rank = answer.ends, independent(answer.rows.C)
+        solved = equations.solve(self._motion.x)
+        bodies, count, joints = solved.bodies, len(equations.mass), len(self._mechanism.joints)
+        R, w = bodies.rotation, bodies.spin
+        arm = np.einsum("nij,nj->ni", R, equations.com)
+        turning = np.einsum("nij,nj->ni", R, solved.angular)
+        ends, rows = equations.connections.ends(bodies), equations.constraint_rows(bodies)
+        rank = independent(rows)
         axes = np.full((joints, 3), np.nan)
         for number, joint in enumerate(self._mechanism.joints):
             if joint.kind in WITH_AXIS:
@@ -103,12 +103,12 @@ class ProjectionMechanism:
             mass=equations.mass.copy(),
             com=equations.com.copy(),
             inertia=equations.inertia.copy(),
-            joint_position=(bodies.r[equations.connections.b] + ends.arm_b)[:joints],
+            joint_position=(ends.place + bodies.origin)[:joints],
             joint_axis=axes,
-            gravity=equations.applied.gravity,
-            rows=len(answer.rows.C),
+            gravity=equations.gravity.copy(),
+            rows=len(rows),
             rank=rank,
             mobility=6 * count - rank,
-            acceleration=of_com[:, :3] - cross(turning, arm) - cross(w, cross(w, arm)),
+            acceleration=solved.linear - cross(turning, arm) - cross(w, cross(w, arm)),
             angular_acceleration=turning,
         )

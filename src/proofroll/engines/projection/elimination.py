@@ -1,0 +1,208 @@
+"""Null space of the constraints, found by elimination along the tree of joints, and within it that of the loops.
+
+A joint fixes the twist of its child but for a few directions S of its own, so velocities ν along these give the twists
+of all bodies: V = Σ S ν over the joints between a body and the world. That is the null space D of the joints' rows, and
+DᵀMD needs no more than sums over the bodies behind each joint: with a body's inertia matrix Σ, the integral of p pᵀ
+over its mass, p = [place; 1], its element (k, l) is ⟨S_k, S_l Σ_l⟩, where Σ_l sums what is behind l. Rows of loops act
+on differences of two twists, and are few: their singular vectors in the metric of DᵀMD take dependent rows as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.engines.projection.connections import SKEW, Bodies, ProjectedConnections
+
+# Of each velocity of a kind of joint: whether it turns; the axis of the frame on its carrier; whether that is body b.
+_TURN_B, _SLIDE_A = [(True, k, True) for k in range(3)], [(False, k, False) for k in range(3)]
+DIRECTIONS: dict[str, list[tuple[bool, int, bool]]] = {
+    "fixed": [],
+    "revolute": [_TURN_B[2]],
+    "prismatic": [_SLIDE_A[2]],
+    "universal": [(True, 2, False), _TURN_B[0]],
+    "spherical": _TURN_B,
+    "planar": [*_SLIDE_A[:2], _TURN_B[2]],
+    "free": [*_SLIDE_A, *_TURN_B],
+}
+
+
+class Space(NamedTuple):
+    """Null space of the joints at a state, and the mass matrix in it.
+
+    Attributes:
+        S: twists of unit velocities, (nv, 16).
+        H: DᵀMD, upper triangle, (nv, nv).
+    """
+
+    S: Array
+    H: Array
+
+
+class Loads(NamedTuple):
+    """Forces on the bodies, and what acts like some.
+
+    Attributes:
+        bent: accelerations of the bodies at rest of their twists' rates, less gravity, (bodies, 4, 4).
+        pulls: forces on them, as matrices, (bodies, 4, 4).
+        drives: forces along the joints' velocities, (nv,).
+    """
+
+    bent: Array | float = 0.0
+    pulls: Array | float = 0.0
+    drives: Array | float = 0.0
+
+
+# Velocities (…, nv) and multipliers from the null space, given twists and forces along the velocities (…, nv).
+Closing = Callable[[Space, Array, Array], tuple[Array, Array]]
+
+
+class Elimination:
+    """The tree of a mechanism.
+
+    Attributes:
+        behind: 1 where a body is carried by a joint, (joints, bodies).
+        joint: the joint of each velocity; ``turns`` whether it turns its child.
+    """
+
+    def __init__(self, mechanism: Mechanism, connections: ProjectedConnections) -> None:
+        joints, n = mechanism.joints, len(mechanism.bodies)
+        self.behind = np.zeros((len(joints), n))
+        child = {int(body): number for number, body in enumerate(connections.b[: len(joints)])}
+        for body in range(n):
+            above = child.get(body)
+            while above is not None:
+                self.behind[above, body] = 1.0
+                above = child.get(int(connections.a[above]))
+        ways = [(number, *way) for number, joint in enumerate(joints) for way in DIRECTIONS[joint.kind]]
+        self.joint = np.array([way[0] for way in ways], dtype=np.intp)
+        self.turns = np.array([way[1] for way in ways], dtype=bool)
+        self._own = np.zeros((len(ways), 4, 4))
+        carriers = []
+        for own, (number, turns, axis, by_child) in zip(self._own, ways, strict=True):
+            ends = connections.at_b if by_child else connections.at_a
+            carriers.append(int((connections.b if by_child else connections.a)[number]))
+            direction, place = ends[number, :3, axis], ends[number, :3, 3]
+            if turns:
+                own[:3, :3] = (direction @ SKEW).reshape(3, 3)
+                own[:3, 3] = -own[:3, :3] @ place
+            else:
+                own[:3, 3] = direction
+        self._carrier = np.array(carriers, dtype=np.intp)
+        # bodies behind each velocity, and velocities before each body; the world moves with none
+        self._sums = self.behind[self.joint]
+        self.moves = np.vstack([self._sums.T, np.zeros(len(ways))])
+        self._steps = np.vstack([self.behind.T, np.zeros(len(joints))])
+        related = np.array([[self.behind[k, connections.b[m]] for m in self.joint] for k in self.joint])
+        self._related = np.triu(related.reshape(len(ways), len(ways)))
+        self._inertia = np.zeros((n, 4, 4))
+        for sigma, solid in zip(self._inertia, mechanism.bodies, strict=True):
+            sigma[:3, :3] = 0.5 * np.trace(solid.inertia) * np.eye(3) - np.asarray(solid.inertia)
+            sigma[3, 3] = solid.mass
+
+    def directions(self, bodies: Bodies) -> Array:
+        """Twists of unit velocities, (nv, 4, 4)."""
+        c = self._carrier
+        return np.asarray(bodies.pose[c] @ self._own @ bodies.inverse[c])
+
+    def inertia(self, bodies: Bodies) -> Array:
+        """Σ of the bodies along the world's axes, (bodies, 4, 4)."""
+        pose = bodies.pose[:-1]
+        return np.asarray(pose @ self._inertia @ pose.swapaxes(1, 2))
+
+    def space(self, bodies: Bodies) -> Space:
+        """The null space at a state."""
+        S, inertia = self.directions(bodies), self.inertia(bodies).reshape(-1, 16)
+        moved = (S @ (self._sums @ inertia).reshape(-1, 4, 4)).reshape(-1, 16)
+        flat = S.reshape(-1, 16)
+        return Space(flat, (flat @ moved.T) * self._related)
+
+    def forces(self, bodies: Bodies, acceleration: Array) -> Array:
+        """Forces that bodies need for accelerations [α× a; 0 0] along their own axes, (…, bodies, 4, 4).
+
+        A force at a place is the matrix f pᵀ, a moment the half of its ×; of moments no more than the part that
+        changes sign is kept, where a body that spins about a principal axis has none to the last digit.
+        """
+        own = acceleration @ self._inertia
+        turning = own[..., :3, :3]
+        own[..., :3, :3] = 0.5 * (turning - turning.swapaxes(-1, -2))
+        pose = bodies.pose[:-1]
+        return np.asarray(pose @ own @ pose.swapaxes(1, 2))
+
+    def motions(
+        self, bodies: Bodies, relative: Array, loads: Loads, closing: Closing | None = None
+    ) -> tuple[Array, Array]:
+        """Projected motions of the bodies: rates of their twists, or, of violations, twists.
+
+        Args:
+            bodies: their motion.
+            relative: what the joints ask of the twists of their children, less those of their parents, but for what
+                they leave free, (…, joints, 16).
+            loads: forces on the bodies.
+            closing: what loops make of it.
+
+        Returns:
+            (…, bodies + 1, 4, 4), and the multipliers of the loops' rows.
+        """
+        space = self.space(bodies)
+        given = _matrices(self._steps @ relative)
+        needed = self.forces(bodies, bodies.inverse[:-1] @ given[..., :-1, :, :] @ bodies.pose[:-1] + loads.bent)
+        push = loads.drives - (space.S * (self._sums @ _flat(needed - loads.pulls))).sum(-1)
+        velocities, multipliers = (closing or _without_loops)(space, given, push)
+        return given + _matrices(self.moves @ (space.S * velocities[..., None])), multipliers
+
+    def of_joints(self, bodies: Bodies, force: Array, torque: Array) -> Array:
+        """Forces and moments of joints on their children (joints, 3), along the velocities, (nv,)."""
+        S = self.directions(bodies)
+        turning = 0.5 * (S[:, :3, :3].reshape(-1, 9) @ SKEW.T) * torque[self.joint]
+        return np.asarray(np.where(self.turns[:, None], turning, S[:, :3, 3] * force[self.joint]).sum(1))
+
+
+def _flat(matrices: Array) -> Array:
+    return matrices.reshape(*matrices.shape[:-2], 16)
+
+
+def _matrices(flat: Array) -> Array:
+    return flat.reshape(*flat.shape[:-1], 4, 4)
+
+
+class LoopSplit:
+    """Velocities that rows of loops lock, and those they allow, in the metric of the mass matrix H.
+
+    Attributes:
+        least: of the singular values that count the smallest, relative to the largest.
+    """
+
+    def __init__(self, H: Array, C: Array, rank: int) -> None:
+        from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri  # here: whoever runs a ball need not wait for it
+
+        upper, failed = dpotrf(H)
+        if failed:
+            raise np.linalg.LinAlgError("the mass matrix is not positive definite")
+        self._into, self._C = dtrtri(upper)[0], C
+        U, values, Vt, failed = dgesdd(C @ self._into, full_matrices=0)
+        if failed:
+            raise np.linalg.LinAlgError("the singular values were not found")
+        self.least = float(values[rank - 1] / values[0])
+        self._locked, self._back = self._into @ Vt[:rank].T, U[:, :rank].T / values[:rank, None]
+
+    def __call__(self, push: Array, wanted: Array) -> tuple[Array, Array]:
+        """H ν = push + Cᵀλ and C ν = wanted, for several right-hand sides (nv, …) and (rows, …): ν and λ."""
+        free = self._into @ (self._into.T @ push)
+        normal = self._back @ (wanted - self._C @ free)
+        return free + self._locked @ normal, self._back.T @ normal
+
+
+def _without_loops(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+    from scipy.linalg.lapack import dposv
+
+    if not push.size:  # fixed joints alone
+        return push, np.zeros(0)
+    _, found, failed = dposv(space.H, push.T)
+    if failed:
+        raise np.linalg.LinAlgError("the mass matrix is not positive definite")
+    return np.asarray(found.T), np.zeros(0)
