@@ -82,7 +82,7 @@ class ConnectionRows(NamedTuple):
         form: what takes the relative twist to Φ̇, (rows, 16).
         force, torque: of a unit multiplier on body b at its point.
         x, y: the axes of rows of angles; none of those of points, which are first.
-        twist: that of which the row is the rate 1 and other rows of the connection, where it is closed, 0; (rows, 16).
+        twist: gives this row the rate 1, and other rows of the connection, where it is closed, none; (rows, 16).
     """
 
     residual: Array
