@@ -13,13 +13,25 @@ if TYPE_CHECKING:
     from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused
     from proofroll.files.scene_file import load_scene
     from proofroll.running.simulation import simulate
+    from proofroll.studies.comparison.by_name import compare
     from proofroll.studies.judging.judge import judge
 
-__all__ = ["Diverged", "InputError", "Missing", "ProofrollError", "Refused", "judge", "load_scene", "simulate"]
+__all__ = [
+    "Diverged",
+    "InputError",
+    "Missing",
+    "ProofrollError",
+    "Refused",
+    "compare",
+    "judge",
+    "load_scene",
+    "simulate",
+]
 __version__ = "0.1.0"
 
 _HOMES = {
-    **dict.fromkeys(("Diverged", "InputError", "Missing", "ProofrollError", "Refused"), "proofroll.core.errors"),
+    **dict.fromkeys(__all__[:5], "proofroll.core.errors"),
+    "compare": "proofroll.studies.comparison.by_name",
     "judge": "proofroll.studies.judging.judge",
     "load_scene": "proofroll.files.scene_file",
     "simulate": "proofroll.running.simulation",

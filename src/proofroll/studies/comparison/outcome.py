@@ -9,10 +9,12 @@ from pathlib import Path
 
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.diagnosis.of_scene import Diagnosis
+from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.scene_file import SceneFile
 from proofroll.running.case import Case, EngineFacts, Result, Status
+from proofroll.studies.html_table import html_table
 from proofroll.studies.judging.reference import Reference
 
 SEVERITY = list(Verdict)
@@ -142,3 +144,21 @@ class Outcome:
         broken = {Status.MISSING, Status.CRASHED, Status.TIMEOUT}
         lost = [run for run in self.runs if run.result.status in broken]
         return [run for run in lost if Verdict.FAILED not in run.row.expected(run.parameters)]
+
+    def _repr_html_(self) -> str:
+        """A row for each run, with what is furthest beyond its tolerance, for a notebook."""
+        rows = []
+        for run in self.runs:
+            worst_of = max(run.judgements, key=lambda item: item.error / item.tolerance, default=None)
+            said = ["", "", "", run.result.message]
+            if worst_of is not None:
+                unit = "" if worst_of.unit == "1" else f" {worst_of.unit}"
+                off = [number(value) + unit for value in (worst_of.error, worst_of.tolerance)]
+                said = [worst_of.observable, *off, worst_of.reason]
+            name = " ".join([run.row.engine, *(f"{key}={value:g}" for key, value in run.parameters.items())])
+            cost = run.result.seconds_per_second
+            rows.append((name, str(run.verdict), *said[:3], "" if cost is None else number(cost), said[3]))
+        columns = ("", "verdict", "furthest", "off by", "allowed", "s/s", "why")
+        left = f"Left out for lack of time: {', '.join(self.beyond_budget)}"
+        notes = [*self.contradictions, *([left] if self.beyond_budget else [])]
+        return html_table(self.comparison.title, columns, rows, notes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from html import escape
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from proofroll.core.truth import truth
 from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Doubt, Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
+from proofroll.studies.html_table import html_table
 from proofroll.studies.judging.given_run import GivenRun, Run, read_run
 from proofroll.studies.judging.reference import Reference, turned_alike
 
@@ -106,14 +106,9 @@ class Judged:
             unit = "" if found.unit == "1" else f" {found.unit}"
             numbers = (number(value) + unit for value in (found.error, found.tolerance, found.truth_error_bar))
             when = "" if item.at is None else f"{item.at:.4g} s"
-            cells = [f"{sign} {found.verdict.value}", *numbers, when]
-            rows.append(
-                f"<tr><th>{escape(found.observable)}</th>{''.join(f'<td>{escape(c)}</td>' for c in cells)}</tr>"
-            )
+            rows.append((found.observable, f"{sign} {found.verdict.value}", *numbers, when))
         columns = ("", "verdict", "off by", "allowed", "truth known to", "at")
-        header = "".join(f"<th>{name}</th>" for name in columns)
-        rest = "".join(f"<p>{escape(line.strip())}</p>" for line in lines[len(rows) :])
-        return f"<p><b>{escape(head)}</b></p><table><tr>{header}</tr>{''.join(rows)}</table>{rest}"
+        return html_table(head, columns, rows, map(str.strip, lines[len(rows) :]))
 
     def content(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -1,0 +1,49 @@
+"""A comparison from Python: of a file, or of a scene about which no file says anything."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from proofroll.core.errors import InputError
+from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import means_scene
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
+from proofroll.running.worker_pool import Workers
+from proofroll.studies.comparison import compare as comparing
+from proofroll.studies.comparison.default_comparison import BUDGET, compared
+from proofroll.studies.comparison.outcome import Outcome
+
+
+def compare(
+    name: str,
+    engines: Sequence[str] = (),
+    *,
+    out: str | Path = "out",
+    jobs: int | None = None,
+    budget: float | None = None,
+    **parameters: float,
+) -> Outcome:
+    """Holds engines against the truth, as ``proofroll compare`` does; a notebook shows the outcome as a table.
+
+    Args:
+        name: of a comparison, or the path of its file; or of a scene, the path of its folder or of a robot file.
+        engines: those to be run; by default all of the comparison, or all that can represent the scene.
+        out: folder for results; what is there is reused.
+        jobs: workers at once; by default one for each core.
+        budget: processor time of all runs of a scene [s]; by default 60.
+        **parameters: of a scene, in SI units.
+
+    Raises:
+        InputError: something that was given does not exist or makes no sense.
+    """
+    workers = Workers()
+    if means_scene(name):
+        comparison = compared(name, parameters, workers, budget or BUDGET)
+    elif parameters or budget:
+        given = next(iter(parameters), "budget")
+        raise InputError(given, parameters.get(given, budget), "a comparison file has its own; name a scene instead")
+    else:
+        comparison = load_comparison(name)
+    return comparing.compare(comparison, Runner(Store(Path(out) / "cases"), jobs=jobs, workers=workers), engines)

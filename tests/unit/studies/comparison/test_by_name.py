@@ -1,0 +1,27 @@
+"""``proofroll.compare``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import proofroll
+
+
+def test_a_notebook_shows_a_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scene is compared at given parameters, and its outcome is a table with a row for each run."""
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["projection"])
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.1)
+    found = proofroll.compare("pendulum", out=tmp_path, jobs=1, length=2.0)
+    assert [run.parameters for run in found.runs] == [{"length": 2.0}] * len(found.runs)
+    shown = found._repr_html_()
+    assert shown.count("<tr>") == 1 + len(found.runs)
+    assert "<th>projection[formulation=dependent] length=2</th><td>agrees</td>" in shown
+
+
+def test_what_is_for_a_scene_is_not_for_a_file() -> None:
+    """A comparison file has its own points and no budget: either is refused by its name."""
+    for given, advice in (({"speed": 2.0}, "speed = 2.0"), ({"budget": 9.0}, "budget = 9.0")):
+        with pytest.raises(proofroll.InputError, match=f"{advice}: a comparison file has its own"):
+            proofroll.compare("bricard", **given)
