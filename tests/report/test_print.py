@@ -20,7 +20,7 @@ PAPER = {"width": round((210 - 2 * 10) / 25.4 * 96), "height": round((297 - 12 -
 MOST_PAGES = 30
 # A table of verdicts with as many observables as our largest comparison judges: cells as wide as numbers become.
 WIDEN = """(more) => {
-  const table = document.querySelector(".matrix");
+  const table = document.querySelector(".matrix:not(#choice)");
   for (const row of table.querySelectorAll("tr:not(.group)")) {
     const cell = row.querySelector("th.n, .cell");
     for (let added = 0; cell && added < more; ++added) cell.after(cell.cloneNode(true));
@@ -65,7 +65,7 @@ def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: V
     Verdicts of every point are there, folded or not; contents and buttons are not.
     """
     with visit(report_page, viewport=PAPER, before=UNDRAWN) as seen:
-        matrices = seen.page.locator(".matrix")
+        matrices = seen.page.locator(".matrix:not(#choice)")
         assert not matrices.nth(2).is_visible(), "folded on the screen"
         seen.page.emulate_media(media="print")
         assert matrices.count() == 3

@@ -87,7 +87,10 @@ class Report:
             ProofrollError: the folder cannot be written.
         """
         content = self.content
-        write_text(out / "report.json", json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
+        said = plain(content)
+        table = json.dumps(said.pop("table"), allow_nan=False).replace("], [", "],\n  [")
+        text = json.dumps(said, indent=1, allow_nan=False).removesuffix("\n}")
+        write_text(out / "report.json", f'{text},\n "table": {table}\n}}\n')
         write_text(out / "report.csv", content.table.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
 

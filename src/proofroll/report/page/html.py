@@ -17,6 +17,7 @@ from proofroll.files.json_data import plain
 from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, report_kinds
+from proofroll.report.page.choice import DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
 from proofroll.report.pages import environment, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -58,12 +59,24 @@ def page(
         content=content,
         curves=curves,
         pictures=pictures,
+        choice=choice_of(content),
         styles=[styles(comparison.rows) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
         data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
         plotly=_plotly(),
     )
+
+
+def choice_of(content: ReportContent) -> ChoiceMatrix:
+    """The matrix of a report: of its comparisons, and of the trade-offs that were made."""
+    found = {
+        item.name: ChoiceStudy(item.title, f"c{number}", list(dict.fromkeys(run.point for run in item.runs)))
+        for number, item in enumerate(content.comparisons)
+    }
+    swept = enumerate(content.entries.get("tradeoffs", ()))
+    found |= {item.name: ChoiceStudy(item.title, f"speed{number}") for number, item in swept if item.study}
+    return choice_matrix(content.table.lines, found)
 
 
 def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
@@ -115,6 +128,8 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
+        "decades": DECADES,
+        "first_decade": FIRST,
         "again": _again,
         "told_hosts": told_hosts,
         "part_kinds": part_kinds(),

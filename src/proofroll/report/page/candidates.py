@@ -1,0 +1,118 @@
+"""Candidates of a choice: each setting with each of its steps in each study, over all places of the study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from proofroll.core.verdict import LimitFinding, Verdict
+from proofroll.report.labels import step
+from proofroll.report.long_table import TableLine
+
+_BEYOND = {LimitFinding.ANOTHER, LimitFinding.NOT_SHOWN}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One setting with one step in one study, over all its places.
+
+    Attributes:
+        name: engine, formulation, setting and step, for a person.
+        motion, forces: largest error of a coordinate, and of a reaction, in parts of its size; None: not told.
+        cost: wall seconds per simulated second at the slowest place; None: not measured.
+        clean: the cost is that of clean runs.
+        blame: verdict of a place without a result; None: every place has one.
+        another: its limit of small steps is not the truth, as far as its ladder shows.
+        href: id of the evidence of the place that is furthest off.
+        message: why a place has no result.
+    """
+
+    name: str
+    motion: float | None
+    forces: float | None
+    cost: float | None
+    clean: bool
+    blame: Verdict | None
+    another: bool
+    href: str
+    message: str
+
+    def error(self, forces: bool) -> float | None:
+        """The error that a tolerance bounds; None: something is not told."""
+        if not forces:
+            return self.motion
+        return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
+
+
+def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
+    """The candidates of one row of a study, its own step first.
+
+    Args:
+        lines: of the row.
+        href: id of the study's evidence.
+        places: that have an evidence of their own, in their order.
+    """
+    needed = list(dict.fromkeys(line.place for line in lines))
+    own = lines[0].step
+    another = any(line.limit in _BEYOND or line.verdict == Verdict.DIFFERS for line in lines)
+    found = []
+    for value in dict.fromkeys(line.step for line in lines):
+        at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
+        found.append(_candidate(lines[0], value, at, another=another, anchors=_anchors(href, lines[0].row, places)))
+    return sorted(found, key=lambda item: item.name != _name(lines[0], own))
+
+
+def _candidate(
+    first: TableLine, value: float | None, at: dict[str, list[TableLine]], *, another: bool, anchors: dict[str, str]
+) -> Candidate:
+    name, href = _name(first, value), anchors.get("", "")
+    judged = {
+        place: [line for line in lines if line.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}]
+        for place, lines in at.items()
+    }
+    judged = {place: lines for place, lines in judged.items() if lines or not at[place]}
+    costs = [lines[0].cost for lines in at.values() if lines]
+    cost = None if None in costs else max((item for item in costs if item is not None), default=None)
+    clean = all(lines[0].clean for lines in at.values() if lines)
+    errors = {place: (_largest(lines, "motion"), _largest(lines, "reaction")) for place, lines in judged.items()}
+    blame, message = _blame(judged)
+    if judged:
+        furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
+        href = anchors.get(furthest, href)
+    motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
+    return Candidate(name, motion, forces, cost, clean, blame, another, href, message)
+
+
+def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
+    """Verdict and message of the first place without a result."""
+    if not judged:
+        return Verdict.NOT_JUDGED, "nobody can be judged here"
+    for place, lines in judged.items():
+        if not lines:
+            return Verdict.FAILED, f"no run with this step at {place}"
+        if lines[0].status != "done":
+            said = {str(item): item for item in Verdict}.get(lines[0].verdict, Verdict.FAILED)
+            return said, lines[0].message
+    return None, ""
+
+
+def _largest(lines: Sequence[TableLine], role: str) -> float | None:
+    """Largest relative error of the quantities of a role that summaries show, of all if they show none."""
+    of_role = [line for line in lines if line.role == role and line.scale]
+    return max((line.relative for line in [x for x in of_role if x.headline] or of_role), default=None)
+
+
+def _worst(errors: Sequence[float | None]) -> float | None:
+    known = [item for item in errors if item is not None]
+    return max(known) if known and len(known) == len(errors) else None
+
+
+def _name(line: TableLine, value: float | None) -> str:
+    words = " ".join(filter(None, (line.engine, line.formulation, line.setting)))
+    size = step(line.resolution or None, value)
+    return f"{words} at {size}" if size else words
+
+
+def _anchors(href: str, row: int, places: Sequence[str]) -> dict[str, str]:
+    """Id of the evidence by place; under the empty name that of the study."""
+    return {"": href} | {place: f"{href}-r{row}-p{number}" for number, place in enumerate(places)}

@@ -1,0 +1,197 @@
+"""Matrix of engines and groups of scenes: of each the cheapest run that holds a tolerance, or why none does."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import groupby, product
+from typing import NamedTuple
+
+from proofroll.core.number_format import error, number
+from proofroll.core.verdict import Verdict
+from proofroll.report.long_table import TableLine
+from proofroll.report.page.candidates import Candidate, candidates
+from proofroll.report.pages import packed
+
+# Tolerances among which a reader chooses: powers of ten, as parts of the path or of the largest force.
+DECADES = range(2, 9)
+# The one that a reader sees first.
+FIRST = 4
+NEEDS = ("motion", "motion and forces")
+NOT_RUN = "none"
+_SEVERITY = list(Verdict)
+
+
+class ChoiceCell(NamedTuple):
+    """What is shown of an engine in a group of scenes at a tolerance.
+
+    Attributes:
+        state: verdict, for colour and glyph; ``none``: nothing was run.
+        text: cost [s/s] where the tolerance is held, else the least error, or how many scenes hold it.
+        title: the same in sentences.
+        href: id of the evidence; empty: there is none.
+        cost: of the slowest scene; infinite where the tolerance is not held in all, or nothing was measured.
+    """
+
+    state: str
+    text: str
+    title: str
+    href: str = ""
+    cost: float = math.inf
+
+
+class ChoiceStudy(NamedTuple):
+    """A study in the matrix: its title, the id of its evidence, and the places that have one of their own."""
+
+    title: str
+    href: str
+    places: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class ChoiceColumn:
+    """A group of scenes, or one study of it; ``whole``: it is the group."""
+
+    group: str
+    title: str
+    href: str
+    studies: tuple[str, ...]
+    whole: bool = True
+
+
+@dataclass(frozen=True)
+class ChoiceRow:
+    """A formulation with one setting, or with all (``setting`` is empty); ``found``: its candidates by study."""
+
+    engine: str
+    formulation: str
+    setting: str
+    own_equations: bool
+    found: dict[str, list[Candidate]] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """Engine and formulation."""
+        return f"{self.engine} {self.formulation}".strip()
+
+
+@dataclass(frozen=True)
+class ChoiceMatrix:
+    """The matrix; ``titles`` are those of studies, by name."""
+
+    columns: list[ChoiceColumn]
+    rows: list[ChoiceRow]
+    titles: dict[str, str]
+
+    @property
+    def engines(self) -> list[str]:
+        """Names of the engines, in the order of the rows."""
+        return list(dict.fromkeys(row.engine for row in self.rows))
+
+    def cell(self, row: ChoiceRow, column: ChoiceColumn, decade: int, forces: bool) -> ChoiceCell:
+        """What is shown at a tolerance of ``10**-decade``."""
+        own = [name for name in column.studies if name in row.found]
+        cells = [(self.titles[name], _cell(row.found[name], 10.0**-decade, forces)) for name in own]
+        return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
+
+    def answer(self, decade: int, forces: bool) -> str:
+        """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
+        asked = f"{NEEDS[forces]} to {number(10.0**-decade)}"
+        said, without = [], []
+        for column in (item for item in self.columns if item.whole):
+            cells = [
+                (self.cell(row, column, decade, forces), row.name)
+                for row in self.rows
+                if not row.setting and not row.own_equations
+            ]
+            cell, name = min(cells, key=lambda item: item[0].cost, default=(ChoiceCell(NOT_RUN, "", ""), ""))
+            if math.isfinite(cell.cost):
+                said.append(f"{column.group}: {name} ({cell.text} s/s)")
+            else:
+                without.append(column.group)
+        nothing = f"nothing that was run and timed holds it for {', '.join(without)}" if without else ""
+        if not said:
+            return f"For {asked}: {nothing or 'nothing was run'}."
+        return f"For {asked} the cheapest are {'; '.join(said)}{f'; {nothing}' if nothing else ''}."
+
+    @cached_property
+    def data(self) -> str:
+        """All cells at all tolerances as JSON: unlike cells once, and for each row and column their numbers."""
+        asked = list(product((False, True), DECADES))
+        pool: dict[tuple[str, str, str, str], int] = {}
+        grid = [
+            [
+                [pool.setdefault(self.cell(row, column, at, need)[:4], len(pool)) for need, at in asked]
+                for column in self.columns
+            ]
+            for row in self.rows
+        ]
+        answers = [self.answer(at, need) for need, at in asked]
+        return json.dumps({"cells": list(pool), "grid": grid, "answers": answers}, separators=(",", ":"))
+
+    @property
+    def packed(self) -> str:
+        """The same as a page keeps it."""
+        return packed(self.data.encode())
+
+
+def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]) -> ChoiceMatrix:
+    """The matrix of the lines of some studies, in the order of the studies."""
+    order = {name: number for number, name in enumerate(studies)}
+    chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
+    rows: dict[tuple[str, str, str], ChoiceRow] = {}
+    groups: dict[str, dict[str, None]] = {}
+    for (name, _, _), own in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
+        of_row, (_, href, places) = list(own), studies[name]
+        first, found = of_row[0], candidates(of_row, href, places)
+        groups.setdefault(first.group, {})[name] = None
+        for setting in ("", first.setting or "as it is"):
+            key = (first.engine, first.formulation, setting)
+            row = rows.setdefault(key, ChoiceRow(*key, own_equations=first.own_equations))
+            row.found.setdefault(name, []).extend(found)
+    columns = []
+    for group, names in groups.items():
+        members = [ChoiceColumn(group, studies[name].title, studies[name].href, (name,), whole=False) for name in names]
+        columns.append(ChoiceColumn(group, group, members[0].href if len(members) == 1 else "", tuple(names)))
+        columns += members if len(members) > 1 else []
+    orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
+    keys = sorted(rows, key=lambda key: [known.index(key[: end + 1]) for end, known in enumerate(orders)])
+    return ChoiceMatrix(columns, [rows[key] for key in keys], {name: item.title for name, item in studies.items()})
+
+
+def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
+    """The cheapest candidate of one study that holds the tolerance; else the closest one, or why there is none."""
+    whole = [item for item in found if item.blame is None]
+    told = [(size, item) for item in whole if (size := item.error(forces)) is not None]
+    held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in told if size <= tolerance]
+    if held:
+        cost, size, item = min(held, key=lambda entry: entry[:2])
+        text = "✓" if math.isinf(cost) else f"{'' if item.clean else '~'}{number(cost)}"
+        spent = "not timed" if math.isinf(cost) else f"{text} s of computing per simulated second"
+        return ChoiceCell(Verdict.AGREES, text, f"{item.name}: within {number(size)}, {spent}", item.href, cost)
+    if told:
+        size, item = min(told, key=lambda entry: entry[0])
+        why = "its limit is another" if item.another else "finer steps were not run"
+        state = Verdict.DIFFERS if item.another else Verdict.CONVERGES
+        return ChoiceCell(state, error(size, 1), f"{item.name}: off by {error(size)}; {why}", item.href)
+    if whole:
+        lacking = "no forces" if whole[0].motion is not None else "no motion"
+        return ChoiceCell(Verdict.INCOMPLETE, lacking, f"{whole[0].name}: reports {lacking}", whole[0].href)
+    item = found[0]
+    state = item.blame or Verdict.FAILED
+    return ChoiceCell(state, str(state), f"{item.name}: {item.message}".rstrip(": "), item.href)
+
+
+def _joined(cells: Sequence[tuple[str, ChoiceCell]]) -> ChoiceCell:
+    """One cell for several studies: the worst; the cost of the slowest where all hold the tolerance."""
+    if len(cells) == 1:
+        return cells[0][1]
+    title = "; ".join(f"{name}: {cell.title}" for name, cell in cells)
+    worst = max((cell for _, cell in cells), key=lambda cell: (_SEVERITY.index(Verdict(cell.state)), cell.cost))
+    held = sum(cell.state == Verdict.AGREES for _, cell in cells)
+    if held == len(cells):
+        return worst._replace(title=title)
+    return worst._replace(text=f"{held} of {len(cells)}", title=title, cost=math.inf)

@@ -1,0 +1,56 @@
+// The matrix of engines and scenes: its cells at the tolerance that the reader chooses; rows and columns unfold.
+(() => {
+  const table = document.getElementById("choice");
+  if (!table) return;
+  const form = document.getElementById("choose");
+  const slider = document.getElementById("tolerance");
+  const forces = document.getElementById("forces");
+  const told = document.getElementById("tolerated");
+  const answer = document.getElementById("answer");
+  const rows = [...table.tBodies[0].rows];
+  const symbols = {{ symbols|tojson }};
+  const first = {{ decades.start }}, count = {{ decades|length }};
+  form.hidden = false;
+
+  // Texts are put in as text: what an engine says is no markup.
+  function fill(cell, [state, text, title, href]) {
+    cell.className = `cell ${state}`;
+    cell.replaceChildren();
+    const hidden = (word) => Object.assign(document.createElement("span"), { className: "vh", textContent: word });
+    if (state === "none") return cell.append(hidden("not run"));
+    const link = Object.assign(document.createElement("a"), { title });
+    if (href) link.href = `#${href}`;
+    const sign = Object.assign(document.createElement("span"), { textContent: symbols[state] });
+    sign.setAttribute("aria-hidden", "true");
+    link.append(sign, hidden(state), ` ${text}`);
+    cell.append(link);
+  }
+  async function show() {
+    const place = (forces.checked ? count : 0) + Number(slider.value) - first;
+    told.textContent = `1e-${slider.value}`;
+    slider.setAttribute("aria-valuetext", told.textContent);
+    const { cells, grid, answers } = JSON.parse(await unpack("choices"));
+    rows.forEach((row, i) => grid[i].forEach((numbers, j) => fill(row.cells[j + 1], cells[numbers[place]])));
+    answer.textContent = answers[place];
+    table.dataset.at = place;
+  }
+  slider.addEventListener("input", show);
+  form.addEventListener("change", (event) => {
+    if (event.target === forces) show();
+    if (event.target.name === "engine") {
+      const off = new Set([...form.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.value));
+      document.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", off.has(part.dataset.engine)));
+    }
+  });
+  form.addEventListener("submit", (event) => event.preventDefault());
+
+  table.addEventListener("click", (event) => {
+    const button = event.target.closest("button");
+    if (!button) return;
+    const open = button.getAttribute("aria-expanded") !== "true";
+    const { group, model } = button.dataset;
+    button.setAttribute("aria-expanded", open);
+    const parts = group === undefined ? "tr" : "th, td";
+    table.querySelectorAll(parts).forEach((part) => { if (part.dataset.of === (group ?? model)) part.hidden = !open; });
+  });
+})();

@@ -1,0 +1,100 @@
+"""The first screen in a browser: the matrix follows the slider, rows and columns unfold, engines are filtered."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsing import UNDRAWN, Visit
+
+from proofroll.report.page.choice import DECADES, ChoiceMatrix
+from proofroll.report.page.html import choice_of
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+SHOWN = """[...document.querySelectorAll('#choice tbody tr')].map((row) =>
+  [...row.cells].slice(1).map((cell) => [cell.className, cell.querySelector('a')?.title ?? '']))"""
+
+
+@pytest.fixture(scope="module")
+def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
+    """The page on a small screen, without its figures."""
+    with visit(report_page, before=UNDRAWN, viewport={"width": 900, "height": 600}) as opened:
+        yield opened
+
+
+@pytest.fixture
+def matrix(everything: Any) -> ChoiceMatrix:
+    """The matrix of the page."""
+    return choice_of(everything.content)
+
+
+def expected(matrix: ChoiceMatrix, decade: int, forces: bool) -> list[list[list[str]]]:
+    """Class and title of every cell."""
+    cells = [[matrix.cell(row, column, decade, forces) for column in matrix.columns] for row in matrix.rows]
+    return [[[f"cell {c.state}", c.title if c.state != "none" else ""] for c in row] for row in cells]
+
+
+def test_the_slider_chooses_the_tolerance(seen: Visit, matrix: ChoiceMatrix) -> None:
+    """By its keys: each cell and the sentence are those of the matrix at that tolerance; so with forces."""
+    slider = seen.page.locator("#tolerance")
+    slider.focus()
+    for decade in DECADES:
+        slider.press("Home")
+        for _ in range(decade - DECADES.start):
+            slider.press("ArrowRight")
+        seen.wait(f"document.getElementById('choice').dataset.at === '{decade - DECADES.start}'")
+        assert seen.page.evaluate(SHOWN) == expected(matrix, decade, False)
+        assert seen.page.locator("#answer").inner_text() == matrix.answer(decade, False)
+        assert slider.get_attribute("aria-valuetext") == f"1e-{decade}"
+    seen.page.get_by_label("forces count, too").check()
+    seen.wait(f"document.getElementById('choice').dataset.at === '{2 * len(DECADES) - 1}'")
+    assert seen.page.evaluate(SHOWN) == expected(matrix, DECADES.stop - 1, True)
+
+
+def test_a_row_unfolds_to_its_settings(seen: Visit) -> None:
+    """Its button shows the settings of that formulation alone, says so, and folds them again."""
+    button = seen.page.get_by_role("button", name="alpha fine", exact=True)
+    hidden = seen.page.locator("#choice tbody tr[hidden]").count()
+    assert hidden > 0
+    button.press("Enter")
+    assert button.get_attribute("aria-expanded") == "true"
+    shown = seen.page.locator("#choice tbody tr[data-of='alpha fine']:not([hidden])")
+    assert shown.count() == 2, "matched and default"
+    button.press("Enter")
+    assert seen.page.locator("#choice tbody tr[hidden]").count() == hidden
+
+
+def test_an_engine_is_hidden_on_the_whole_page(seen: Visit) -> None:
+    """One box takes its rows out of the matrix and of the verdicts, and brings them back."""
+    rows = seen.page.locator("[data-engine='alpha']:visible")
+    before = rows.count()
+    assert before > 2
+    box = seen.page.get_by_role("checkbox", name="alpha")
+    box.uncheck()
+    assert rows.count() == 0
+    assert seen.page.locator("[data-engine='beta']:visible").count() > 1
+    box.check()
+    assert rows.count() == before
+
+
+def test_cells_lead_to_their_evidence(seen: Visit) -> None:
+    """Each link of the matrix has its target on the page."""
+    there: list[bool] = seen.page.evaluate(
+        "[...document.querySelectorAll('#choice a')].map((a) => document.getElementById(a.hash.slice(1)) !== null)"
+    )
+    assert there
+    assert all(there)
+
+
+def test_the_matrix_is_there_without_a_program(report_page: Path, matrix: ChoiceMatrix) -> None:
+    """What is written says what the matrix says at the first tolerance: printed, and read without JavaScript."""
+    text = report_page.read_text(encoding="utf-8")
+    assert matrix.answer(4, False).split(" the cheapest")[0].split("1e-4")[0] in text
+    table = text[text.index('id="choice"') : text.index('id="choices"')]
+    for row in matrix.rows:
+        for column in matrix.columns:
+            cell = matrix.cell(row, column, 4, False)
+            assert cell.state == "none" or f'class="cell {cell.state}"' in table

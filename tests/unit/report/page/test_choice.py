@@ -1,0 +1,155 @@
+"""The matrix of engines and groups of scenes: what each cell says at each tolerance."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import pytest
+
+from proofroll.core.verdict import Verdict
+from proofroll.report.long_table import TableLine
+from proofroll.report.page.choice import DECADES, NOT_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
+
+STUDIES = {
+    "arm": ChoiceStudy("An arm", "c0", ["", "mass=2"]),
+    "chain": ChoiceStudy("A chain", "c1", [""]),
+    "ball": ChoiceStudy("A ball", "c2", [""]),
+}
+LINE = TableLine(
+    study="arm", group="trees", scene="arm", place="", row=0, engine="alpha", version="1", formulation="joints",
+    preset="default", setting="default", precision="double", own_equations=False, resolution="dt", step=1e-3,
+    status="done", message="", verdict="agrees", limit="within tolerance", quantity="x", unit="m", role="motion",
+    headline=True, error=5e-4, truth_error_bar=1e-12, tolerance=1e-2, scale=1.0, order=2.0, cost=0.01, cost_low=None,
+    cost_high=None, clean=True,
+)  # fmt: skip
+
+
+def line(**changes: Any) -> TableLine:
+    """A line of the table."""
+    return replace(LINE, **changes)
+
+
+FORCE = line(quantity="F", unit="N", role="reaction", error=3e-2, scale=1.0)
+FINER = [line(step=2.5e-4, error=3e-5, cost=0.04, clean=False, verdict=""), replace(FORCE, step=2.5e-4, error=2e-3)]
+TUNED = [
+    line(row=1, preset="tuned", setting="tuned", error=2e-7, cost=0.2),
+    line(row=1, preset="tuned", setting="tuned", quantity="F", role="reaction", error=1e-6, cost=0.2),
+]
+ARM = [LINE, FORCE, *FINER, *TUNED]
+
+
+def at(
+    lines: list[TableLine], decade: int, forces: bool = False, group: str = "trees", setting: str = ""
+) -> ChoiceCell:
+    """The cell of alpha's joints in a group."""
+    found = choice_matrix(lines, STUDIES)
+    row = next(item for item in found.rows if (item.engine, item.setting) == ("alpha", setting))
+    column = next(item for item in found.columns if item.whole and item.group == group)
+    return found.cell(row, column, decade, forces)
+
+
+def test_a_cell_has_the_cheapest_run_that_holds_the_tolerance() -> None:
+    """The step of the comparison, then a finer one of its ladder, then another setting, each with its cost."""
+    assert at(ARM, 3)[:2] == (Verdict.AGREES, "0.01")
+    assert at(ARM, 4)[:2] == (Verdict.AGREES, "~0.04")
+    assert at(ARM, 6)[:2] == (Verdict.AGREES, "0.2")
+    assert "alpha joints tuned at dt 1e-3 s: within 2e-7" in at(ARM, 6).title
+    assert at(ARM, 3).href == "c0-r0-p0"
+    assert at(ARM, 6, setting="default").state == Verdict.CONVERGES, "what unfolds is that setting alone"
+
+
+def test_forces_count_where_they_are_asked_for() -> None:
+    """With forces the same tolerance takes a finer run; an engine that reports none says so."""
+    assert at(ARM, 2)[:2] == (Verdict.AGREES, "0.01")
+    assert at(ARM, 2, forces=True)[:2] == (Verdict.AGREES, "~0.04")
+    assert at([LINE], 2, forces=True)[:2] == (Verdict.INCOMPLETE, "no forces")
+
+
+def test_what_no_run_holds_shows_the_least_error_and_why() -> None:
+    """Finer steps come closer, or the limit of small steps is another; the truth's own bar counts as error."""
+    assert at(ARM, 8)[:2] == (Verdict.CONVERGES, "2e-7")
+    wrong = [line(verdict="differs", limit="another limit", tolerance=1e-4)]
+    assert at(wrong, 4)[:2] == (Verdict.DIFFERS, "5e-4")
+    assert "its limit is another" in at(wrong, 4).title
+    assert at([line(error=0.0, truth_error_bar=1e-5)], 6).state == Verdict.CONVERGES
+
+
+@pytest.mark.parametrize(
+    ("changes", "state"),
+    [
+        ({"status": "refused", "verdict": "refused", "message": "needs loops"}, Verdict.REFUSED),
+        ({"status": "crashed", "verdict": "failed", "message": "it ended"}, Verdict.FAILED),
+        ({"verdict": "ill-posed"}, Verdict.NOT_JUDGED),
+    ],
+)
+def test_what_gave_no_result_says_so(changes: dict[str, Any], state: Verdict) -> None:
+    """Refused, failed, and what nobody is judged by, each with its word."""
+    missing = {} if "status" not in changes else {"quantity": "", "role": "", "error": None, "scale": None}
+    found = at([line(**changes, **missing)], 4)
+    assert (found.state, found.text) == (state, str(state))
+    assert changes.get("message", "") in found.title
+
+
+def test_a_run_holds_only_at_all_places() -> None:
+    """One place beyond the tolerance, or without a result, is enough; what is ill-posed is left out."""
+    heavy = line(place="mass=2", error=5e-2, cost=0.03)
+    assert at([LINE, heavy], 3)[:2] == (Verdict.CONVERGES, "0.05")
+    assert at([LINE, heavy], 3).href == "c0-r0-p1"
+    assert at([LINE, replace(heavy, verdict="ill-posed")], 3).state == Verdict.AGREES
+    assert at([LINE, replace(heavy, error=1e-4)], 3)[:2] == (Verdict.AGREES, "0.03"), "the slowest place"
+    assert at([LINE, FORCE, *FINER, heavy], 4).state != Verdict.AGREES, "the finer step was not run there"
+
+
+def test_a_group_holds_where_all_its_scenes_do() -> None:
+    """All: the cost of the slowest scene; some: how many; a group of one scene has no column besides."""
+    chain = [replace(item, study="chain", scene="chain", cost=0.5) for item in ARM]
+    assert at([*ARM, *chain], 3)[:2] == (Verdict.AGREES, "0.5")
+    coarse = [line(study="chain", scene="chain", error=4e-2)]
+    assert at([*ARM, *coarse], 3)[:2] == (Verdict.CONVERGES, "1 of 2")
+    columns = choice_matrix([*ARM, *coarse, line(study="ball", group="ball rolling")], STUDIES).columns
+    assert [(item.title, item.whole) for item in columns] == [
+        ("trees", True), ("An arm", False), ("A chain", False), ("ball rolling", True),
+    ]  # fmt: skip
+
+
+def test_the_answer_names_the_cheapest_engine_of_each_group() -> None:
+    """Solutions of the scene's own equations are no answer; a group that nothing holds is named."""
+    beta = line(engine="beta", row=3, error=1e-9, cost=0.5)
+    own = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
+    ball = line(study="ball", group="ball rolling", error=0.1)
+    found = choice_matrix([*ARM, beta, own, ball], STUDIES)
+    assert found.answer(3, False) == (
+        "For motion to 1e-3 the cheapest are trees: alpha joints (0.01 s/s); "
+        "nothing that was run and timed holds it for ball rolling."
+    )
+    assert "trees: beta joints (0.5 s/s)" in found.answer(8, False)
+    assert "motion and forces" in found.answer(3, True)
+
+
+def test_the_data_hold_every_cell(whole: ChoiceMatrix) -> None:
+    """What the page's program shows is what the matrix says, for all tolerances, with and without forces."""
+    data = json.loads(whole.data)
+    for index, (forces, decade) in enumerate(product((False, True), DECADES)):
+        assert data["answers"][index] == whole.answer(decade, forces)
+        for row, numbers in zip(whole.rows, data["grid"], strict=True):
+            for column, own in zip(whole.columns, numbers, strict=True):
+                assert tuple(data["cells"][own[index]]) == whole.cell(row, column, decade, forces)[:4]
+    assert len(data["cells"]) < len(whole.rows) * len(whole.columns) * 14
+
+
+def test_what_was_not_run_is_empty(whole: ChoiceMatrix) -> None:
+    """An engine that was not asked for a scene has a cell that says so."""
+    row = next(item for item in whole.rows if item.engine == "beta")
+    column = next(item for item in whole.columns if item.group == "ball rolling")
+    assert whole.cell(row, column, 4, False) == ChoiceCell(NOT_RUN, "", "not run")
+
+
+@pytest.fixture
+def whole() -> ChoiceMatrix:
+    """Three studies of two groups, two engines."""
+    chain = [replace(item, study="chain", scene="chain") for item in ARM]
+    beta = line(engine="beta", row=3, error=1e-9, cost=0.5)
+    return choice_matrix([*ARM, *chain, beta, line(study="ball", group="ball rolling")], STUDIES)
