@@ -112,8 +112,8 @@ class HybridPath(Generic[ModeT]):
         return [int(k) for k in np.searchsorted(ends, times, side="right")]
 
 
-def follow(route: HybridRoute[ModeT], until: float) -> HybridPath[ModeT]:
-    """Everything from time 0 to ``until`` [s].
+def follow(route: HybridRoute[ModeT], until: float, breaks: Sequence[float] = ()) -> HybridPath[ModeT]:
+    """Everything from time 0 to ``until`` [s]; a stretch ends at each of the rising ``breaks`` [s] of its rates.
 
     Raises:
         Diverged: the route makes no progress.
@@ -123,8 +123,12 @@ def follow(route: HybridRoute[ModeT], until: float) -> HybridPath[ModeT]:
     happenings = [Happening(*what, time) for what in change.happenings]
     margins = [(time, change.margin)]
     while True:
-        leg = route.walk(time, change.state, change.mode, until)
+        end = next((at for at in breaks if time < at < until), until)
+        leg = route.walk(time, change.state, change.mode, end)
         legs.append(leg)
+        if leg.guard is None and end < until:
+            time, change = end, Transition(leg.last, leg.mode, ())
+            continue
         if leg.guard is None:
             return HybridPath(tuple(legs), tuple(happenings), tuple(margins))
         still = still + 1 if leg.end <= leg.start else 0

@@ -94,7 +94,10 @@ class Actuator:
 
     def mode(self, time: float, q: float, v: float) -> str:
         """Mode, of :data:`MODES`, by the size of what is wanted."""
-        wanted = float(self.wanted(time, q, v))
+        return self.mode_of(float(self.wanted(time, q, v)))
+
+    def mode_of(self, wanted: float) -> str:
+        """Mode, of :data:`MODES`, of an effort that is wanted [N m, N]."""
         return "least" if wanted < -self.bound else "greatest" if wanted > self.bound else "linear"
 
 

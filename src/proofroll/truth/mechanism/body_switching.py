@@ -1,4 +1,4 @@
-"""Route 2 of a mechanism whose joints have dry friction or stops: maximal coordinates, modes by trial."""
+"""Route 2 of a mechanism with dry friction, stops or limits of efforts: maximal coordinates, modes by trial."""
 
 from __future__ import annotations
 
@@ -9,11 +9,20 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition, walked
-from proofroll.truth.mechanism.joint_switching import SETTLED, changes, guard_value, guards_of, left_by, noise_of
+from proofroll.truth.mechanism.joint_switching import (
+    SETTLED,
+    changes,
+    effort_event,
+    guard_values,
+    guards_of,
+    left_by,
+    noise_of,
+)
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 
@@ -22,68 +31,85 @@ _SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality b
 
 
 class SwitchedBodies:
-    """The legs of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+    """The legs of a mechanism as bodies that are each alone; a state ends with the time.
+
+    See :class:`proofroll.truth.hybrid.HybridRoute`.
+    """
 
     def __init__(self, equations: NumericEquations, joints: tuple[SwitchedJoint, ...], tolerance: float) -> None:
         self.equations, self.joints = equations, joints
+        mechanism = equations.equations.mechanism
         self._numbers = [joint.number for joint in joints]
-        self._tolerance = np.full(len(equations.equations.start()), tolerance)
+        self._motors = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
+        self.motors = tuple(mechanism.actuators[k] for k in self._motors)
+        self._driven = [mechanism.joint_index[motor.joint] for motor in self.motors]
+        self._tolerance = np.full(len(equations.equations.start()) + 1, tolerance)
         self._fastest: dict[int, float] = {}
         self._span: float | None = None
 
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
-        state = self.equations.equations.start()
+        state = np.append(self.equations.equations.start(), 0.0)
         mode, margin = self._decided(state, [False] * len(self.joints))
         return Transition(state, mode, (), margin)
 
     def walk(self, time: float, state: Array, mode: Mode, until: float) -> Stretch[Mode]:
         """See the protocol."""
-        equations = self.equations.switched(state, self.switched(mode))
+        equations = self.equations.switched(state[:-1], self.switched(mode))
         end, last, guard = walked(
-            equations.rate,
+            lambda _, y: _rate(equations, y),
             time,
             state,
             until,
             tolerance=self._tolerance,
             guards=lambda y: self._guards(equations, y, mode),
-            corrected=equations.eliminated,
+            corrected=lambda y: _corrected(equations, y),
             first_step=self._span,
-            noise=noise_of(self.joints, mode, self.equations.along(state, self._numbers)[0]),
+            noise=noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
         )
         self._span = end - time if end > time else None
         return Stretch(time, end, mode, state, last, guard)
 
     def within(self, leg: Stretch[Mode], times: FloatArray) -> FloatArray:
         """See the protocol."""
-        equations = self.equations.switched(leg.first, self.switched(leg.mode))
+        equations = self.equations.switched(leg.first[:-1], self.switched(leg.mode))
         spans = np.maximum(times - leg.start, 0.0)
-        tolerance = float(self._tolerance[0])
-        return np.array(list(integrated(equations.rate, leg.first, spans, tolerance, equations.eliminated)))
+        states = integrated(
+            lambda _, y: _rate(equations, y),
+            leg.first,
+            spans,
+            float(self._tolerance[0]),
+            lambda y: _corrected(equations, y),
+        )
+        return np.array(list(states))
 
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
         assert leg.guard is not None  # nothing changes at the end of time
         which, kind = guards_of(self.joints, leg.mode)[leg.guard]
-        joint, mode = self.joints[which], list(leg.mode)
-        still = [own in HOLDING for own in leg.mode]
+        mode, last = list(leg.mode), np.append(leg.last[:-1], leg.end)
+        if kind in MODES:
+            mode[which] = kind
+            return Transition(last, tuple(mode), (effort_event(self.motors[which - len(self.joints)], kind),))
+        joint = self.joints[which]
+        still = [own in HOLDING for own in leg.mode[: len(self.joints)]]
         if kind in {"up", "down"}:
             was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
-            return Transition(leg.last, tuple(mode), ((left_by(was), joint.name),))
+            return Transition(last, tuple(mode), ((left_by(was), joint.name),))
         if kind == "still":
             still[which] = True
-            decided, margin = self._decided(leg.last, still)
-            return Transition(leg.last, decided, changes(self.joints, leg.mode, decided), margin)
-        speed = abs(float(self.equations.along(leg.last, self._numbers)[1][which]))
+            decided, margin = self._decided(last, still)
+            return Transition(last, decided, changes(self.joints, leg.mode, decided), margin)
+        speed = abs(float(self._along(last)[1][which]))
         fastest = self._fastest.setdefault(which, speed)
-        state, margin = self._struck(leg, which, joint.restitution)
+        state, margin = self._struck(last, leg.mode, which, joint.restitution)
         delay = 0.0
         if joint.restitution and speed < SETTLED * fastest:
-            free = self.equations.switched(state, self.switched(leg.mode))
+            free = self.equations.switched(state[:-1], self.switched(leg.mode))
             pull = abs(float(self._accelerations(free, state)[which]))
             delay = 2 * speed * joint.restitution / (pull * (1 - joint.restitution))
-            state, margin = self._struck(leg, which, 0.0)
-        rates = self.equations.along(state, self._numbers)[1]
+            state, margin = self._struck(last, leg.mode, which, 0.0)
+        rates = self._along(state)[1]
         still = [
             (held and leg.mode[k] in {"low", "high"} and abs(rates[k]) <= _SLACK * speed)
             or (k == which and (delay > 0 or not joint.restitution))
@@ -98,34 +124,41 @@ class SwitchedBodies:
 
     def switched(self, mode: Mode) -> Switched:
         """What a mode does to the equations."""
-        pairs = list(zip(self.joints, mode, strict=True))
+        pairs = list(zip(self.joints, mode, strict=False))
         held = tuple(joint.number for joint, own in pairs if own in HOLDING)
         stopped = tuple(joint.number for joint, own in pairs if own in STOPPED)
         push = {joint.number: joint.push(own) for joint, own in pairs if joint.push(own)}
-        return Switched(held, stopped, push, {})
+        motors = zip(self._motors, self.motors, mode[len(self.joints) :], strict=True)
+        clamped = {k: motor.bound * MODES.index(own) - motor.bound for k, motor, own in motors if own != "linear"}
+        return Switched(held, stopped, push, clamped)
 
     def holding(self, equations: NumericEquations, state: Array, mode: Mode) -> Array:
         """Force of what holds or rubs along each switched joint's coordinate, N or N m."""
         held = [number for number, own in enumerate(mode) if own in HOLDING]
-        force = np.array([joint.push(own) for joint, own in zip(self.joints, mode, strict=True)])
+        force = np.array([joint.push(own) for joint, own in zip(self.joints, mode, strict=False)])
         if held:
-            force[held] = equations.solve(equations.normalised(state)).multipliers[-len(held) :]
+            solved = equations.solve(equations.normalised(state[:-1]), float(state[-1]))
+            force[held] = solved.multipliers[-len(held) :]
         return force
 
     def _guards(self, equations: NumericEquations, state: Array, mode: Mode) -> FloatArray:
-        q, v = equations.along(equations.normalised(state), self._numbers)
-        force = self.holding(equations, state, mode) if any(own in HOLDING for own in mode) else np.zeros(len(mode))
-        return np.array(
-            [
-                guard_value(self.joints[k], mode[k], kind, float(q[k]), float(v[k]), float(force[k]))
-                for k, kind in guards_of(self.joints, mode)
-            ]
-        )
+        q, v = self._along(np.append(equations.normalised(state[:-1]), state[-1]))
+        force = self.holding(equations, state, mode)
+        return guard_values(self.joints, self.motors, mode, q, v, force, self._wanted(state))
+
+    def _along(self, state: Array) -> tuple[Array, Array]:
+        """Coordinates and rates of the switched joints."""
+        return self.equations.along(state[:-1], self._numbers)
+
+    def _wanted(self, state: Array) -> list[float]:
+        """Efforts of the motors with a limit before it clamps them."""
+        q, v = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
+        return [float(m.wanted(state[-1], *at)) for m, *at in zip(self.motors, q, v, strict=True)]
 
     def _accelerations(self, equations: NumericEquations, state: Array) -> Array:
-        """Of all switched joints along their coordinates."""
-        acceleration = equations.solve(state).acceleration
-        rows = self.equations.equations.rate_rows(state.tolist(), self._numbers)
+        """Accelerations of all switched joints along their coordinates."""
+        acceleration = equations.solve(state[:-1], float(state[-1])).acceleration
+        rows = self.equations.equations.rate_rows(state[:-1].tolist(), self._numbers)
         return np.array([sum(c * acceleration[k] for k, c in r.coefficients.items()) + r.bias for r in rows], float)
 
     def _decided(self, state: Array, still: Sequence[bool]) -> tuple[Mode, float]:
@@ -138,8 +171,10 @@ class SwitchedBodies:
         Raises:
             Refused: none does, or there are too many.
         """
-        state = self.equations.normalised(state)
-        q, v = self.equations.along(state, self._numbers)
+        state = np.append(self.equations.normalised(state[:-1]), state[-1])
+        q, v = self._along(state)
+        modes = zip(self.motors, self._wanted(state), strict=True)
+        efforts = tuple(motor.mode_of(wanted) for motor, wanted in modes)
         choices = [
             list(_candidates(joint, float(q[k]))) if still[k] or v[k] == 0 else [joint.moving(float(v[k]))]
             for k, joint in enumerate(self.joints)
@@ -148,10 +183,11 @@ class SwitchedBodies:
         if len(open_) > _MOST:
             raise Refused(f"{len(open_)} joints with friction or stops come to rest at once; at most {_MOST} are tried")
         if not open_:
-            return tuple(choice[0] for choice in choices), np.inf
+            return tuple(choice[0] for choice in choices) + efforts, np.inf
         best: tuple[float, Mode] = (-np.inf, ())
-        for mode in itertools.product(*choices):
-            equations = self.equations.switched(state, self.switched(mode))
+        for joints in itertools.product(*choices):
+            mode = joints + efforts
+            equations = self.equations.switched(state[:-1], self.switched(mode))
             if equations.rank < self.equations.rank + sum(own in HOLDING for own in mode):
                 raise Refused("joints that hold lock more than can move: their forces are not determinate")
             force, acceleration = self.holding(equations, state, mode), self._accelerations(equations, state)
@@ -168,36 +204,36 @@ class SwitchedBodies:
             low, high = joint.bounds(mode)
             size = abs(force) + sum(abs(bound) for bound in (low, high) if np.isfinite(bound))
             return min(high - force, force - low) / size if size else np.inf
-        q = float(self.equations.along(state, self._numbers)[0][which])
+        q = float(self._along(state)[0][which])
         direction = {"forward": 1.0, "backward": -1.0}.get(mode, 1.0 if q <= joint.low else -1.0)
-        stuck = self.equations.switched(state, Switched((joint.number,)))
-        needed = abs(float(stuck.solve(state).multipliers[-1]))
-        response = self._accelerations(self.equations.switched(state, Switched(push={joint.number: 1.0})), state)
-        free = self._accelerations(self.equations.switched(state, Switched()), state)
+        stuck = self.equations.switched(state[:-1], Switched((joint.number,)))
+        needed = abs(float(stuck.solve(state[:-1], float(state[-1])).multipliers[-1]))
+        response = self._accelerations(self.equations.switched(state[:-1], Switched(push={joint.number: 1.0})), state)
+        free = self._accelerations(self.equations.switched(state[:-1], Switched()), state)
         inertia = 1.0 / float((response - free)[which])
         size = needed + abs(acceleration) * inertia + joint.friction
         return direction * acceleration * inertia / size if size else np.inf
 
-    def _struck(self, leg: Stretch[Mode], which: int, restitution: float) -> tuple[Array, float]:
+    def _struck(self, last: Array, before: Mode, which: int, restitution: float) -> tuple[Array, float]:
         """The state after an impact of one joint on its stop; others at their stops are pressed or set free.
 
         Raises:
             Refused: the outcome hangs on an order.
         """
-        state = self.equations.normalised(leg.last)
-        _, v = self.equations.along(state, self._numbers)
-        resting = [k for k, own in enumerate(leg.mode) if own in {"low", "high"} and k != which]
+        state = np.append(self.equations.normalised(last[:-1]), last[-1])
+        _, v = self._along(state)
+        resting = [k for k, own in enumerate(before) if own in STOPPED and k != which]
         joints, e = self.joints, self.equations.equations
-        side = {k: 1.0 if leg.mode[k] == "low" else -1.0 for k in resting} | {which: -float(np.sign(v[which]))}
+        side = {k: 1.0 if before[k] == "low" else -1.0 for k in resting} | {which: -float(np.sign(v[which]))}
         best: tuple[float, Array, int] = (-np.inf, state, 0)
         for count in range(len(resting) + 1):
             for pressed in itertools.combinations(resting, count):
                 held = [which, *pressed]
                 after = [-restitution * float(v[which]), *([0.0] * count)]
-                u, impulse = self.equations.struck(state, [joints[k].number for k in held], after)
+                u, impulse = self.equations.struck(state[:-1], [joints[k].number for k in held], after)
                 trial = state.copy()
                 trial[e.nx : e.nx + e.nu] = u
-                rates = self.equations.along(trial, self._numbers)[1]
+                rates = self._along(trial)[1]
                 speed = max(abs(float(v[which])), np.finfo(float).tiny)
                 largest = float(np.abs(impulse).max())
                 kept = [side[k] * float(p) / largest for k, p in zip(held, impulse, strict=True)]
@@ -209,6 +245,14 @@ class SwitchedBodies:
         if best[2] and (restitution or any(joints[k].restitution for k in resting)):
             raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
         return best[1], max(best[0], 0.0)
+
+
+def _rate(equations: NumericEquations, state: Array) -> Array:
+    return np.append(equations.rate(float(state[-1]), state[:-1]), 1.0)
+
+
+def _corrected(equations: NumericEquations, state: Array) -> Array:
+    return np.append(equations.eliminated(state[:-1]), state[-1])
 
 
 def _candidates(joint: SwitchedJoint, q: float) -> Iterator[str]:

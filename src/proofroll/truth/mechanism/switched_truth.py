@@ -1,4 +1,4 @@
-"""The truth of a mechanism whose joints have dry friction or stops, by two routes that share the finder of guards."""
+"""The truth of a mechanism that switches (friction, stops, limits), by two routes that share the finder of guards."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import breaks
 from proofroll.truth.hybrid import HybridPath, follow, least_margin, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
@@ -31,7 +32,7 @@ from proofroll.truth.mechanism.two_routes import (
 )
 
 _TOLERANCE = 1e-14  # of each step
-_GRAZED = 1e-8  # rad or m by which a stop must be passed to act; more than the look ahead is wrong by
+_GRAZED = 1e-8  # rad, m or part by which a stop or a limit must be passed to act; more than the look ahead is wrong by
 _SCOUT = 1e-9  # of a look ahead: whether any stop is reached
 # Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
 CLOSE = 1e-9
@@ -47,27 +48,36 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     if mechanism.contacts:
         raise Refused("no route of the truth follows contact between bodies")
     equations = JointCoordinates(mechanism)
-    if not equations.switched or mechanism.unmodelled:
+    kinks = breaks(mechanism.signals)
+    if not (equations.switches or kinks) or mechanism.unmodelled:
         return find_truth(mechanism, times)
-    dry = any(joint.friction for joint in equations.switched)
+    smooth = not kinks and not any(joint.friction for joint in equations.switched)
     try:
-        if (
-            not dry
-            and not follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1])).happenings
-        ):
-            return find_truth(mechanism, times)  # no stop is passed
+        if smooth:
+            look = follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1]))
+            if not look.happenings and not any("linear" not in leg.mode for leg in look.legs if equations.limited):
+                return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
         return _switched(mechanism, equations, times)
     except Diverged as stopped:
         raise Refused(f"no truth to the end: {stopped}; end before it") from None
 
 
+def _unlimited(mechanism: Mechanism) -> Mechanism:
+    """The mechanism without limits of efforts."""
+    return replace(mechanism, actuators=tuple(replace(actuator, limit=None) for actuator in mechanism.actuators))
+
+
 def _wider(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with its stops a little further off: a swing that just comes back to one does not pass it."""
+    """The mechanism with its stops and limits a little further off: what just comes to one does not pass it."""
     joints = (
         replace(joint, limits=(joint.limits[0] - _GRAZED, joint.limits[1] + _GRAZED)) if joint.limits else joint
         for joint in mechanism.joints
     )
-    return replace(mechanism, joints=tuple(joints))
+    actuators = (
+        actuator if actuator.limit is None else replace(actuator, limit=actuator.limit * (1 + _GRAZED))
+        for actuator in mechanism.actuators
+    )
+    return replace(mechanism, joints=tuple(joints), actuators=tuple(actuators))
 
 
 def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -> TwoRouteMotion:
@@ -77,8 +87,8 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
     second = MaximalCoordinates(mechanism)
     check_start(equations, second)
     tree, bodies = SwitchedTree(equations, _TOLERANCE), SwitchedBodies(second.lean, equations.switched, _TOLERANCE)
-    until = float(times[-1])
-    paths: tuple[HybridPath[Any], HybridPath[Any]] = (follow(tree, until), follow(bodies, until))
+    until, kinks = float(times[-1]), breaks(mechanism.signals)
+    paths: tuple[HybridPath[Any], HybridPath[Any]] = (follow(tree, until, kinks), follow(bodies, until, kinks))
     parted = _parted(*paths)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
@@ -86,12 +96,12 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
     one = gathered(
         times,
         [
-            equations.sample(state[:nq], state[nq:], paths[0].legs[number].mode)
+            equations.sample(state[:nq], state[nq:-1], paths[0].legs[number].mode, float(state[-1]))
             for state, number in zip(q_and_v, paths[0].leg_at(times), strict=True)
         ],
     )
     modes = [bodies.switched(paths[1].legs[number].mode) for number in legs]
-    two = matched(mechanism, one, second.recorded(times, states_of(bodies, paths[1], times, legs), modes))
+    two = matched(mechanism, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
     masked = replace(one, wrench=np.where(found.determinate, one.wrench, np.nan))
     bars, differences = {}, {}
     other = judged(mechanism, two)

@@ -1,0 +1,173 @@
+"""Truths of mechanisms with actuators and couplings, against closed forms and another solver."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room
+ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+
+
+def motion(scene: str, times: list[float], **parameters: float):
+    """The truth of a scene of one mechanism at these times."""
+    return truth_of(load_scene(scene, **parameters).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
+
+
+def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) -> Mechanism:
+    """A mass on a slide without weight."""
+    return Mechanism(
+        (Body("b", mass, inertia=ONES),),
+        (Joint("j", "prismatic", "world", "b", **more),),  # type: ignore[arg-type]
+        actuators=(actuator,) if actuator else (),
+        gravity=(0, 0, 0),
+    )
+
+
+def test_a_servo_moves_as_a_damped_oscillator() -> None:
+    """Its place, speed and effort at half a second are those of two complex roots."""
+    found = motion("servo", [0.0, 0.5])
+    x, v = 1.00554445182408973, -3.68948219323025222
+    assert found.record.q[1, 0] == pytest.approx(x, abs=TIGHT)
+    assert found.record.v[1, 0] == pytest.approx(v, abs=TIGHT)
+    assert found.record.named[:, 0] == pytest.approx([100.0, 100 * (1 - x) - 4 * v], abs=100 * TIGHT)
+    assert max(bars[-1] for bars in found.bars.values()) < 1e-9
+    assert found.events == ()
+
+
+def test_a_limit_clamps_the_whole_effort() -> None:
+    """The effort leaves and reaches its limit at the roots of the piecewise closed form."""
+    found = motion("saturated_servo", [0.0, 0.1, 0.5, 1.0])
+    expected = (0.245657137141714, 0.324272287425472, 0.726726594852378, 0.843002288039135)
+    assert [event.kind for event in found.events] == ["release", "saturate", "release", "saturate"]
+    for event, time in zip(found.events, expected, strict=True):
+        assert event.time == pytest.approx(time, abs=TIGHT)
+        assert event.name == "servo"
+    assert found.record.q[-1, 0] == pytest.approx(0.694076613248125506, abs=TIGHT)
+    assert found.record.v[-1, 0] == pytest.approx(0.127876511755251, abs=TIGHT)
+    assert found.record.named[:, 0] == pytest.approx([20.0, 20.0, -20.0, 20.0], abs=1e-10)
+    assert found.bars["q"][-1] < TIGHT
+
+
+def test_a_limit_that_is_never_reached_changes_nothing() -> None:
+    """A servo whose limit is larger than all its efforts has the truth of one without a limit."""
+    one, two = motion("servo", [0.0, 0.5, 1.0]), motion("saturated_servo", [0.0, 0.5, 1.0], limit=150.0)
+    assert two.events == ()
+    assert np.abs(one.record.q - two.record.q).max() <= one.bars["q"][-1] + two.bars["q"][-1]
+
+
+def test_a_gear_carries_the_force_of_the_second_wheel() -> None:
+    """Both wheels turn as their reflected inertia says, and the gear pushes the second one with -1 N m."""
+    found = motion("gear_pair", [0.0, 0.5, 1.0])
+    t = np.array([0.0, 0.5, 1.0])
+    assert found.record.q[:, 0] == pytest.approx(2.5 * t**2, abs=TIGHT)
+    assert found.record.q[:, 1] == pytest.approx(-1.25 * t**2, abs=TIGHT)
+    assert found.record.named[:, 0] == pytest.approx([-1.0] * 3, abs=TIGHT)
+    assert found.record.wrench[:, :, 5] == pytest.approx(np.array([[0.5, -1.0]] * 3), abs=TIGHT)
+
+
+def test_an_arm_under_servos_is_that_of_its_own_equations() -> None:
+    """Both angles are those of Lagrange's equations, integrated beforehand to thirteen digits."""
+    found = motion("arm_pd", [0.0, 0.1, 0.2, 0.5, 1.0], armature=0.0)
+    a = (0.23626707478537, 0.37429121540015, 0.50907031540782, 0.43786597702448)
+    b = (-0.65247382917625, -0.89726151996199, -0.92085720881267, -0.96593345099848)
+    assert found.record.q[1:] == pytest.approx(np.array([a, b]).T, abs=1e-13)
+    assert found.bars["q"][-1] < TIGHT
+    assert abs(motion("arm_pd", [0.0, 0.1]).record.q[1, 0] - a[0]) > 1e-2, "armature changes it"
+
+
+def test_a_velocity_servo_closes_in_on_its_speed() -> None:
+    """With kv 5 and a target of 2 the place is 2 (t - (1 - exp(-5 t))/5)."""
+    found = truth_of(slider(Actuator("a", "j", "velocity", 2.0, kd=5.0)), np.array([0.0, 0.7]))
+    assert found.record.q[1, 0] == pytest.approx(2 * (0.7 - (1 - np.exp(-3.5)) / 5), abs=TIGHT)
+
+
+def test_a_drive_of_time_is_integrated_as_such() -> None:
+    """A force 3 sin 2t moves a mass by 3/2 t - 3/4 sin 2t."""
+    found = truth_of(slider(torque=Formula("3*sin(2*t)")), np.array([0.0, 0.5, 2.0]))
+    t = np.array([0.0, 0.5, 2.0])
+    assert found.record.q[:, 0] == pytest.approx(1.5 * t - 0.75 * np.sin(2 * t), abs=TIGHT)
+
+
+def test_breaks_of_a_table_cost_no_digits() -> None:
+    """A force that is piecewise linear gives a path of cubics, joined at its breaks."""
+    found = truth_of(slider(torque=Table((0.2, 0.5), (0.0, 3.0))), np.array([0.0, 0.2, 0.5, 1.0]))
+    x, v = 10 * 0.3**3 / 6, 10 * 0.3**2 / 2
+    assert found.record.q[:, 0] == pytest.approx([0.0, 0.0, x, x + v * 0.5 + 1.5 * 0.25], abs=TIGHT)
+    assert found.events == ()
+    assert found.bars["q"][-1] < TIGHT
+
+
+def test_a_coupled_joint_that_sticks_holds_the_other() -> None:
+    """A wheel driven through a gear stays as long as the reflected friction of the other one is stronger."""
+    wheels = (Body("a", 1.0, inertia=ONES), Body("b", 1.0, inertia=ONES))
+    joints = (
+        Joint("one", "revolute", "world", "a", torque=Formula("2*t")),
+        Joint("two", "revolute", "world", "b", friction=0.5),
+    )
+    made = Mechanism(wheels, joints, couplings=(Coupling("g", "one", "two", -2.0),), gravity=(0, 0, 0))
+    found = truth_of(made, np.array([0.0, 0.4, 1.0]))
+    assert [(event.kind, event.name) for event in found.events] == [("slip", "two")]
+    assert found.events[0].time == pytest.approx(0.5, abs=TIGHT)
+    # (1 + 4) a = 2 t - 2 * 0.5 from then on
+    assert found.record.q[:, 0] == pytest.approx([0.0, 0.0, 0.5**3 / 15], abs=TIGHT)
+    assert found.record.named[1] == pytest.approx([-0.4, 0.4], abs=TIGHT)
+
+
+def by_itself(mass: float, motor: Actuator, spring: float, target: Formula, until: float) -> tuple[float, list[float]]:
+    """Last place of a mass on a spring under a servo with a limit, and times at which the limit begins or ends."""
+    n, bound = motor.gear, motor.bound
+
+    def wanted(t: float, y: np.ndarray) -> float:
+        return float(n * (motor.kp * (target.at(t) - n * y[0]) - motor.kd * n * y[1]))
+
+    def rate(t: float, y: np.ndarray) -> list[float]:
+        free = wanted(t, y)
+        effort = free if mode == 0 else mode * bound
+        return [y[1], (effort - spring * y[0]) / mass]
+
+    def upper(t: float, y: np.ndarray) -> float:
+        return wanted(t, y) - bound
+
+    def lower(t: float, y: np.ndarray) -> float:
+        return wanted(t, y) + bound
+
+    y, t, times = np.zeros(2), 0.0, []
+    first = wanted(0.0, y)
+    mode = int(np.sign(first)) if abs(first) > bound else 0
+    upper.terminal = lower.terminal = True  # type: ignore[attr-defined]
+    while t < until:
+        upper.direction, lower.direction = (-1.0, 1.0) if mode else (1.0, -1.0)  # type: ignore[attr-defined]
+        events = [upper, lower] if mode == 0 else [upper if mode > 0 else lower]
+        found = solve_ivp(rate, (t, until), y, "DOP853", events=events, rtol=1e-12, atol=1e-13)
+        y, t = found.y[:, -1], float(found.t[-1])
+        if found.status == 1:
+            times.append(t)
+            mode = 0 if mode else (1 if len(found.t_events[0]) else -1)
+    return float(y[0]), times
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:
+    """With random numbers and a target of time, place and switches are those of a plain solver with events."""
+    random = np.random.default_rng(seed)
+    mass, spring, kp = random.uniform(0.5, 2), random.uniform(0, 20), random.uniform(20, 80)
+    gear = float(random.choice([-2.0, 0.5, 1.5]))
+    target = Formula(f"{random.uniform(0.5, 1.5)}*cos({random.uniform(1, 6)}*t) + 0.3*t")
+    motor = Actuator("a", "j", "position", target, kp, random.uniform(0, 4), gear, random.uniform(3, 12))
+    place, times = by_itself(mass, motor, spring, target, 1.5)
+    found = truth_of(slider(motor, mass, stiffness=spring), np.array([0.0, 1.5]))
+    assert len(times) > 1
+    assert all(b - a > 1e-6 for a, b in pairwise(times))
+    assert [event.time for event in found.events] == pytest.approx(times, abs=1e-8)
+    assert found.record.q[1, 0] == pytest.approx(place, abs=1e-8)
+    assert found.bars["q"][-1] < 1e-10
