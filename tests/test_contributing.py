@@ -1,0 +1,64 @@
+"""CONTRIBUTING.md leads to files that are there, and to commands that exist."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+SOURCE = ROOT / "src" / "proofroll"
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+# Parts of every kind of element or study: "the element's `kind.py`".
+_OF_EACH = ("elements/*", "studies/*")
+
+
+def rows() -> list[str]:
+    """The lines of tables with at least one path in code."""
+    return [line for line in TEXT.splitlines() if line.startswith("|") and paths(line)]
+
+
+def paths(line: str) -> list[str]:
+    """The paths in a line: names in code with a slash or the ending of a file."""
+    return [name for name in re.findall(r"`([^`\s]+)`", line) if re.search(r"/|\.(py|md|toml|html|bib)$", name)]
+
+
+def missing(line: str) -> list[str]:
+    """The paths of a line that lead nowhere; a name without a folder lies beside the path before it."""
+    found: list[str] = []
+    before: list[Path] = []
+    for name in paths(line):
+        bases = [*before, SOURCE, ROOT, ROOT / "docs", *(folder for each in _OF_EACH for folder in SOURCE.glob(each))]
+        places = [place for base in bases for place in base.glob(name.rstrip("/"))]
+        if not places:
+            found.append(name)
+            continue
+        folder = places[0] if places[0].is_dir() else places[0].parent
+        before = [folder, *before]
+    return found
+
+
+@pytest.mark.parametrize("line", rows(), ids=lambda line: line.split("|")[1].strip()[:50])
+def test_every_path_of_a_table_is_there(line: str) -> None:
+    """Each path in a table of CONTRIBUTING.md is a file or a folder of this repository."""
+    assert missing(line) == []
+
+
+def test_a_wrong_path_is_seen() -> None:
+    """A path that is not there is named, and the others of its line are not."""
+    assert missing("| a | `core/verdict.py`, `convergence.py`, `nowhere.py`, `studies/none/` |") == [
+        "nowhere.py", "studies/none/",
+    ]  # fmt: skip
+
+
+def test_every_folder_of_tests_is_explained() -> None:
+    """Each folder of tests has its place in the table of what tests guard."""
+    folders = {path.parent.name for path in (ROOT / "tests").glob("*/test_*.py")}
+    assert [name for name in sorted(folders) if f"`tests/{name}/`" not in TEXT] == []
+
+
+def test_every_folder_of_the_package_is_on_the_map() -> None:
+    """Each folder of the package has a row of the map."""
+    folders = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
+    assert [name for name in sorted(folders) if f"| `{name}/` |" not in TEXT] == []
