@@ -18,6 +18,7 @@ from proofroll.truth.crossing import first_rise
 
 State = FloatArray
 ModeT = TypeVar("ModeT")
+LegT = TypeVar("LegT", bound="Span")
 Rates = Callable[[float, State], FloatArray]
 # Stretches without any length, one after the other, after which a route is taken to make no progress.
 _STUCK = 50
@@ -31,11 +32,29 @@ class Happening:
         kind: as the kind of element names its events.
         name: of what changes.
         time: [s].
+        blur: how far off the time may be, by every route [s].
     """
 
     kind: str
     name: str
     time: float
+    blur: float = 0.0
+
+
+class Span(Protocol):
+    """A stretch of time in one mode, as a kind of element describes it."""
+
+    @property
+    def start(self) -> float:
+        """Its start [s]."""
+
+    @property
+    def end(self) -> float:
+        """Its end [s]."""
+
+    @property
+    def guard(self) -> object | None:
+        """The guard that ended it; None: the end of time."""
 
 
 @dataclass(frozen=True)
@@ -63,48 +82,56 @@ class Transition(Generic[ModeT]):
     """What a route makes of the end of a leg.
 
     Attributes:
-        state, mode: of the next leg.
+        state, mode: of the next leg; no mode: what follows is not known, and the path ends.
         happenings: what changed.
         margin: how far from another outcome the forces were, relative; inf where nothing was decided.
         delay: time after the leg's end at which the changes are over [s]: infinitely many may follow each other within.
+        blur: how far off that delay may be, by every route [s].
     """
 
     state: State
-    mode: ModeT
+    mode: ModeT | None
     happenings: tuple[tuple[str, str], ...]
     margin: float = np.inf
     delay: float = 0.0
+    blur: float = 0.0
 
 
-class HybridRoute(Protocol[ModeT]):
+class Legs(Protocol[ModeT, LegT]):
     """One way of integrating the legs, in state variables of its own."""
-
-    def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
-        """States at rising times from the start of a leg on [s], shape (times, state)."""
 
     def begin(self) -> Transition[ModeT]:
         """The state and mode at time 0."""
 
-    def walk(self, time: float, state: State, mode: ModeT, until: float) -> Stretch[ModeT]:
+    def walk(self, time: float, state: State, mode: ModeT, until: float) -> LegT:
         """One leg from ``time`` to its first guard, or to ``until`` [s]."""
 
-    def change(self, leg: Stretch[ModeT]) -> Transition[ModeT]:
-        """What comes after a leg that a guard ended."""
+    def change(self, leg: LegT) -> Transition[ModeT]:
+        """State and mode after a leg that a guard or a break ended."""
+
+
+class HybridRoute(Legs[ModeT, Stretch[ModeT]], Protocol):
+    """Legs as stretches with a state at their start, from which any time within is found."""
+
+    def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
+        """States at rising times from the start of a leg on [s], shape (times, state)."""
 
 
 @dataclass(frozen=True)
-class HybridPath(Generic[ModeT]):
+class HybridPath(Generic[LegT]):
     """The whole sequence.
 
     Attributes:
         legs: one after another from time 0.
         happenings: each change, with its time.
         margins: of each decision: time [s] and distance from another outcome, relative.
+        known: the last leg reaches the end of time; else what follows it is not known.
     """
 
-    legs: tuple[Stretch[ModeT], ...]
+    legs: tuple[LegT, ...]
     happenings: tuple[Happening, ...]
     margins: tuple[tuple[float, float], ...]
+    known: bool = True
 
     def leg_at(self, times: FloatArray) -> list[int]:
         """Number of the leg at each time [s]; a time of a change belongs to the later leg."""
@@ -112,31 +139,31 @@ class HybridPath(Generic[ModeT]):
         return [int(k) for k in np.searchsorted(ends, times, side="right")]
 
 
-def follow(route: HybridRoute[ModeT], until: float, breaks: Sequence[float] = ()) -> HybridPath[ModeT]:
-    """Everything from time 0 to ``until`` [s]; a stretch ends at each of the rising ``breaks`` [s] of its rates.
+def follow(route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = ()) -> HybridPath[LegT]:
+    """Path from time 0 to ``until`` [s]; a leg ends at each of the rising ``breaks`` [s] of its rates.
 
     Raises:
         Diverged: the route makes no progress.
     """
-    time, change, still = 0.0, route.begin(), 0
-    legs: list[Stretch[ModeT]] = []
-    happenings = [Happening(*what, time) for what in change.happenings]
-    margins = [(time, change.margin)]
+    time, over, change, still = 0.0, 0.0, route.begin(), 0
+    legs: list[LegT] = []
+    happenings: list[Happening] = []
+    margins = []
     while True:
+        over = max(over, time + change.delay)  # nothing is told to happen before what led to it is over
+        happenings += [Happening(*what, over, change.blur) for what in change.happenings]
+        margins.append((time, change.margin))
+        if change.mode is None:
+            return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
         end = next((at for at in breaks if time < at < until), until)
         leg = route.walk(time, change.state, change.mode, end)
         legs.append(leg)
-        if leg.guard is None and end < until:
-            time, change = end, Transition(leg.last, leg.mode, ())
-            continue
-        if leg.guard is None:
+        if leg.guard is None and end == until:
             return HybridPath(tuple(legs), tuple(happenings), tuple(margins))
         still = still + 1 if leg.end <= leg.start else 0
         if still > _STUCK:
             raise Diverged(f"the truth makes no progress at {leg.end:g} s, where its modes alternate at once")
         time, change = leg.end, route.change(leg)
-        happenings += [Happening(*what, time + change.delay) for what in change.happenings]
-        margins.append((time, change.margin))
 
 
 def walked(
@@ -252,7 +279,9 @@ def _integrated(rates: Rates, state: State, start: float, end: float, tolerance:
     return np.asarray(solver.y)
 
 
-def states_of(route: HybridRoute[ModeT], path: HybridPath[ModeT], times: FloatArray, legs: Sequence[int]) -> FloatArray:
+def states_of(
+    route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, legs: Sequence[int]
+) -> FloatArray:
     """States at rising times [s], each within the leg of the given number, shape (times, state)."""
     at = np.asarray(legs)
     parts = [route.within(path.legs[number], times[at == number]) for number in sorted(set(legs))]

@@ -10,7 +10,7 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.ball_on_surface.route import End, Leg, Motion, Path, Route, World
+from proofroll.truth.ball_on_surface.route import End, Leg, Route, World
 from proofroll.truth.crossing import first_rise
 
 # A ball that leaves the wall is looked for on it from this part of its pace on; its gap has grown from zero till then.
@@ -33,79 +33,75 @@ def pressed(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
 
 
 @dataclass(frozen=True)
+class Bounce:
+    """A ball that leaves its impact.
+
+    Attributes:
+        world: its place [m], velocity [m/s] and spin [rad/s] after it.
+        seen: it goes high enough to be an event.
+    """
+
+    world: World
+    seen: bool
+
+
+@dataclass(frozen=True)
 class Landed:
     """A ball that has come to stay on the wall.
 
     Attributes:
-        time: of its last impact that is followed [s].
-        settled: of the last of all, since when it stays [s]; the ball goes as far meanwhile as if it stayed before.
-        world: its place [m], velocity [m/s] and spin [rad/s] then.
+        rest: time from the impact that is the last to be followed to the last of all, since when it stays [s]; it goes
+            as far meanwhile as if it stayed.
+        blur: how far off that may be [s], for both routes.
+        world: its place [m], velocity [m/s] and spin [rad/s] at the impact that is the last to be followed.
         slip: velocity of its contact point [m/s], shape (3,); None: it rolls.
     """
 
-    time: float
-    settled: float
+    rest: float
+    blur: float
     world: World
     slip: FloatArray | None
 
 
-def touching(route: Route, landed: Landed) -> FloatArray:
-    """The state in which a ball goes on that has landed."""
-    state = route.at(*landed.world)
-    return state if landed.slip is not None else route.nudged(state, landed.world[1])
-
-
-def airborne(
-    body: RollingBall,
-    route: Route,
-    world: World,
-    time: float,
-    until: float,
-    path: Path,
-) -> Landed | float | None:
-    """Flights and impacts from ``time`` on, added to the path, until the ball stays on the wall.
+def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | None:
+    """What becomes of a ball at the end of a flight.
 
     A ball that leaves each impact with e times its speed bounces infinitely often in a finite time: below a speed that
     does not matter (:data:`_LOW`) its last impact takes all of it, which gives the wall the same impulse as all the
     others together.
 
     Returns:
-        How it goes on; None if it flies until the end; the time [s] of a landing about which nothing is said.
+        None: the contact has no restitution, so nothing is said about what follows.
+
+    Raises:
+        Refused: the wall moves, or the spin has no limit.
+        Diverged: the flight has no length.
     """
     e, e_t = body.contact.restitution, body.contact.tangential_restitution
+    time = flight.end
+    if e is None:
+        return None
+    if body.wall_rate is not None:
+        raise Refused(f"the ball lands at t = {time:.9g} s on a wall that moves, which is not followed")
+    if not time > flight.start:
+        raise Diverged(f"the truth makes no progress at {time:g} s, where the ball bounces")
     natural = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity))
-    while True:
-        lands, motion = _flight(body, world, time, until)
-        path.legs.append(Leg(time, until if lands is None else lands, False, route.start(), End.TIME, motion))
-        if lands is None or e is None:
-            return lands
-        if body.wall_rate is not None:
-            raise Refused(f"the ball lands at t = {lands:.9g} s on a wall that moves, which is not followed")
-        if not lands > time:
-            raise Diverged(f"the truth makes no progress at {time:g} s, where the ball bounces")
-        time = lands
-        at = motion(np.array([time]))
-        p, v, w = at.p_WB[0], at.v_WB[0], at.w_WB[0]
-        e1 = body.surface.normal(p)
-        approach, weight = float(v @ e1), pressed(body, p, v - (v @ e1) * e1)
-        if e * approach > _LOW * natural or weight < 0:
-            world = (p, *route.impact(body, p, v, w, e, e_t))
-            if e * approach > _SEEN * natural:
-                path.events.append(("bounce", time))
-            continue
-        bounced = np.isinf(body.contact.mu_static) and e_t == 1 and 0 < e < 1
-        if bounced and _slip(body, v, w, e1) is not None:
-            raise Refused(
-                f"at about {time:.6g} s the ball comes to stay on the wall after infinitely many bounces, each of "
-                "which turns back its contact point whole, so its spin has no limit; "
-                "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
-            )
-        v, w = route.impact(body, p, v, w, 0.0, 0.0)
-        rest = 2 * e * approach / ((1 - e) * weight) if e else 0.0
-        settled = time + rest
-        path.events.append(("settle", settled))
-        path.blurs[settled] = rest**2 * (natural + np.linalg.norm(v)) * _bend(body, p)  # the weight changes meanwhile
-        return Landed(time, settled, (p, v, w), _slip(body, v, w, e1))
+    p, v, w = flight.at_end()
+    e1 = body.surface.normal(p)
+    approach, weight = float(v @ e1), pressed(body, p, v - (v @ e1) * e1)
+    if e * approach > _LOW * natural or weight < 0:
+        return Bounce((p, *route.impact(body, p, v, w, e, e_t)), bool(e * approach > _SEEN * natural))
+    bounced = np.isinf(body.contact.mu_static) and e_t == 1 and 0 < e < 1
+    if bounced and _slip(body, v, w, e1) is not None:
+        raise Refused(
+            f"at about {time:.6g} s the ball comes to stay on the wall after infinitely many bounces, each of "
+            "which turns back its contact point whole, so its spin has no limit; "
+            "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
+        )
+    v, w = route.impact(body, p, v, w, 0.0, 0.0)
+    rest = 2 * e * approach / ((1 - e) * weight) if e else 0.0
+    blur = rest**2 * (natural + np.linalg.norm(v)) * _bend(body, p)  # the weight changes meanwhile
+    return Landed(rest, float(blur), (p, v, w), _slip(body, v, w, e1))
 
 
 def _bend(body: RollingBall, p_WB: FloatArray) -> float:
@@ -122,8 +118,11 @@ def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> Fl
     return slip if size > _STANDS * (np.sqrt(a * gravity) + np.linalg.norm(v) + a * np.linalg.norm(w)) else None
 
 
-def _flight(body: RollingBall, world: World, time: float, until: float) -> tuple[float | None, Motion]:
-    """Free fall from ``time`` [s] with constant spin: when the ball is on the wall again (None: not until the end)."""
+def flown(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> Leg:
+    """Free fall from ``time`` [s] with constant spin until the ball is on the wall again, or to ``until`` [s].
+
+    ``state`` is what the leg has for a state of a ball that touches the wall.
+    """
     p, v, w = world
 
     def way(times: FloatArray) -> FloatArray:
@@ -152,4 +151,6 @@ def _flight(body: RollingBall, world: World, time: float, until: float) -> tuple
     while lands is None and start < until:  # the gap is a smooth function of the time since: ever longer looks suffice
         end = min(time + 2 * (start - time), until)
         lands, start = first_rise(sunk, start, end), end
-    return lands, motion
+    if lands is None:
+        return Leg(time, until, False, state, End.TIME, motion)
+    return Leg(time, lands, False, state, End.LANDED, motion)

@@ -28,6 +28,7 @@ class End(Enum):
     STILL = auto()  # slipping: the contact point stands still
     HALT = auto()  # sticking with rolling resistance: the centre stands still
     LIFTOFF = auto()  # the normal force reached zero
+    LANDED = auto()  # flying: the ball is on the wall again
     GROWN = auto()  # of the start of a slip, never of a leg: the slip has a direction of its own
 
 
@@ -49,6 +50,16 @@ class Leg:
     state: FloatArray
     why: End
     motion: Motion
+
+    @property
+    def guard(self) -> End | None:
+        """Reason that it ended before the end of time; None: it did not."""
+        return None if self.why is End.TIME else self.why
+
+    def at_end(self) -> World:
+        """Place, velocity and spin at the end, before anything changes there."""
+        last = self.motion(np.array([self.end]))
+        return last.p_WB[0], last.v_WB[0], last.w_WB[0]
 
 
 class Route(ABC):
@@ -134,8 +145,8 @@ class Path:
         blurs: how far off events at a time [s] may be that both routes find in one way [s].
     """
 
-    legs: list[Leg] = field(default_factory=list)
-    events: list[tuple[EventKind, float]] = field(default_factory=list)
+    legs: list[Leg]
+    events: list[tuple[EventKind, float]]
     lands: float | None = None
     blurs: dict[float, float] = field(default_factory=dict)
 

@@ -1,22 +1,26 @@
-"""The sequence of sticking and slipping, whatever integrates each leg of it.
+"""Rolling, slipping, flight and rest of a ball, one after the other, whatever integrates each leg.
 
-A leg is a stretch of time in one mode. A :class:`Route` integrates one leg at a time and says why it ended; here is
-decided what comes next. Nothing limits the number of legs: only the end of time ends the sequence.
+A :class:`Route` integrates one leg at a time and says why it ended; here is decided what comes next.
+:func:`proofroll.truth.hybrid.follow` puts the legs together.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
+from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, setting_off, stands, stays
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
-from proofroll.truth.ball_on_surface.flight import Landed, airborne, pressed, touching
-from proofroll.truth.ball_on_surface.route import End, Leg, Path, Route
+from proofroll.truth import hybrid
+from proofroll.truth.ball_on_surface.flight import Bounce, flown, landed, pressed
+from proofroll.truth.ball_on_surface.route import End, Leg, Path, Route, World
+from proofroll.truth.hybrid import Transition
 
 # Relative distance from the friction cone below which round-off decides on which side a state is; round-off is 1e-15.
 _ON_CONE = 1e-12
@@ -31,72 +35,118 @@ _REVERSALS = 10
 _SHORTER = 1e-6
 
 
-def follow(body: RollingBall, route: Route, until: float) -> Path:  # noqa: PLR0912, PLR0915 -- one per end
+@dataclass(frozen=True)
+class Mode:
+    """How a ball moves during a leg.
+
+    Attributes:
+        flight: place [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: it touches the wall.
+        sticking: it rolls without slip, or rests.
+        slip: velocity of the contact point at the start of a slip [m/s], shape (3,); None: at rest.
+        rests: nothing moves any more but a spin about the normal.
+    """
+
+    flight: World | None = None
+    sticking: bool = False
+    slip: FloatArray | None = None
+    rests: bool = False
+
+
+ROLLS = Mode(sticking=True)
+RESTS = Mode(sticking=True, rests=True)
+
+
+def follow(body: RollingBall, route: Route, until: float) -> Path:
     """Path from time 0 to ``until`` [s].
 
     Raises:
         Refused: the ball slips to and fro ever faster.
         Diverged: a route makes no progress.
     """
-    path = Path()
-    legs, events = path.legs, path.events
-    reversals = 0
-    time, begins, state = 0.0, 0.0, route.start()
-    if not body.gap0 and stands(body, route.world(state)[1]):
-        if stays(body, route.world(state)[0]):
-            return Path([_rest(body, route, state, time, until)], events)
-        state = route.nudged(state, setting_off(body, route.world(state)[0]))
-    slip = body.slip0 if np.any(body.slip0) else None
-    falls = not body.gap0 and pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body)
-    if falls:
-        events.append(("lift_off", time))
-    flight = (body.p0, body.v0, body.w0) if falls or body.gap0 else None
-    sticking: bool | None = None  # it has just begun to touch the wall
-    while True:
-        if flight is not None:
-            came = airborne(body, route, flight, time, until, path)
-            if not isinstance(came, Landed):
-                return replace(path, lands=came)
-            time, begins, slip, state = came.time, came.settled, came.slip, touching(route, came)
-            flight, sticking = None, None
-        if sticking is None:
-            sticking = slip is None and not _must_slip(body, route, state)
-            if not sticking:
-                events.append(("slip", max(time, begins)))
-        leg = route.stick(time, state, until) if sticking else route.slip(time, state, until, slip)
-        slip = None
-        legs.append(leg)
-        if not leg.end > time and leg.why is not End.TIME and len(legs) > 1 and legs[-2].end == legs[-2].start:
-            raise Diverged(f"the truth makes no progress at {time:g} s, where sticking and slipping alternate at once")
-        time, state = leg.end, leg.state
-        if leg.why is End.TIME:
-            return path
+    path = hybrid.follow(SwitchedBall(body, route), until)
+    events = [(cast(EventKind, event.kind), event.time) for event in path.happenings]
+    blurs = {event.time: event.blur for event in path.happenings if event.blur}
+    return Path(list(path.legs), events, None if path.known else path.legs[-1].end, blurs)
+
+
+class SwitchedBall:
+    """The legs of a ball by one route. See :class:`proofroll.truth.hybrid.Legs`."""
+
+    def __init__(self, body: RollingBall, route: Route) -> None:
+        self.body, self.route = body, route
+        self._reversals, self._spans = 0, (0.0, 0.0)  # of the last two legs [s]
+
+    def begin(self) -> Transition[Mode]:
+        """See the protocol."""
+        body, route, state = self.body, self.route, self.route.start()
+        if body.gap0:
+            return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ())
+        p, v, _ = route.world(state)
+        if stands(body, v):
+            if stays(body, p):
+                return Transition(state, RESTS, ())
+            state = route.nudged(state, setting_off(body, p))
+        if pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body):
+            return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), (("lift_off", ""),))
+        return self._touching(state, body.slip0 if np.any(body.slip0) else None)
+
+    def walk(self, time: float, state: FloatArray, mode: Mode, until: float) -> Leg:
+        """See the protocol."""
+        if mode.flight is not None:
+            leg = flown(self.body, mode.flight, time, until, state)
+        elif mode.rests:
+            leg = _rest(self.body, self.route, state, time, until)
+        elif mode.sticking:
+            leg = self.route.stick(time, state, until)
+        else:
+            leg = self.route.slip(time, state, until, mode.slip)
+        self._spans = self._spans[1], leg.end - leg.start
+        return leg
+
+    def change(self, leg: Leg) -> Transition[Mode]:
+        """See the protocol."""
+        body, route, state = self.body, self.route, leg.state
+        if leg.why is End.LANDED:
+            return self._landed(leg)
         if leg.why is End.LIFTOFF:
-            events.append(("lift_off", time))
-            last = leg.motion(np.array([time]))  # with the slip that a state does not tell
-            flight = last.p_WB[0], last.v_WB[0], last.w_WB[0]
-            continue
+            # With the slip that a state does not tell.
+            return Transition(route.start(), Mode(flight=leg.at_end()), (("lift_off", ""),))
         if _comes_to_rest(body, route, leg):
-            if not sticking:
-                events.append(("stick", max(time, begins)))
-            legs.append(_rest(body, route, route.nudged(state, np.zeros(3)), time, until))
-            return path
+            stopped = () if leg.sticking else (("stick", ""),)
+            return Transition(route.nudged(state, np.zeros(3)), RESTS, stopped)
         if leg.why is End.HALT:
             state = route.nudged(state, setting_off(body, route.world(state)[0]))
-        hastens = len(legs) > 1 and leg.end - leg.start < (1 - _SHORTER) * (legs[-2].end - legs[-2].start)
-        reversals = reversals + 1 if leg.why is End.STILL and not sticking and hastens else 0
-        if reversals > _REVERSALS:
+        before, span = self._spans
+        hastens = leg.why is End.STILL and not leg.sticking and span < (1 - _SHORTER) * before
+        self._reversals = self._reversals + 1 if hastens else 0
+        if self._reversals > _REVERSALS:
             raise Refused(
-                f"from about {time:.6g} s on the ball slips to and fro ever faster, for resistance stops the rolling "
-                "before friction stops the centre; end the run earlier, or take more friction or less resistance"
+                f"from about {leg.end:.6g} s on the ball slips to and fro ever faster, for resistance stops the "
+                "rolling before friction stops the centre; "
+                "end the run earlier, or take more friction or less resistance"
             )
         # With |u| = 0 the ball sticks if it can; where the needed force is outside the cone it goes on slipping.
-        must_slip = leg.why is End.CONE or _must_slip(body, route, state)
-        if must_slip and sticking:
-            events.append(("slip", max(time, begins)))
-        elif not must_slip and not sticking:
-            events.append(("stick", max(time, begins)))
-        sticking = not must_slip
+        slips = leg.why is End.CONE or _must_slip(body, route, state)
+        if slips != leg.sticking:
+            return Transition(state, Mode() if slips else ROLLS, ())
+        return Transition(state, Mode() if slips else ROLLS, (("slip" if slips else "stick", ""),))
+
+    def _landed(self, leg: Leg) -> Transition[Mode]:
+        came = landed(self.body, self.route, leg)
+        if came is None:
+            return Transition(leg.state, None, ())
+        if isinstance(came, Bounce):
+            return Transition(leg.state, Mode(flight=came.world), (("bounce", ""),) if came.seen else ())
+        state = self.route.at(*came.world)
+        state = state if came.slip is not None else self.route.nudged(state, came.world[1])
+        after = self._touching(state, came.slip)
+        return Transition(state, after.mode, (("settle", ""), *after.happenings), delay=came.rest, blur=came.blur)
+
+    def _touching(self, state: FloatArray, slip: FloatArray | None) -> Transition[Mode]:
+        """The mode of a ball that has just begun to touch the wall, its contact point at the velocity ``slip``."""
+        if slip is None and not _must_slip(self.body, self.route, state):
+            return Transition(state, ROLLS, ())
+        return Transition(state, Mode(slip=slip), (("slip", ""),))
 
 
 def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:

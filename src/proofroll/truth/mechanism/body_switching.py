@@ -85,7 +85,8 @@ class SwitchedBodies:
 
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
-        assert leg.guard is not None  # nothing changes at the end of time
+        if leg.guard is None:  # at a break
+            return Transition(leg.last, leg.mode, ())
         which, kind = guards_of(self.joints, leg.mode)[leg.guard]
         mode, last = list(leg.mode), np.append(leg.last[:-1], leg.end)
         if kind in MODES:

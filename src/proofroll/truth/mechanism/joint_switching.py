@@ -78,7 +78,8 @@ class SwitchedTree:
 
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
-        assert leg.guard is not None  # nothing changes at the end of time
+        if leg.guard is None:  # at a break
+            return Transition(leg.last, leg.mode, ())
         which, kind = guards_of(self.joints, leg.mode)[leg.guard]
         state, mode = leg.last.copy(), list(leg.mode)
         state[-1] = leg.end

@@ -16,7 +16,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.truth.hybrid import HybridPath, follow, least_margin, states_of
+from proofroll.truth.hybrid import HybridPath, Stretch, follow, least_margin, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
@@ -36,6 +36,8 @@ _GRAZED = 1e-8  # rad, m or part by which a stop or a limit must be passed to ac
 _SCOUT = 1e-9  # of a look ahead: whether any stop is reached
 # Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
 CLOSE = 1e-9
+
+_Path = HybridPath[Stretch[Any]]
 
 
 def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -88,7 +90,10 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
     check_start(equations, second)
     tree, bodies = SwitchedTree(equations, _TOLERANCE), SwitchedBodies(second.lean, equations.switched, _TOLERANCE)
     until, kinks = float(times[-1]), breaks(mechanism.signals)
-    paths: tuple[HybridPath[Any], HybridPath[Any]] = (follow(tree, until, kinks), follow(bodies, until, kinks))
+    paths: tuple[_Path, _Path] = (
+        follow(tree, until, kinks),
+        follow(bodies, until, kinks),
+    )
     parted = _parted(*paths)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
@@ -121,7 +126,7 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
     return TwoRouteMotion(masked, bars, differences, horizon, [], found.determinate, routes, None, events, reason)
 
 
-def _parted(one: HybridPath[Any], two: HybridPath[Any]) -> float:
+def _parted(one: _Path, two: _Path) -> float:
     """Start of the first leg in which the two routes are in different modes [s]; inf: there is none."""
     for a, b in zip(one.legs, two.legs, strict=False):
         if a.mode != b.mode:
@@ -130,7 +135,7 @@ def _parted(one: HybridPath[Any], two: HybridPath[Any]) -> float:
     return np.inf if len(one.legs) == len(two.legs) else min(p.legs[last - 1].end for p in (one, two))
 
 
-def _events(one: HybridPath[Any], two: HybridPath[Any]) -> Sequence[Event]:
+def _events(one: _Path, two: _Path) -> Sequence[Event]:
     """The changes of both routes, each with a bracket that holds both times and their round-off."""
     found = []
     for a, b in zip(one.happenings, two.happenings, strict=True):
