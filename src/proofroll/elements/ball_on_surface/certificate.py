@@ -60,7 +60,10 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
     natural = natural_acceleration(body)
     frame = body.surface.frame(body.u0)
     fall = float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
-    speed = float(np.linalg.norm(body.v0)) or fall or 1.0
+    # A velocity is the sum of that of the contact and what the ball turns, each known to its own rounding.
+    wall = wall_velocity(body, body.p0, frame[:, 0])
+    turns = body.ball.radius * float(np.linalg.norm(body.w0))
+    speed = max(float(np.linalg.norm(body.v0)), float(np.linalg.norm(wall)), turns) or fall or 1.0
     spin = max(float(np.linalg.norm(body.w0)), speed / body.ball.radius)
     lines: list[Line] = []
 

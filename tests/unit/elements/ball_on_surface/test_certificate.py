@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -202,6 +203,20 @@ FRICTION: dict[str, Any] = {
     "mu_kinetic": 0.25,
     "angular_acceleration": initial_angular_acceleration(rolling_ball(SLIPPING)),
 }
+
+
+def test_a_velocity_is_measured_by_all_that_makes_it() -> None:
+    """A ball that spins fast and goes slowly has its velocity from contact and spin: their roundings are no lie."""
+    scene = load_scene("slide_to_roll", speed=1e-4, back_spin=213.7)
+    body = rolling_ball(scene)
+    rounded = body.v0 + np.array([1e-6, 0, 0])  # two roundings of the 5 m/s with which the ball's lowest point moves
+    single = SimpleNamespace(precision="single")
+    friction = {"mu_static": body.contact.mu_static, "mu_kinetic": body.contact.mu_kinetic}
+    lines = certify(Stub(scene, {"v_WB": rounded}, **friction), scene, single)
+    assert [line.quantity for line in lines if not line.holds] == []
+    wrong = body.v0 + np.array([1e-3, 0, 0])
+    assert "velocity is" in str(first_difference(certify(Stub(scene, {"v_WB": wrong}, **friction), scene, single)))
+    assert "velocity is" in str(first_difference(certify(Stub(scene, {"v_WB": rounded}, **friction), scene)))
 
 
 def test_friction_and_angular_acceleration_are_certified() -> None:
