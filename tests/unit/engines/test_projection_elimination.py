@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 import scipy.linalg.lapack
 
+from proofroll.core.errors import Refused
+from proofroll.core.plugins import load_engine
+from proofroll.elements.ball_on_surface.compiled.library import available
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.sampling import independent
 from proofroll.engines.projection.connections import Bodies
 from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.engines.projection.recursion import Recursion
 
 ROUND_OFF = 1e-12
 
@@ -97,3 +101,49 @@ def test_a_tree_may_lock_nothing_or_everything(kind):
     assert run.built().mobility == (0 if held else 6)
     np.testing.assert_allclose(run.sample().p_WB[0, 2], 0.0 if held else -0.5 * 9.81 * 0.01, atol=ROUND_OFF)
     np.testing.assert_allclose(run.sample().joint_force[0, 2], 2.0 * 9.81 if held else 0.0, atol=1e-11)
+
+
+def sprung_tree() -> Mechanism:
+    """A joint of every kind with dampers and drives, and a spring between two points."""
+    laws = {"revolute": {"damping": 0.3, "torque": 0.7}, "prismatic": {"stiffness": 3.0, "rest": 0.2, "torque": 0.5}}
+    laws["spherical"] = laws["universal"] = {"damping": 0.4}
+    joints = tuple(replace(joint, **laws.get(joint.kind, {})) for joint in tree().joints)
+    return replace(tree(), joints=joints)
+
+
+@pytest.mark.parametrize("violated", [0.0, 1e-3])
+def test_elimination_joint_by_joint_is_that_by_sums(violated):
+    """Both give the same rates and take away the same violations, in a state that obeys the joints or does not."""
+    mechanism = sprung_tree()
+    by_sums, one_by_one = DependentCoordinates(mechanism), DependentCoordinates(mechanism, Recursion)
+    x = by_sums.start + violated * np.random.default_rng(1).normal(size=len(by_sums.start))
+    for name in ("rates", "eliminated"):
+        expected, found = (getattr(each, name)(x) for each in (by_sums, one_by_one))
+        np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+
+
+@pytest.mark.skipif(not available(), reason="needs heyoka")
+@pytest.mark.parametrize("mechanism", [sprung_tree(), runs.model("heavy_top")], ids=["every kind", "top"])
+def test_compiled_equations_end_where_others_do(mechanism):
+    """A run in machine code gives the motion and the reactions of one in numpy."""
+    kind = load_engine("projection")
+    ends = []
+    for preset in ("matched", "tuned"):
+        run = kind.build(mechanism, kind.presets["dependent"][preset])
+        run.advance(0.02)
+        ends.append(run.sample())
+    for name in ("p_WB", "v_WB", "joint_force", "joint_torque"):
+        expected = getattr(ends[0], name)
+        np.testing.assert_allclose(getattr(ends[1], name), expected, atol=1e-9 * (1 + np.abs(expected).max()))
+
+
+@pytest.mark.skipif(not available(), reason="needs heyoka")
+@pytest.mark.parametrize(("name", "reason"), [("four_bar", "loops are not compiled"), ("pendulum", "turned")])
+def test_compiled_equations_refuse_what_they_do_not_hold(name, reason):
+    """Loops, and springs that count turns, are refused with the reason."""
+    mechanism = runs.model(name)
+    if name == "pendulum":
+        mechanism = replace(mechanism, joints=(replace(mechanism.joints[0], stiffness=1.0),))
+    kind = load_engine("projection")
+    with pytest.raises(Refused, match=reason):
+        kind.build(mechanism, kind.presets["dependent"]["tuned"])

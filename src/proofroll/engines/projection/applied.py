@@ -36,7 +36,8 @@ class Applied:
     def __init__(self, mechanism: Mechanism) -> None:
         index, count = mechanism.body_index, len(mechanism.bodies)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
-        start = ((law, mechanism.joints[law.connection].q0) for law in self._laws if law.stiffness)
+        sprung = [law for law in self._laws if law.stiffness and law.axis != "slide"]
+        start = ((law, mechanism.joints[law.connection].q0) for law in sprung)
         self._angles = {law: q0[1 if law.axis == "x" else 0] for law, q0 in start}
         self._balls = [
             (n, joint.damping)
@@ -54,11 +55,11 @@ class Applied:
 
     def pulls(self, bodies: Bodies) -> Array:
         """Forces of springs on the bodies, (bodies, 4, 4): matrices f pᵀ of a force at p."""
-        forces = np.zeros((len(bodies.pose), 4, 4))
+        forces = np.zeros((len(bodies.pose), 4, 4), dtype=bodies.pose.dtype)
         for spring, (a, at_a), (b, at_b) in self._springs:
             place_a, place_b = bodies.pose[a] @ at_a, bodies.pose[b] @ at_b
             between = place_b - place_a
-            length = math.sqrt(between @ between)
+            length = (between @ between) ** 0.5
             pull = spring.stiffness * (length - spring.length)
             if spring.damping:
                 rate = bodies.twist[b] @ place_b - bodies.twist[a] @ place_a
@@ -88,7 +89,8 @@ class Applied:
         """Angle [rad], on the branch nearest to the last accepted one, or distance [m]."""
         A, B = ends.A[law.connection], ends.B[law.connection]
         if law.axis == "slide":
-            return float(A[:, 2] @ ends.d[law.connection])
+            along: float = A[:, 2] @ ends.d[law.connection]
+            return along
         if law.axis == "z":
             angle = math.atan2(B[:, 0] @ A[:, 1], B[:, 0] @ A[:, 0])
         else:

@@ -16,6 +16,7 @@ from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, independent, mechanism_of
 from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.engines.projection.recursion import compiled
 from proofroll.engines.projection.settings import ProjectionSettings
 
 PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
@@ -44,13 +45,16 @@ class ProjectionMechanism:
         start = self._equations.start
         resolution = float(getattr(settings, settings.resolution))
         integrator = INTEGRATORS[settings.integrator]
-        self._motion = integrator(self._equations.rates, self._accepted, start, np.ones(len(start)), resolution)
+        equations = self._equations
+        in_numpy = equations.rates, equations.eliminated
+        rates, self._without_violations = compiled(mechanism) if settings.equations == "compiled" else in_numpy
+        self._motion = integrator(rates, self._accepted, start, np.ones(len(start)), resolution)
 
     def _accepted(self, t: float, x: Array) -> Array:
         if not np.isfinite(x.sum()):
             raise Diverged(f"the state is not finite at t = {t:.6g} s")
         if self._eliminates:
-            x = self._equations.eliminated(x)
+            x = self._without_violations(x)
         self._equations.accept(x)
         if self._equations.regularity < SINGULAR * self._most_regular:
             raise Stalled(f"a singular pose at t = {t:.6g} s, where the rows of loops become dependent")

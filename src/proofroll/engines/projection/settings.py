@@ -34,8 +34,10 @@ class ProjectionSettings:
             constraints are linear with constant coefficients, but round-off does, and it grows.
         singularity: what ``euler`` does near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
             ``stop``, as the paper's equations do by themselves.
-        equations: ``written_out``, the result of the projections in plain numbers, where the surface looks the same
-            from every point of it; or ``projected``, with the projections carried out in numpy at every evaluation.
+        equations: of balls ``written_out``, the result of the projections in plain numbers, where the surface looks
+            the same from every point of it, or ``projected``, with the projections carried out in numpy at every
+            evaluation, as those of mechanisms always are but where they are ``compiled`` (heyoka; trees of joints
+            without springs of their own).
     """
 
     formulation: Literal["euler", "rotating_frame", "dependent"] = "euler"
@@ -45,7 +47,7 @@ class ProjectionSettings:
     rtol: Annotated[float, Gt(0)] = TIGHTEST
     elimination: bool | None = None
     singularity: Literal["renew", "stop"] = "renew"
-    equations: Literal["written_out", "projected"] = "written_out"
+    equations: Literal["written_out", "projected", "compiled"] = "written_out"
 
     def __post_init__(self) -> None:
         refuse_first("projection", self, self._rules())
@@ -65,6 +67,8 @@ class ProjectionSettings:
         yield self.resolution == "dt" and self.rtol != TIGHTEST, "rtol", advice
         yield dependent and taylor, "integrator", "dependent has rk4 and dop853"
         yield dependent and projected, "equations", "dependent always projects; leave it out"
+        advice = "only mechanisms have compiled equations; leave it out, or take integrator=taylor"
+        yield self.equations == "compiled" and not dependent, "equations", advice
         advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
         yield taylor and projected, "equations", advice
         advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
@@ -103,5 +107,6 @@ PRESETS: Mapping[str, Mapping[str, ProjectionSettings]] = {
     "dependent": {
         "default": ProjectionSettings("dependent", "default", "rk4"),
         "matched": ProjectionSettings("dependent", "matched", "dop853"),
+        "tuned": ProjectionSettings("dependent", "tuned", "dop853", equations="compiled"),
     },
 }

@@ -1,0 +1,125 @@
+"""Elimination joint by joint, from the tips of the tree to the world and back, for single numbers; compiled by heyoka.
+
+Its cost grows with the number of bodies and no faster, without a matrix of all velocities: so its formulas stay few
+enough for a compiler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.ball_on_surface.compiled.library import require_heyoka
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.engines.projection.connections import SKEW, Bodies, ProjectedConnections
+from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.engines.projection.elimination import Closing, Elimination, Loads
+
+# More bodies than these are compiled in parts: slower code, in a time that grows no faster than they do.
+_WHOLE = 10
+
+
+class Recursion(Elimination):
+    """Tree of a mechanism without loops; twists are six numbers, ω and the velocity at the origin."""
+
+    def __init__(self, mechanism: Mechanism, connections: ProjectedConnections) -> None:
+        super().__init__(mechanism, connections)
+        count = len(mechanism.joints)
+        self._child, self._parent = connections.b[:count].tolist(), connections.a[:count].tolist()
+        self._velocities = [np.flatnonzero(self.joint == number).tolist() for number in range(count)]
+        self._world = len(mechanism.bodies)
+
+    def motions(
+        self, bodies: Bodies, relative: Array, loads: Loads, closing: Closing | None = None
+    ) -> tuple[Array, Array]:
+        """See :meth:`Elimination.motions`."""
+        assert closing is None
+        S = _six(self.directions(bodies))
+        steps = _six(relative.reshape(*relative.shape[:-1], 4, 4))
+        pushes = np.zeros((*relative.shape[:-2], self._world, 6), dtype=S.dtype)
+        if isinstance(loads.bent, np.ndarray):
+            pushes[...] = _moments(loads.pulls - self.forces(bodies, loads.bent))
+        drives = np.zeros(len(S)) + loads.drives
+        inertia = [_spatial(one) for one in self.inertia(bodies)]
+        parts: list[tuple[Array, Array]] = [(S[0], S[0])] * len(S)
+        for number in reversed(range(len(self._child))):
+            body, parent = self._child[number], self._parent[number]
+            solid, push = inertia[body], pushes[..., body, :] - steps[..., number, :] @ inertia[body]
+            for k in reversed(self._velocities[number]):
+                U = solid @ S[k]
+                D = S[k] @ U
+                rate = (push @ S[k] + drives[k]) / D
+                parts[k] = U / D, rate
+                solid, push = solid - np.outer(U, U / D), push - np.multiply.outer(rate, U)
+            if parent != self._world:
+                inertia[parent] = inertia[parent] + solid
+                pushes[..., parent, :] += push
+        found = np.zeros((*relative.shape[:-2], self._world + 1, 6), dtype=S.dtype)
+        for number, (body, parent) in enumerate(zip(self._child, self._parent, strict=True)):
+            motion = found[..., parent, :]
+            for k in self._velocities[number]:
+                part, rate = parts[k]
+                motion = motion + np.multiply.outer(rate - motion @ part, S[k])
+            found[..., body, :] = motion + steps[..., number, :]
+        return _four(found), np.zeros(0)
+
+
+def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
+    """Rates of the state, and the state without violations: :class:`DependentCoordinates` in machine code.
+
+    Raises:
+        Refused: heyoka is missing, or the mechanism has what these formulas do not.
+    """
+    require_heyoka("equations=compiled")
+    if mechanism.loops:
+        raise Refused("singular values of loops are not compiled; choose preset=matched")
+    equations = DependentCoordinates(mechanism, Recursion)
+    if equations.applied.remembers:
+        raise Refused(
+            "springs of joints remember how often these have turned, and are not compiled; choose preset=matched"
+        )
+    import heyoka
+
+    numbers = heyoka.make_vars(*(f"x{number}" for number in range(len(equations.start))))
+    x = np.array(numbers, dtype=object)
+    in_parts = len(mechanism.bodies) > _WHOLE
+
+    def of(formulas: Any) -> Callable[[Array], Array]:
+        found = [item if isinstance(item, heyoka.expression) else heyoka.expression(float(item)) for item in formulas]
+        function: Callable[[Array], Array] = heyoka.cfunc(found, numbers, compact_mode=in_parts)
+        return function
+
+    return of(equations.rates(x)), of(equations.eliminated(x))
+
+
+def _six(twists: Array) -> Array:
+    """(ω, v) of [ω× v; 0 0]."""
+    flat = twists[..., :3, :3].reshape(*twists.shape[:-2], 9)
+    return np.concatenate([0.5 * flat @ SKEW.T, twists[..., :3, 3]], axis=-1)
+
+
+def _four(twists: Array) -> Array:
+    found = np.zeros((*twists.shape[:-1], 4, 4), dtype=twists.dtype)
+    found[..., :3, :3] = (twists[..., :3] @ SKEW).reshape(*twists.shape[:-1], 3, 3)
+    found[..., :3, 3] = twists[..., 3:]
+    return found
+
+
+def _moments(forces: Array) -> Array:
+    """(moment about the origin, force) of matrices f pᵀ."""
+    flat = forces[..., :3, :3].reshape(*forces.shape[:-2], 9)
+    return np.concatenate([flat @ SKEW.T, forces[..., :3, 3]], axis=-1)
+
+
+def _spatial(inertia: Array) -> Array:
+    """Inertia matrix of six rows from Σ of four."""
+    found = np.zeros((6, 6), dtype=inertia.dtype)
+    found[:3, :3] = np.eye(3) * np.trace(inertia[:3, :3]) - inertia[:3, :3]
+    found[:3, 3:] = (inertia[:3, 3] @ SKEW).reshape(3, 3)
+    found[3:, :3] = found[:3, 3:].T
+    found[3:, 3:] = np.eye(3) * inertia[3, 3]
+    return found
