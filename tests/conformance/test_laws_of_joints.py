@@ -11,7 +11,12 @@ from single_precision import Single
 from proofroll.conformance import checks
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 
-LAWS = frozenset({MechanismCapability.JOINT_SPRINGS, MechanismCapability.ARMATURE, MechanismCapability.JOINT_FRICTION})
+LAWS = frozenset(
+    MechanismCapability[name]
+    for name in ("JOINT_SPRINGS", "ARMATURE", "JOINT_FRICTION", "ACTUATORS", "SATURATION", "COUPLINGS", "SIGNALS")
+)
+
+DRIVES = ("servo", "limit", "target", "coupling")
 
 
 class Deaf(Single):
@@ -20,7 +25,7 @@ class Deaf(Single):
     provides: ClassVar[Mapping[str, frozenset[str]]] = {name: LAWS | can for name, can in Single.provides.items()}
 
 
-@pytest.mark.parametrize("law", ["damping", "torque", "armature", "friction"])
+@pytest.mark.parametrize("law", ["damping", "torque", "armature", "friction", *DRIVES])
 def test_a_law_that_is_left_out_is_noticed(law: str) -> None:
     """An engine that says it has a law, and moves without it, fails the checks of its motion."""
     ending = f"[rk4-matched-double_pendulum-{law}]"

@@ -11,8 +11,10 @@ from proofroll.core.gravity import Gravity
 from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
+from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.reader import KINDS, made_mechanism
+from proofroll.elements.mechanism.signal import Formula
 
 if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
@@ -33,6 +35,27 @@ def _with_law(scene: Scene, law: str, value: float) -> Scene:
     joints = tuple(replace(joint, **changes) for joint in mechanism.joints)
     changed = replace(element, mechanism=replace(mechanism, joints=joints))
     return replace(scene, name=f"{scene.name}-{law}", elements=(changed,))
+
+
+def _with_drive(scene: Scene, drive: str) -> Scene:
+    """A scene of two hinges that both move, with an actuator at the second or a coupling of the two."""
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)  # it is one of ours
+    joints = tuple(replace(joint, v0=(_SPEED,)) for joint in element.mechanism.joints)
+    one, two = joints
+    servo = Actuator("servo", two.name, "position", 1.0, kp=30.0, kd=2.0, gear=2.0)
+    of_time = replace(servo, target=Formula("cos(5*t)"))
+    drives: Mapping[str, Mapping[str, Any]] = {
+        "servo": {"actuators": (servo,)},
+        "limit": {"actuators": (replace(servo, limit=5.0),)},
+        "target": {"actuators": (of_time,)},
+        "coupling": {"couplings": (Coupling("gear", one.name, two.name, 1.0, two.q0[0] - one.q0[0]),)},
+    }
+    changed = replace(element, mechanism=replace(element.mechanism, joints=joints, **drives[drive]))
+    return replace(scene, name=f"{scene.name}-{drive}", elements=(changed,))
+
+
+_DRIVES = ("servo", "limit", "target", "coupling")
 
 
 class MechanismKind:
@@ -68,11 +91,13 @@ class MechanismKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Mechanisms with a loop, oblique axes, a spinning body, springs, and each law of a joint."""
+        """Mechanisms with a loop, oblique axes, a spinning body, springs, each law of a joint, and each drive."""
         from proofroll.files.scene_file import load_scene
 
         found = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators")}
-        return found | {f"{_PLAIN}-{law}": _with_law(load_scene(_PLAIN), law, value) for law, value in _LAWS.items()}
+        plain = load_scene(_PLAIN)
+        found |= {f"{_PLAIN}-{law}": _with_law(plain, law, value) for law, value in _LAWS.items()}
+        return found | {f"{_PLAIN}-{drive}": _with_drive(plain, drive) for drive in _DRIVES}
 
     @staticmethod
     def hypotheses() -> Sequence[Hypothesis]:

@@ -1,0 +1,118 @@
+"""MuJoCo's actuators, joint equalities, dry friction and stops, as the scene has them."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+pytest.importorskip("mujoco")
+
+from proofroll.engines.mujoco.mechanism import MujocoMechanism
+from proofroll.engines.mujoco.settings import PRESETS
+
+ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+
+
+def built(mechanism: Mechanism, preset: str = "matched", **settings: Any) -> MujocoMechanism:
+    """The mechanism in MuJoCo, at time 0."""
+    return MujocoMechanism(mechanism, replace(PRESETS["joints"][preset], **settings))
+
+
+def slider(*actuators: Actuator, gravity: float = 0.0, **more: Any) -> Mechanism:
+    """A mass on an upright slide."""
+    return Mechanism(
+        (Body("b", 1.0, inertia=ONES),),
+        (Joint("j", "prismatic", "world", "b", **more),),
+        actuators=actuators,
+        gravity=(0, 0, -gravity),
+    )
+
+
+@pytest.mark.parametrize(
+    "actuator",
+    [
+        Actuator("a", "j", "torque", 3.0, gear=-2.0),
+        Actuator("a", "j", "velocity", 3.0, kd=5.0, gear=2.0),
+        Actuator("a", "j", "position", 3.0, kp=7.0, kd=5.0, gear=-2.0),
+        Actuator("a", "j", "position", 3.0, kp=7.0, kd=5.0, gear=2.0, limit=9.0),
+        Actuator("a", "j", "position", -3.0, kp=7.0, kd=5.0, gear=-50.0, limit=9.0),
+    ],
+)
+def test_efforts_are_those_of_the_scene(actuator: Actuator) -> None:
+    """Each kind, with its gear and its limit, has the scene's effort at the start and its motion after it."""
+    made = slider(actuator, q0=(0.2,), v0=(0.5,))
+    engine = built(made, dt=1e-4)
+    (effort,) = engine.sample().effort  # type: ignore[misc]
+    assert effort == pytest.approx(actuator.effort(0.0, 0.2, 0.5), rel=1e-12)
+    assert engine.built().acceleration[0, 2] == pytest.approx(effort, rel=1e-9)
+    engine.advance(0.2)
+    truth = truth_of(made, np.array([0.0, 0.2])).record
+    assert engine.sample().p_WB[0, 2] == pytest.approx(truth.q[1, 0], abs=1e-5)
+
+
+@pytest.mark.parametrize("signal", [Formula("sin(7*t)"), Table((0.0, 0.1, 0.4), (0.0, 1.0, -1.0))])
+def test_what_changes_in_time_is_taken_at_each_stage(signal: Formula | Table) -> None:
+    """With RK4, targets and drives are those of the stages; held over a step they would leave 1e-3."""
+    made = slider(Actuator("a", "j", "position", signal, kp=50.0, kd=2.0), torque=signal)
+    engine = built(made, dt=1e-3)
+    engine.advance(0.5)
+    truth = truth_of(made, np.array([0.0, 0.5])).record
+    found = engine.sample()
+    assert found.p_WB[0, 2] == pytest.approx(truth.q[1, 0], abs=1e-6)
+    assert found.effort == pytest.approx(truth.named[1], abs=1e-4)
+    with pytest.raises(Refused, match="in no MJCF"):
+        engine.model_file()
+    euler = built(made, "default", dt=1e-4)
+    euler.advance(0.5)
+    assert euler.sample().effort == pytest.approx(truth.named[1], abs=0.1)
+
+
+def test_a_coupling_has_its_ratio_and_its_offset() -> None:
+    """Two slides that are coupled move as the coupling says, and its force is that on joint_b."""
+    bodies = (Body("a", 1.0, inertia=ONES), Body("b", 2.0, inertia=ONES))
+    joints = (
+        Joint("one", "prismatic", "world", "a", q0=(0.4,), torque=3.0),
+        Joint("two", "prismatic", "world", "b", q0=(-0.9,)),
+    )
+    made = Mechanism(bodies, joints, couplings=(Coupling("g", "one", "two", -2.0, -0.1),), gravity=(0, 0, 0))
+    engine = built(made)
+    engine.advance(0.3)
+    found, truth = engine.sample(), truth_of(made, np.array([0.0, 0.3])).record
+    assert found.p_WB[:, 2] == pytest.approx(truth.q[1], abs=1e-6)
+    assert found.coupling == pytest.approx(truth.named[1], rel=1e-6)
+    assert truth.named[1] == pytest.approx([2.0 * -2.0 * 3.0 / 9.0])
+
+
+def test_friction_and_stops_are_told_apart() -> None:
+    """A mass that friction holds, and one that a stop holds from either side, tell the forces with their signs."""
+    held = built(slider(gravity=9.81, friction=15.0))
+    held.advance(0.1)
+    assert held.sample().friction == pytest.approx([9.81], rel=1e-3)
+    assert held.sample().stop == pytest.approx([0.0])
+    for side, limits in ((1.0, (0.0, 1.0)), (-1.0, (-1.0, 0.0))):
+        lying = built(slider(gravity=side * 9.81, limits=limits))
+        lying.advance(0.5)
+        assert lying.sample().stop == pytest.approx([side * 9.81], rel=1e-3)
+        assert lying.sample().friction == pytest.approx([0.0])
+
+
+def test_the_engine_says_that_it_has_all_of_it() -> None:
+    """Actuators, limits, couplings and signals are asked of formulation joints, and of no other of its own."""
+    provides = load_engine("mujoco").provides
+    for need in (
+        "actuators of joints",
+        "limits of efforts",
+        "couplings of joints",
+        "drives and targets that change in time",
+    ):
+        assert [name for name in provides if need in provides[name]] == ["joints"]
