@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import pytest
 
+from proofroll.cli.report import _of_groups
 from proofroll.report.page.growing import Report
 from proofroll.running.store import alone_in
 
@@ -178,3 +179,42 @@ def test_a_second_report_into_one_folder(tmp_path: Path) -> None:
         assert "this one waits for it" in second.stderr.readline()
         second.terminate()
     assert not (tmp_path / "report.html").exists()
+
+
+def test_a_planted_change_of_one_per_cent_is_found_and_nothing_else(
+    command_line: Proofroll,
+    install_engines: Callable[[Mapping[str, str]], None],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An adapter that begins to move one per cent too fast is named; the engine beside it is not."""
+    text = COMPARISON.replace('z = "1e-9 m", gamma = "1e-9 rad"', 'z = "10 %", gamma = "10 %"')
+    (claim,) = files(tmp_path, claim=text + '\n[[rows]]\nengine = "steady"\ntolerance = "tight"\n')
+    arguments = ["report", claim, "--jobs", "1", "--fresh", "--out"]
+    install_engines({"oracle": "hostile:Oracle", "steady": "hostile:Steady"})
+    assert command_line(*arguments, str(tmp_path / "old"))[0] == 0
+    old = tmp_path / "old" / "report.json"
+    code, out, _ = command_line(*arguments, str(tmp_path / "same"), "--against", str(old))
+    assert code == 0
+    assert "Of 6 runs in both reports, changed: nothing." in " ".join(out.split()), "two with their ladders"
+    monkeypatch.setenv("PROOFROLL_TEST_OFF", "0.01")
+    code, out, _ = command_line(*arguments, str(tmp_path / "new"), "--against", str(old))
+    assert code == 1
+    changes = json.loads((tmp_path / "new" / "report.json").read_text(encoding="utf-8"))["against"]["changes"]
+    assert {(item["study"], item["run"].split()[0]) for item in changes} == {("claim", "steady")}
+    assert len(changes) == 3, "the run and both rungs of its ladder"
+    assert "steady" in (tmp_path / "new" / "report.html").read_text(encoding="utf-8").split('id="changes"')[1][:4000]
+    assert "error of" in " ".join(out.split())
+
+
+def test_only_some_groups_of_scenes_are_run(proofroll: Proofroll, tmp_path: Path) -> None:
+    """--only takes the comparisons of these groups, by name or by a word of it; others are one line of advice."""
+    text = COMPARISON.replace("sphere_in_cylinder", "four_bar").replace("vary = { speed = [4] }", "")
+    text = text.replace('z = "1e-9 m", gamma = "1e-9 rad"', 'positions = "1e-9 m"')
+    claim, other = files(tmp_path, claim=COMPARISON, other=text)
+    code, _, err = proofroll("report", claim, other, "--only", "wheels", "--out", str(tmp_path / "out"))
+    assert code == 2
+    assert "groups are ball rolling, loops" in " ".join(err.split())
+    assert _of_groups([claim, other], "loops") == [other]
+    assert _of_groups([claim, other], "rolling, loops") == [claim, other]
+    assert _of_groups([claim, other], "ball rolling") == [claim]

@@ -35,6 +35,14 @@ def report(
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
     budget: options.Budget = None,
+    only: Annotated[
+        str | None,
+        typer.Option(help="Groups of scenes, as loops,contact: all comparisons of these, and no studies."),
+    ] = None,
+    against: Annotated[
+        Path | None,
+        typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -48,18 +56,22 @@ def report(
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
+    from proofroll.report.against import EarlierReport
     from proofroll.report.page.growing import begun
     from proofroll.report.parts import all_parts, parts_of
     from proofroll.running.store import alone_in
     from proofroll.running.worker_pool import Workers
 
+    earlier = EarlierReport.read(against) if against else None
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
+    if only:
+        names, parts = _of_groups(names if studies else [*names, *further_comparison_names()], only), []
     workers, assigned = Workers(), options.assignments(settings)
     if assigned and (parts or not studies):
         raise InputError(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
         )
-    left_out = [] if studies else further_comparison_names()
+    left_out = [] if studies or only else further_comparison_names()
     loaded = [asked(name, assigned, workers, budget, scheduler) for name in names]
     if not studies:
         loaded = [item.briefly() for item in loaded]
@@ -68,7 +80,7 @@ def report(
     tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))
     total = len(keys) + bool(loaded)
-    command = _command(studies or [], engine or [], settings or [], budget, out)
+    command = _command(studies or [], engine or [], settings or [], budget, out, only)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
         outcomes: list[Outcome] = []
         if loaded:
@@ -81,6 +93,7 @@ def report(
                 options.complain(f"{stage}the first is in {out / 'report.html'}")
                 outcomes += outcomes_of(loaded[1:], engine or [], runner, stage)
         made = begun(outcomes, runner.store, command, left_out=left_out)
+        made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)
         for number, key in enumerate(keys, start=1 + bool(loaded)):
@@ -94,7 +107,33 @@ def report(
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
 
 
-def _command(studies: list[str], engines: list[str], settings: list[str], budget: float | None, out: Path) -> str:
+def _of_groups(names: list[str], only: str) -> list[str]:
+    """Comparisons whose scene belongs to one of the groups: each by its name, or by a word of it.
+
+    Raises:
+        InputError: no comparison is of such a group.
+    """
+    from proofroll.core.errors import InputError
+    from proofroll.files.comparison_file import load_comparison
+    from proofroll.report.kinds import group_of
+    from proofroll.studies.comparison.planning import scene_at
+
+    groups = {}
+    for name in names:
+        comparison = load_comparison(name)
+        groups[name] = group_of(scene_at(comparison, next(iter(comparison.variations(comparison.rows[0])), {})))
+    found: set[str] = set()
+    for word in (item.strip() for item in only.split(",")):
+        matching = {name for name, group in groups.items() if word == group or word in group.split()}
+        if not matching:
+            raise InputError("--only", word, f"groups are {', '.join(dict.fromkeys(groups.values()))}")
+        found |= matching
+    return [name for name in names if name in found]
+
+
+def _command(
+    studies: list[str], engines: list[str], settings: list[str], budget: float | None, out: Path, only: str | None
+) -> str:
     """The command that makes the report again."""
     words = ["proofroll", "report", *studies]
     for name in engines:
@@ -102,6 +141,7 @@ def _command(studies: list[str], engines: list[str], settings: list[str], budget
     for setting in settings:
         words += ["--set", setting]
     words += ["--budget", f"{budget:g}"] if budget else []
+    words += ["--only", only] if only else []
     return shlex.join(words if out == Path("out") else [*words, "--out", str(out)])
 
 
@@ -124,17 +164,20 @@ def _exit_code(content: ReportContent, compared: int) -> int:
     entries = content.further
     if compared == options.ENGINE or any(entry.missing or entry.lost for entry in entries):
         return options.ENGINE
-    return options.CONTRADICTED if compared or any(entry.contradictions for entry in entries) else options.OK
+    changed = content.against is not None and content.against.changed
+    contradicted = compared or changed or any(entry.contradictions for entry in entries)
+    return options.CONTRADICTED if contradicted else options.OK
 
 
 def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     """The verdicts, what came of the further studies, what to look at first, and where the report is."""
-    from proofroll.report.terminal.tables import first_lines, part_lines, verdict_parts
+    from proofroll.report.terminal.tables import change_lines, first_lines, part_lines, verdict_parts
 
     for item in content.comparisons:
         yield from verdict_parts(item)
     yield from part_lines(content)
     yield from first_lines(content)
+    yield from change_lines(content.against)
     if content.left_out:
         names = " ".join(content.left_out)
         yield f"Comparisons left out: {len(content.left_out)}. proofroll report {names} runs them."

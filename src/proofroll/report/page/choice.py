@@ -144,13 +144,14 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
     groups: dict[str, dict[str, None]] = {}
+    derived = {(line.engine, line.formulation) for line in chosen if line.own_equations}
     for (name, _, _), own in groupby(chosen, key=lambda x: (x.study, x.row, x.engine)):
         of_row, (_, href, places) = list(own), studies[name]
         first, found = of_row[0], candidates(of_row, href, places)
         groups.setdefault(first.group, {})[name] = None
         for setting in ("", first.setting or "as it is"):
             key = (first.engine, first.formulation, setting)
-            row = rows.setdefault(key, ChoiceRow(*key, own_equations=first.own_equations))
+            row = rows.setdefault(key, ChoiceRow(*key, own_equations=key[:2] in derived))
             row.found.setdefault(name, []).extend(found)
     columns = []
     for group, names in groups.items():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.json_data import plain
+from proofroll.report.against import EarlierReport, against
 from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
@@ -33,6 +34,7 @@ class Report:
         replay: of the comparisons, as their kind of element gives it.
         parts: the further studies, in the order of the content's lists.
         pictures: markup by name.
+        earlier: the report against which this one is held.
     """
 
     compared: ReportContent
@@ -40,6 +42,7 @@ class Report:
     replay: Replay | None
     parts: list[Part] = field(default_factory=list)
     pictures: dict[str, str] = field(default_factory=dict)
+    earlier: EarlierReport | None = None
     _said: dict[int, PartEntry] = field(default_factory=dict)
     _lines: dict[int, Sequence[TableLine]] = field(default_factory=dict)
 
@@ -55,7 +58,10 @@ class Report:
         findings = Sentences(three_sentences(self.compared.comparisons, entries))
         further = [line for part in self.parts for line in self._lines.get(id(part), ())]
         table = LongTable([*self.compared.table.lines, *further])
-        return replace(self.compared, entries=entries, findings=findings, environment=environment, table=table)
+        found = replace(self.compared, entries=entries, findings=findings, environment=environment, table=table)
+        if self.earlier is None:
+            return found
+        return replace(found, against=against(self.earlier, table.lines, environment.machine, environment.versions))
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
         """Lists further studies with what is kept of them in the folder of all results, unless it is made ``fresh``.

@@ -11,6 +11,7 @@ from typing import Any
 
 import proofroll
 from proofroll.files.json_data import MERGED, OPTIONAL
+from proofroll.report.against import Against
 from proofroll.report.comparison.growth import Growth, growth
 from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
@@ -102,6 +103,7 @@ class ReportContent:
         entries: of further studies, by the key of their kind.
         environment: where and with what it was made.
         table: every quantity of every run.
+        against: what changed since an earlier report.
         replay: its cases without their numbers, which follow from the trajectories that they name.
     """
 
@@ -115,6 +117,7 @@ class ReportContent:
     findings: Sentences
     table: LongTable
     replay: Sequence[Any] | None = field(default=None, metadata=OPTIONAL)
+    against: Against | None = field(default=None, metadata=OPTIONAL)
 
     @property
     def further(self) -> list[PartEntry]:

@@ -20,6 +20,7 @@ from proofroll.running.case import told_hosts
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from proofroll.report.against import Against
     from proofroll.report.comparison.records import ReportedComparison, WorstJudgement
     from proofroll.report.page.records import ReportContent
 
@@ -142,6 +143,19 @@ def part_lines(content: ReportContent) -> list[str]:
     """One line for each further study of a report."""
     pairs = [(kind, entry) for kind in part_kinds() for entry in content.entries[kind.key] if entry.study is not None]
     return [f"{entry.name}: {kind.line(entry)}." for kind, entry in pairs]
+
+
+def change_lines(found: Against | None) -> list[str]:
+    """What changed since an earlier report, a line for each run; none where there is no earlier one."""
+    if found is None:
+        return []
+    head = f"Against {found.old} of {found.date[:10]}. {found.sentence}"
+    versions = [f"{name} {old} → {new}" for name, (old, new) in found.versions.items()]
+    lines = [f"Other versions: {', '.join(versions)}."] if versions else []
+    for item in found.changes:
+        where = f" at {item.place}" if item.place else ""
+        lines.append(f"!! {item.study}: {item.run}{where}: {'; '.join(item.says) or item.kind}")
+    return [head, *lines]
 
 
 def first_lines(content: ReportContent) -> list[str]:

@@ -19,7 +19,12 @@ if TYPE_CHECKING:
     from proofroll.report.pen import Picture
     from proofroll.report.replay.records import ReplayKind
 
-_LAWS = {MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.REBOUNDS}
+_CONTACTS = {item for item in MechanismCapability if item.name.startswith("CONTACT")}
+_LAWS = {
+    MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.REBOUNDS,
+    MechanismCapability.SATURATION, MechanismCapability.COUPLINGS,
+}  # fmt: skip
+_DRIVES = {MechanismCapability.ACTUATORS, MechanismCapability.SIGNALS}
 # Curves of forces, and of torques, of one case.
 _MOST = 8
 # What changes by less than this part of the widest range is a straight line in its figure.
@@ -43,13 +48,15 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """Group of its hardest part: laws of joints that switch, loops, springs and drives, or none of them."""
+        """Group of its hardest part: contact, joint laws that switch, loops, springs and drives, or none of them."""
         needs = covered(scene).requires
+        if needs & _CONTACTS:
+            return "contact"
         if needs & _LAWS:
             return "joint laws"
         if needs & ALL_LOOPS:
             return "loops"
-        return "springs and drives" if needs & FORCES else "trees"
+        return "springs and drives" if needs & (FORCES | _DRIVES) else "trees"
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:

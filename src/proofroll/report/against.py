@@ -1,0 +1,195 @@
+"""Changes since an earlier report: of verdicts, of errors beyond their bars, of costs beyond their intervals."""
+
+from __future__ import annotations
+
+import json
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from proofroll.core.errors import InputError
+from proofroll.core.number_format import counted, error, number
+from proofroll.report.long_table import COLUMNS, TableLine
+
+# Round-off of another build may change an error by this part of the quantity's size, and by this part of itself.
+_OF_SCALE, _OF_ERROR = 1e-9, 1e-3
+# Intervals of costs that do not meet are news where the costs differ by this factor, too: hundreds are compared.
+_COST = 1.2
+
+
+@dataclass(frozen=True)
+class RunChange:
+    """One run that changed.
+
+    Attributes:
+        study, run, place: which.
+        kind: ``verdict``, ``value``, ``cost``, ``gone`` or ``new``; the first of these that applies.
+        says: the changes as clauses.
+    """
+
+    study: str
+    run: str
+    place: str
+    kind: str
+    says: list[str]
+
+
+@dataclass(frozen=True)
+class Against:
+    """An earlier report held against this one.
+
+    Attributes:
+        old: its path.
+        date: when it was written.
+        versions: what ran in another version: name -> both versions.
+        costs: costs were compared, for both reports are of one machine.
+        compared: how many runs are in both.
+        changes: the runs that changed.
+    """
+
+    old: str
+    date: str
+    versions: dict[str, tuple[str, str]]
+    costs: bool
+    compared: int
+    changes: list[RunChange]
+
+    @property
+    def changed(self) -> bool:
+        """True if a run of both reports changed, or one is gone; runs that are new change nothing."""
+        return any(item.kind != "new" for item in self.changes)
+
+    @property
+    def sentence(self) -> str:
+        """How much changed, in one sentence."""
+        kinds = [item.kind for item in self.changes]
+        words = {
+            "verdict": "verdicts",
+            "value": "errors",
+            "cost": "costs",
+            "gone": "runs that are gone",
+            "new": "new runs",
+        }
+        said = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in words.items() if kind in kinds)
+        costs = "" if self.costs else "; costs are of another machine and not compared"
+        return f"Of {counted(self.compared, 'runs')} in both reports, changed: {said or 'nothing'}{costs}."
+
+
+@dataclass(frozen=True)
+class EarlierReport:
+    """What is read of an earlier report."""
+
+    path: Path
+    date: str
+    machine: str
+    versions: dict[str, str]
+    lines: list[TableLine]
+
+    @classmethod
+    def read(cls, path: Path) -> EarlierReport:
+        """From its ``report.json``.
+
+        Raises:
+            InputError: it cannot be read, or has no long table.
+        """
+        try:
+            said: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            table, made = said["table"], said["environment"]
+            lines = [TableLine(**_known(dict(zip(table["columns"], row, strict=True)))) for row in table["data"]]
+            return cls(path, said["date"], made["machine"], made["versions"], lines)
+        except OSError as problem:
+            raise InputError("--against", path, f"cannot be read: {problem.strerror}") from None
+        except (KeyError, TypeError, ValueError):
+            raise InputError(
+                "--against", path, "is no report.json with a long table; proofroll report writes one"
+            ) from None
+
+
+def _known(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of columns that this version has."""
+    return {name: value for name, value in values.items() if name in COLUMNS}
+
+
+def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versions: dict[str, str]) -> Against:
+    """Holds an earlier report against the lines of this one, in the studies that both have."""
+    before, after = _runs(old.lines), _runs(lines)
+    shared = {study for study, *_ in before} & {study for study, *_ in after}
+    costs = old.machine == machine
+    changes = []
+    for key in dict.fromkeys([*after, *before]):
+        study, place, run, *_ = key
+        if study not in shared:
+            continue
+        if key not in after or key not in before:
+            changes.append(RunChange(study, run, place, "gone" if key not in after else "new", []))
+            continue
+        found = list(_changes(before[key], after[key], costs=costs))
+        if found:
+            kinds = [kind for kind, _ in found]
+            first = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
+            changes.append(RunChange(study, run, place, first, [text for _, text in found]))
+    others = {
+        name: (version, versions[name])
+        for name, version in old.versions.items()
+        if name in versions and versions[name] != version
+    }
+    both = sum(key in before for key in after)
+    return Against(str(old.path), old.date, others, costs, both, changes)
+
+
+def _runs(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
+    """Lines by quantity of each run; runs of equal settings are told apart by their order."""
+    rows: dict[tuple[str, str, str], dict[int, dict[str, TableLine]]] = defaultdict(dict)
+    for line in lines:
+        size = f"{line.resolution} {number(line.step, 6)}" if line.step is not None else ""
+        run = " ".join(filter(None, (line.engine, line.formulation, line.setting, size)))
+        rows[line.study, line.place, run].setdefault(line.row, {})[line.quantity] = line
+    return {(*key, place): run for key, found in rows.items() for place, run in enumerate(found.values())}
+
+
+def _changes(before: dict[str, TableLine], after: dict[str, TableLine], *, costs: bool) -> Iterator[tuple[str, str]]:
+    """Kind and clause of each change of a run."""
+    one, other = next(iter(before.values())), next(iter(after.values()))
+    if one.status != other.status:
+        yield "verdict", f"{one.status} → {other.status} {other.message}".rstrip()
+        return
+    values = []
+    for name, new in after.items():
+        old = before.get(name)
+        if old is None:
+            yield "verdict", f"{name} is new"
+            continue
+        if old.verdict != new.verdict:
+            yield "verdict", f"{name or 'run'} {old.verdict or 'without verdict'} → {new.verdict or 'without verdict'}"
+        if (size := _beyond(old, new)) > 0:
+            values.append((size, f"error of {name} {error(old.error)} → {error(new.error)} {new.unit}"))
+    if values:
+        more = f", and of {len(values) - 1} more" if len(values) > 1 else ""
+        yield "value", f"{max(values)[1]}{more}"
+    for name in before.keys() - after.keys():
+        yield "verdict", f"{name} is gone"
+    if costs and (text := _cost(one, other)):
+        yield "cost", text
+
+
+def _beyond(old: TableLine, new: TableLine) -> float:
+    """Change of an error beyond both bars and round-off, in parts of the quantity's size; 0: there is none."""
+    if old.error is None or new.error is None:
+        return float((old.error is None) != (new.error is None))
+    scale = new.scale or max(old.error, new.error) or 1.0
+    bar = (old.truth_error_bar or 0.0) + (new.truth_error_bar or 0.0)
+    allowed = bar + _OF_SCALE * scale + _OF_ERROR * max(old.error, new.error)
+    return max(0.0, abs(new.error - old.error) - allowed) / scale
+
+
+def _cost(old: TableLine, new: TableLine) -> str:
+    """A cost beyond both intervals, as a clause; empty: it is not, or an interval is not known."""
+    if None in (old.cost, old.cost_low, old.cost_high, new.cost, new.cost_low, new.cost_high):
+        return ""
+    low, high = sorted((old, new), key=lambda line: line.cost or 0.0)
+    if (high.cost_low or 0.0) <= (low.cost_high or 0.0) or (high.cost or 0.0) < _COST * (low.cost or 0.0):
+        return ""
+    between = [f"{number(line.cost)} ({number(line.cost_low)} to {number(line.cost_high)})" for line in (old, new)]
+    return f"cost {between[0]} → {between[1]} s/s"

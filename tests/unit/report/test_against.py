@@ -1,0 +1,98 @@
+"""Two reports held against each other: what changed, and nothing else."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from proofroll.core.errors import InputError
+from proofroll.files.json_data import plain
+from proofroll.report.against import Against, EarlierReport, against
+from proofroll.report.long_table import LongTable, TableLine
+
+LINE = TableLine(
+    study="arm", group="trees", scene="arm", place="", row=0, engine="alpha", version="1", formulation="joints",
+    preset="default", setting="default", precision="double", own_equations=False, resolution="dt", step=1e-3,
+    status="done", message="", verdict="agrees", limit="", quantity="x", unit="m", role="motion", headline=True,
+    error=5e-4, truth_error_bar=1e-12, tolerance=1e-2, scale=1.0, order=2.0, cost=0.01, cost_low=9e-3, cost_high=0.011,
+    clean=True,
+)  # fmt: skip
+SLOW = {"cost": 0.02, "cost_low": 0.019, "cost_high": 0.021}
+LINES = [LINE, replace(LINE, quantity="z", error=1e-13), replace(LINE, row=1, engine="beta", error=2e-9)]
+
+
+def held(new: list[TableLine], machine: str = "here", old: list[TableLine] = LINES) -> Against:
+    """The lines against earlier ones."""
+    return against(
+        EarlierReport(Path("old.json"), "2026-01-01", "here", {"alpha": "1"}, old), new, machine, {"alpha": "2"}
+    )
+
+
+def changed(number: int, **values: Any) -> list[TableLine]:
+    """The lines with one of them changed."""
+    return [replace(line, **values) if at == number else line for at, line in enumerate(LINES)]
+
+
+def test_the_same_numbers_have_not_changed() -> None:
+    """Nothing is said, and versions are told; round-off and errors within both bars are no change."""
+    found = held(LINES)
+    assert (found.changes, found.changed, found.compared) == ([], False, 2)
+    assert found.sentence == "Of 2 runs in both reports, changed: nothing."
+    assert found.versions == {"alpha": ("1", "2")}
+    assert held(changed(1, error=3e-13)).changes == []
+    assert held(changed(2, error=2.5e-9)).changes == [], "round-off of another processor"
+    assert held(changed(0, truth_error_bar=1e-3, error=6e-4)).changes == [], "within the truth's bar"
+
+
+@pytest.mark.parametrize(
+    ("values", "kind", "says"),
+    [
+        ({"error": 5.05e-4}, "value", "error of x 5e-4 → 5.1e-4 m"),
+        ({"verdict": "differs", "error": 5e-2}, "verdict", "x agrees → differs"),
+        ({"status": "crashed", "message": "it ended"}, "verdict", "done → crashed it ended"),
+        ({"error": None}, "value", "error of x 5e-4 → ∞ m"),
+        (SLOW, "cost", "cost 0.01 (9e-3 to 0.011) → 0.02 (0.019 to 0.021) s/s"),
+    ],
+)  # fmt: skip
+def test_one_change_is_found_and_nothing_else(values: dict[str, Any], kind: str, says: str) -> None:
+    """One per cent of an error, a verdict, the end of a run, a cost beyond its interval: the run is named."""
+    found = held(changed(0, **values))
+    assert [(item.run, item.kind) for item in found.changes] == [("alpha joints default dt 1e-3", kind)]
+    assert found.changes[0].says[0] == says
+    assert found.changed
+
+
+def test_costs_of_other_machines_are_not_compared() -> None:
+    """They say nothing of the engine, and the report says that; intervals that meet are no change either."""
+    assert held(changed(0, **SLOW), machine="there").changes == []
+    assert "another machine" in held(LINES, machine="there").sentence
+    assert held(changed(0, cost=0.012, cost_low=0.0105, cost_high=0.013)).changes == []
+
+
+def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:
+    """A run that is not made any more is a change; one that is new is told; other studies are left alone."""
+    assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints default dt 1e-3")]
+    assert held(LINES[:2]).changed
+    more = held([*LINES, replace(LINE, row=2, engine="gamma")])
+    assert [item.kind for item in more.changes] == ["new"]
+    assert not more.changed
+    assert held([*LINES, replace(LINE, study="chain")]).changes == []
+
+
+def test_a_report_is_read_from_its_file(tmp_path: Path) -> None:
+    """What a report wrote is what is read; columns of a later version are left out; other files are one line."""
+    file = tmp_path / "report.json"
+    said = {"date": "2026-01-01", "environment": {"machine": "here", "versions": {}}, "table": plain(LongTable(LINES))}
+    said["table"]["columns"] = [*said["table"]["columns"], "later"]
+    said["table"]["data"] = [[*row, 1] for row in said["table"]["data"]]
+    file.write_text(json.dumps(said), encoding="utf-8")
+    assert EarlierReport.read(file).lines == LINES
+    file.write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="with a long table"):
+        EarlierReport.read(file)
+    with pytest.raises(InputError, match="cannot be read"):
+        EarlierReport.read(tmp_path / "absent.json")
