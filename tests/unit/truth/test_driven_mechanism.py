@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
@@ -83,6 +84,45 @@ def test_an_arm_under_servos_is_that_of_its_own_equations() -> None:
     assert found.record.q[1:] == pytest.approx(np.array([a, b]).T, abs=1e-13)
     assert found.bars["q"][-1] < TIGHT
     assert abs(motion("arm_pd", [0.0, 0.1]).record.q[1, 0] - a[0]) > 1e-2, "armature changes it"
+
+
+def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
+    """A rotor behind a gear n adds I [[1, n], [n, n^2]] to the mass matrix, and its mass; armature is n^2 I alone."""
+    inertia, n, mass, g = 1e-4, 50.0, 0.1, 9.81
+    a, b = 0.0, 0.7
+    own = 1 / 12 + 1 / 4
+    coupled = own + np.cos(b) / 2
+    M = np.array([[2 * own + 1 + np.cos(b) + mass, coupled], [coupled, own]])
+    weight = -g * np.array([(1.5 + mass) * np.sin(a) + np.sin(a + b) / 2, np.sin(a + b) / 2])
+    effort = np.array([100 * (0.5 - a), 50 * (-1.0 - b)])
+    rotor = inertia * np.array([[1, n], [n, n**2]])
+    expected = np.linalg.solve(M + rotor, weight + effort)
+    scene = load_scene("arm_rotor", elbow=b)
+    found = JointCoordinates(scene.elements[0].mechanism)  # type: ignore[attr-defined]
+    acceleration = found.solve(*found.mechanism.start()).acceleration
+    assert acceleration == pytest.approx([*expected, n * expected[1]], rel=1e-12)
+    armature = np.linalg.solve(M + np.diag([0, inertia * n**2]), weight + effort)
+    assert np.abs(armature / expected - 1).max() > 1e-3
+    truth = motion("arm_rotor", [0.0, 0.3, 1.0], elbow=b)
+    assert truth.bars["q"][-1] < 1e-10
+
+
+def test_a_stiff_damper_lets_the_mass_go_its_time_constant() -> None:
+    """A mass in a damper goes (F/c) t + (v0 - F/c) (m/c) (1 - exp(-c t/m)), and then as fast as its force."""
+    t = np.array([0.0, 0.001, 0.2])
+    found = motion("stiff_damper", t.tolist())
+    assert found.record.q[:, 0] == pytest.approx(0.01 * t + 0.99e-3 * (1 - np.exp(-1000 * t)), abs=1e-15)
+    assert found.bars["q"][-1] < TIGHT
+
+
+def test_friction_that_holds_a_weight_is_the_weight() -> None:
+    """A mass that its friction can hold does not move, and friction tells the weight; a weaker one lets it fall."""
+    found = motion("friction_hold", [0.0, 0.5, 1.0])
+    assert np.abs(found.record.q).max() == np.abs(found.record.v).max() == 0.0
+    assert found.record.named[:, 0] == pytest.approx([9.81] * 3, rel=1e-12)
+    falls = motion("friction_hold", [0.0, 1.0], friction=4.81)
+    assert falls.record.q[1, 0] == pytest.approx(-2.5, abs=TIGHT)
+    assert falls.record.named[:, 0] == pytest.approx([4.81] * 2)
 
 
 def test_a_velocity_servo_closes_in_on_its_speed() -> None:
