@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from proofroll.core import engine_abilities
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.capabilities import MechanismCapability
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "write_an_engine.md").read_text(encoding="utf-8")
@@ -31,6 +33,13 @@ def test_every_optional_protocol_is_named() -> None:
     """The page names each small protocol that an engine can follow besides, and no other."""
     optional = {name for name, kind in vars(engine_abilities).items() if getattr(kind, "_is_runtime_protocol", False)}
     assert optional == PROTOCOLS
+
+
+def test_every_capability_is_named() -> None:
+    """Authors find each name that ``provides`` may have, in its order and with what it means."""
+    section = PAGE.partition("\n### Capabilities\n")[2].partition("\n## ")[0]
+    found = re.findall(r"^\|[^|]*\| `(\w+)` \| (.*) \|$", section, flags=re.MULTILINE)
+    assert found == [(item.name, item.value) for kind in (MechanismCapability, BallCapability) for item in kind]
 
 
 @pytest.mark.parametrize("module", NAMES)

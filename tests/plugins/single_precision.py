@@ -198,3 +198,22 @@ class Single:
             turnings.append(turned)
         own = (np.array(part, dtype=np.float64) for part in (accelerations, turnings))
         return MechanismBuilt(mass, com, inertia, places, axes, gravity, None, None, None, *own)
+
+
+class OnePrecision(Single):
+    """The same, with one precision for its whole process, as a library may have a switch: the first one stays."""
+
+    name: ClassVar[str] = "one_precision"
+    presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
+        "euler": {"matched": SingleSettings(formulation="euler", precision="double")},
+        "rk4": {"matched": SingleSettings()},
+    }
+    _switched: ClassVar[list[str]] = []
+
+    @classmethod
+    def build(cls, scene: Scene, settings: SingleSettings) -> Self:
+        """See :class:`proofroll.core.engine.Engine`."""
+        cls._switched.append(settings.precision)
+        if settings.precision != cls._switched[0]:
+            raise RuntimeError(f"this process computes in {cls._switched[0]} precision")
+        return super().build(scene, settings)

@@ -12,6 +12,7 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
+from proofroll.conformance.apart import run_apart
 from proofroll.conformance.subject import Subject, UnlikeSceneError, explained, lacking, scenes, truth_scenes
 
 # One per engine.
@@ -87,11 +88,7 @@ class Check:
         except Exception as error:
             if self.known:
                 raise SkipTest(f"known: {self.known}") from error
-            if isinstance(error, UnlikeSceneError):
-                what = explained(error)
-            else:
-                what = str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
-            raise AssertionError(f"{what}\n\nTo reproduce:\n{self.reproducer}") from error
+            raise AssertionError(f"{told(error)}\n\nTo reproduce:\n{self.reproducer}") from error
         if self.known:
             raise AssertionError(f"{self.name} passes, though it is said to fail ({self.known}); take it off the list")
 
@@ -103,18 +100,30 @@ class Check:
         return f"python -c \"{imports}; run_check({name}, '{self.name}')\""
 
 
-def checks(engine: Any, known: Mapping[str, str] | None = None) -> list[Check]:
+def told(error: Exception) -> str:
+    """Text of a failed check for a person."""
+    if isinstance(error, UnlikeSceneError):
+        return explained(error)
+    return str(error) if isinstance(error, AssertionError) else f"{type(error).__name__}: {error}"
+
+
+def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool = False) -> list[Check]:
     """All checks of an engine: of each formulation, on the scenes that require nothing which it does not provide.
 
     Args:
         engine: the engine's class.
         known: names of checks that are known to fail, ``*`` for any text as in ``order_is_as_declared[free-*]``, with
             the reason. A name that fits no check, or whose check passes, is a failure.
+        apart: runs those of each formulation and preset in a process of their own, for an engine that sets something
+            for its whole process, as JAX its precision; the class must be one that a module has by its name.
     """
     patterns = dict(known or {})
+    all_runs = runs(engine)
+    if apart:
+        all_runs = ((name, partial(run_apart, engine, _of_one_process(engine, name), name)) for name, _ in all_runs)
     found = [
         Check(engine, name, next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""), run)
-        for name, run in _runs(engine)
+        for name, run in all_runs
     ]
     for pattern in patterns:
         if not any(_fits(check.name, pattern) for check in found):
@@ -135,7 +144,14 @@ def run_check(engine: Any, name: str) -> None:
     raise ValueError(f"{engine.__name__} has no check {name!r}")
 
 
-def _runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
+def _of_one_process(engine: Any, name: str) -> str:
+    """Formulation and preset that a check is of; empty: of the whole engine."""
+    keys = (f"{formulation}-{preset}" for formulation, presets in engine.presets.items() for preset in presets)
+    return next((key for key in keys if name.partition("[")[2].removesuffix("]").startswith(key)), "")
+
+
+def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
+    """Every check of an engine by its name."""
     for check in _OF_ENGINES:
         yield check.__name__, partial(check, engine)
     for formulation, presets in engine.presets.items():

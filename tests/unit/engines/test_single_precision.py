@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from single_precision import Single, SingleSettings
+from single_precision import OnePrecision, Single, SingleSettings
 
 from proofroll.conformance import checks
 from proofroll.core.certificate import certify, first_difference
@@ -230,3 +230,19 @@ def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
 def test_single_precision_conforms(check: Callable[[], None]) -> None:
     """The checks for engines' authors let an engine in float32 pass."""
     check()
+
+
+def test_conformance_can_run_each_preset_in_a_process_of_its_own() -> None:
+    """A switch of the whole process fails no check of another preset there; without, one accuses the other."""
+    name = "certificate_holds[{}-matched-pendulum]"
+    names = [name.format("euler"), name.format("rk4"), "precision_is_told"]
+    together, alone = ({check.name: check for check in checks(OnePrecision, apart=apart)} for apart in (False, True))
+    for one in names:
+        alone[one]()
+    together[names[0]]()
+    with pytest.raises(AssertionError, match="this process computes in double precision"):
+        together[names[1]]()
+    with pytest.raises(
+        AssertionError, match="no installed package has the entry point"
+    ):  # a failure there is told as here
+        alone["name_is_the_entry_point"]()
