@@ -9,7 +9,7 @@ import pytest
 from robot_templates import inertial, mjcf, urdf
 
 from proofroll.core.errors import InputError
-from proofroll.robots.robot_file import open_robot
+from proofroll.robots.opening import open_robot
 from proofroll.robots.urdf import read_urdf
 
 BOMB = """<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">

@@ -9,7 +9,8 @@ from robot_templates import inertial, mjcf, spherical, urdf
 
 from proofroll.robots.lint import lint
 from proofroll.robots.model import Robot
-from proofroll.robots.robot_file import LintFinding, open_robot
+from proofroll.robots.opening import open_robot
+from proofroll.robots.robot_file import LintFinding
 from proofroll.robots.urdf import read_urdf
 
 MESH = '<collision><geometry><mesh filename="package://x/y.stl"/></geometry></collision>'

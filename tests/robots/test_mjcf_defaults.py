@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from proofroll.robots.robot_file import open_robot
+from proofroll.robots.opening import open_robot
 
 NESTED = '<default class="k"><joint damping="1"/></default>'
 

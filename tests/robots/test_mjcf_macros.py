@@ -12,8 +12,8 @@ from robot_templates import mjcf, urdf
 from proofroll.core.errors import InputError
 from proofroll.robots.judging import TIME_LIMIT, meaning, opened
 from proofroll.robots.model import Robot
+from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
-from proofroll.robots.robot_file import open_robot
 from proofroll.robots.urdf import read_urdf
 
 Proofroll = Callable[..., tuple[int, str, str]]

@@ -9,8 +9,8 @@ import pytest
 from proofroll.core.errors import InputError
 from proofroll.robots.judging import TIME_LIMIT, meaning, opened
 from proofroll.robots.model import Robot
+from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
-from proofroll.robots.robot_file import open_robot
 
 # A corner of a cube: 0.1³/6 m³ of 1000 kg/m³.
 TETRAHEDRON = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

@@ -19,9 +19,10 @@ from proofroll.robots.check import check
 from proofroll.robots.judging import judged
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
+from proofroll.robots.opening import open_robot
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import ImporterRow
-from proofroll.robots.robot_file import RobotFile, open_robot
+from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import random_states
 from proofroll.robots.urdf import BASE_JOINT, read_urdf
 from proofroll.running.process import Worker

@@ -20,8 +20,8 @@ from proofroll.core.truth import truth
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.robots.gallery import locate, read_gallery
 from proofroll.robots.judging import TIME_LIMIT, meaning
+from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
-from proofroll.robots.robot_file import open_robot
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import world_jacobians
 from proofroll.truth.mechanism import maximal_taylor

@@ -14,8 +14,8 @@ from proofroll.files.json_data import plain
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
+from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import robot_from, states_from
-from proofroll.robots.robot_file import open_robot
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import world_jacobians
 from proofroll.robots.urdf import read_urdf

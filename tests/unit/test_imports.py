@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import graphlib
 import re
 from collections.abc import Iterator
 from functools import cache
@@ -196,3 +197,51 @@ def test_modules_are_short_enough_to_be_read_at_once() -> None:
     """No module has more than 400 lines: below, what counts is that it has one job."""
     long = [str(file.relative_to(ROOT)) for file in ROOT.rglob("*.py") if len(file.read_text().splitlines()) > 400]
     assert long == []
+
+
+def _at_run_time(tree: ast.AST) -> Iterator[ast.ImportFrom]:
+    """The imports of a module that it carries out, wherever in it they stand; those for types alone are none."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.ImportFrom):
+            yield node
+        elif not (isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"):
+            yield from _at_run_time(node)
+
+
+def circle(root: Path) -> list[str]:
+    """Modules of a package below ``root`` that import each other in a circle; empty: there is none."""
+    modules = {
+        ".".join([root.name, *file.relative_to(root).with_suffix("").parts]).removesuffix(".__init__"): file
+        for file in root.rglob("*.py")
+        if "templates" not in file.parts
+    }
+    leads: dict[str, set[str]] = {}
+    for name, file in modules.items():
+        asked = [
+            (node.module, f"{node.module}.{alias.name}")
+            for node in _at_run_time(ast.parse(file.read_text(encoding="utf-8")))
+            for alias in node.names
+        ]
+        leads[name] = {inner if inner in modules else str(outer) for outer, inner in asked} & modules.keys() - {name}
+    try:
+        graphlib.TopologicalSorter(leads).prepare()
+    except graphlib.CycleError as error:
+        return list(error.args[1])
+    return []
+
+
+def test_no_modules_import_each_other() -> None:
+    """No module imports, even inside a function, one that leads back to it."""
+    assert circle(ROOT) == []
+
+
+def test_a_circle_is_seen(tmp_path: Path) -> None:
+    """Two modules that import each other are named, and an import for types alone makes no circle."""
+    package = tmp_path / "pack"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "a.py").write_text("from pack.b import f\n")
+    (package / "b.py").write_text("if TYPE_CHECKING:\n    from pack.a import g\n")
+    assert circle(package) == []
+    (package / "b.py").write_text("def f():\n    from pack import a\n")
+    assert set(circle(package)) == {"pack.a", "pack.b"}

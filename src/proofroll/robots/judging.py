@@ -20,10 +20,11 @@ from proofroll.robots import defining, reading
 from proofroll.robots.explain import Search
 from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences, first_failing
 from proofroll.robots.model import Robot
+from proofroll.robots.opening import open_robot
 from proofroll.robots.places import worst_place
 from proofroll.robots.protocol import Reading, Whole
 from proofroll.robots.records import HeldLayer, ImporterRow
-from proofroll.robots.robot_file import RobotFile, open_robot
+from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.urdf import read_urdf
 from proofroll.running.asking import lent_workers
 from proofroll.running.process import Worker, WorkerDied
@@ -149,7 +150,7 @@ def opened(
     time_limit: float = TIME_LIMIT,
     workers: Workers | None = None,
 ) -> RobotFile:
-    """A file as :func:`proofroll.robots.robot_file.open_robot` reads it, its macros written out.
+    """A file as :func:`proofroll.robots.opening.open_robot` reads it, its macros written out.
 
     The engine that defines the format is asked for no longer than ``time_limit`` [s].
     """

@@ -19,7 +19,8 @@ from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.judging import meant, opened
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
-from proofroll.robots.robot_file import BASES, RobotFile
+from proofroll.robots.opening import BASES
+from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates, random_states
 
 _DURATION = 1.0  # s: an arm falls through much of its reach, and few are chaotic so early

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import sys
 from collections.abc import Mapping
 from functools import cache
-from importlib import metadata
 from typing import Any
 
 import proofroll
-from proofroll.core.plugins import place_of
-from proofroll.running.program import path_of
+from proofroll.running.identity import digest
 
 # Of requests and answers; see docs/worker_protocol.md.
 PROTOCOL = 2
@@ -29,8 +26,6 @@ def identify_and_settle(place: str) -> dict[str, Any]:
 @cache
 def own() -> dict[str, Any]:
     """Protocol, version and code of this proofroll."""
-    from proofroll.running.identity import digest
-
     return {"protocol": PROTOCOL, "proofroll": proofroll.__version__, "code": digest([])}
 
 
@@ -47,20 +42,3 @@ def mismatch(answer: Mapping[str, Any]) -> str:
     if answer.get("code") != mine["code"]:
         return f"has other code of proofroll {mine['proofroll']} than this one"
     return ""
-
-
-def libraries(engine: str) -> dict[str, str]:
-    """Libraries besides an engine and its adapter that decide the last digits of its results.
-
-    In another interpreter all its packages count, for engines bring libraries of their own; of a program it itself.
-    """
-    program = path_of(engine)
-    if program is not None:
-        return {"program": hashlib.sha256(program.read_bytes()).hexdigest()[:12]}
-    found = {"python": platform.python_version()}
-    for name in ("numpy", "scipy"):
-        found[name] = metadata.version(name)
-    if place_of(engine):
-        packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
-        found["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
-    return found

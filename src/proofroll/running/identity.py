@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import hashlib
 import inspect
+import platform
 import sys
 from collections.abc import Iterable, Sequence
 from importlib import metadata
@@ -13,10 +15,12 @@ from typing import Any
 
 import proofroll
 from proofroll.core.errors import InputError
+from proofroll.core.plugins import place_of
 from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
 from proofroll.running.case import EngineDescription, EngineFacts
+from proofroll.running.program import path_of
 
 # Folders on which every result rests; reports and the command line are not among them.
 FOUNDATION = ("core", "elements", "files", "running")
@@ -28,9 +32,6 @@ ASIDE = frozenset(
         "robot_reader",
         "robot_compiled",
         "report",
-        "onset_study",
-        "regimes_study",
-        "commands",
         "failure_program",
         "diagnosis",
     }
@@ -74,7 +75,6 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     from proofroll.core.engine import precision_of
     from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats
     from proofroll.core.plugins import resolve_settings
-    from proofroll.running.handshake import libraries
     from proofroll.running.loading import load
 
     kind = load(engine)
@@ -102,6 +102,23 @@ def truth_version() -> str:
         with contextlib.suppress(metadata.PackageNotFoundError):
             found.append(f"{name} {metadata.version(name)}")
     return ", ".join(found)
+
+
+def libraries(engine: str) -> dict[str, str]:
+    """Libraries besides an engine and its adapter that decide the last digits of its results.
+
+    In another interpreter all its packages count, for engines bring libraries of their own; of a program it itself.
+    """
+    program = path_of(engine)
+    if program is not None:
+        return {"program": hashlib.sha256(program.read_bytes()).hexdigest()[:12]}
+    found = {"python": platform.python_version()}
+    for name in ("numpy", "scipy"):
+        found[name] = metadata.version(name)
+    if place_of(engine):
+        packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
+        found["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
+    return found
 
 
 def digest(sources: Iterable[Path]) -> str:

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from proofroll.core.certificate import Line
+    from proofroll.core.scene import Scene
 
 # Least size of an observable over its natural one, as for balls: less is stillness to the eye.
 _LEAST = 1e-2
@@ -310,3 +311,10 @@ class MechanismElement:
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
         """None yet."""
         return []
+
+
+def the_mechanism(scene: Scene) -> MechanismElement:
+    """The mechanism of a scene that holds nothing else."""
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)
+    return element

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.observable import Observable, Role
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.capabilities import ALL_LOOPS, FORCES, MechanismCapability
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.report.kinds import ReportKind
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ class MechanismReport(ReportKind):
     @staticmethod
     def group(scene: Scene) -> str:
         """Group of its hardest part: contact, joint laws that switch, loops, springs and drives, or none of them."""
-        needs = covered(scene).requires
+        needs = the_mechanism(scene).requires
         if needs & _CONTACTS:
             return "contact"
         if needs & _LAWS:
@@ -63,12 +63,12 @@ class MechanismReport(ReportKind):
         """The first case at its start."""
         from proofroll.elements.mechanism.report.drawing import drawn
 
-        return [drawn(covered(scenes[0])).picture("at the start")], ""
+        return [drawn(the_mechanism(scenes[0])).picture("at the start")], ""
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
         """Forces and torques of joints and loops; their arrays are judged as a whole."""
-        return _reactions(covered(scene), truth)
+        return _reactions(the_mechanism(scene), truth)
 
     @staticmethod
     def replay() -> ReplayKind:
@@ -77,13 +77,6 @@ class MechanismReport(ReportKind):
         from proofroll.report.replay.records import ReplayKind
 
         return ReplayKind("mechanism", seen, drawn)
-
-
-def covered(scene: Scene) -> MechanismElement:
-    """The mechanism of a scene that :class:`MechanismReport` covers."""
-    (element,) = scene.elements
-    assert isinstance(element, MechanismElement)
-    return element
 
 
 def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:

@@ -14,10 +14,9 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.checks import WORLD
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
-from proofroll.elements.mechanism.report.kind import covered
 from proofroll.files.json_data import plain
 from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
@@ -40,12 +39,12 @@ _MOTION = ("time", "p_WB", "v_WB", "w_WB", "q_WB")
 
 def seen(scene: Scene) -> float:
     """Largest invisible error of a body's place [m]."""
-    return _SEEN * covered(scene).length
+    return _SEEN * the_mechanism(scene).length
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
     """Drawing of a mechanism in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
-    element = covered(replayed.scene)
+    element = the_mechanism(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]

@@ -1,0 +1,64 @@
+"""Reading of a robot file: safely, once, and without what engines must not load."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+from proofroll.core.errors import InputError, require_known, told_of
+from proofroll.robots import mjcf, urdf
+from proofroll.robots.robot_file import RUN_XACRO, Expand, RobotFile, names_files_inside, read_xml
+
+# More bodies than any robot has; each costs a row and a column of dense matrices.
+MOST_BODIES = 2000
+BASES = ("fixed", "free")
+_XACRO = "xacro"
+
+
+def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand: Expand | None = None) -> RobotFile:
+    """Reads a file, and leaves out what engines must not or need not load.
+
+    Args:
+        path: of a URDF or MJCF.
+        base: what carries the root of a URDF, ``fixed`` or ``free``.
+        root: folder that the file and what it names lie in; by default the file's own.
+        expand: writes out what macros of a format (repetition, attached models) stand for.
+
+    Raises:
+        InputError: the file is broken, of another kind, too large, or asks for files outside the folder.
+    """
+    require_known("base", base, BASES)
+    with told_of(str(path)):
+        inside = (path.parent if root is None else root).resolve()
+        if not path.resolve().is_relative_to(inside):
+            raise InputError("--root", root, f"{path} is not in this folder")
+        return _opened(path, base, inside, expand)
+
+
+def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> RobotFile:
+    root = read_xml(path)
+    if root.tag == "robot":
+        _require_plain(root, path)
+        if base == "free":
+            urdf.rename_world(root)
+        contained = names_files_inside(root, path.resolve().parent, inside)
+        kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
+    elif root.tag in {"mujoco", "mujocoinclude"}:
+        kind, (root, findings, contained), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
+    else:
+        raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
+    count = sum(1 for _ in root.iter(body))
+    if count > MOST_BODIES:
+        raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
+    return RobotFile(path, kind, root, base, tuple(findings), contained)
+
+
+def _require_plain(root: Element, path: Path) -> None:
+    """Raises InputError if a URDF is a template that xacro has not yet been run on."""
+    tag = next((str(element.tag) for element in root.iter() if _XACRO in str(element.tag)), None)
+    if tag is not None:
+        raise InputError("file", path, f"it has <xacro:{tag.rpartition('}')[2]}>: {RUN_XACRO}")
+    for element in root.iter():
+        for key, value in element.attrib.items():
+            if "${" in value or "$(" in value:
+                raise InputError("file", path, f"<{element.tag} {key}> is {value!r}: {RUN_XACRO}")
