@@ -16,10 +16,11 @@ from proofroll import load_scene, simulate
 from proofroll.cli import app
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.events import events_of
+from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.robots.gallery import locate, read_gallery
-from proofroll.robots.judging import TIME_LIMIT, meaning
+from proofroll.robots.judging import meaning
 from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
 from proofroll.robots.states import random_states

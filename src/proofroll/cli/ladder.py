@@ -17,7 +17,10 @@ def ladder(
     tolerance: Annotated[float | None, typer.Option(help="Error of it that is allowed, in its unit.")] = None,
     until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
     engine: options.Engines = None,
-    rounds: Annotated[int | None, typer.Option(min=2, help="Rounds of timing; fewer say less. By default 5.")] = None,
+    rounds: Annotated[
+        int | None,
+        typer.Option(min=2, help="Rounds of timing; fewer say less. By default as many as an interval of 95 % needs."),
+    ] = None,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from proofroll.core.errors import InputError
+from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.verdict import Verdict
 
 
@@ -150,7 +151,7 @@ class Comparison:
     points: list[dict[str, float | Edge]] = field(default_factory=list)
     bands: dict[str, Band] = field(default_factory=dict, metadata={"key": "tolerances"})
     rows: list[Row] = field(default_factory=list)
-    time_limit: float = 120.0
+    time_limit: float = TIME_LIMIT
     timed: bool = True
     order: float = math.inf
     brief: dict[str, list[float]] = field(default_factory=dict)

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import InputError, require_known
+from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import EngineSpec
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.check import bar_of, drawn
-from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened
+from proofroll.robots.judging import judged, meaning, opened
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.model import Array, Mimic, Robot

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from proofroll.core.errors import InputError, Missing, require_known
+from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_name
 from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.hypotheses import hypotheses
-from proofroll.robots.judging import TIME_LIMIT, judged, meaning, opened, with_the_copy
+from proofroll.robots.judging import judged, meaning, opened, with_the_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
 from proofroll.robots.protocol import Request

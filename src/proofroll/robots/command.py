@@ -11,6 +11,7 @@ import typer
 from proofroll.cli import options
 from proofroll.cli.checking import check_text, is_text_check
 from proofroll.core.errors import InputError
+from proofroll.core.limits import TIME_LIMIT
 
 
 def check(
@@ -25,7 +26,7 @@ def check(
     states: Annotated[int, typer.Option(min=1, max=1000, help="Random states that are compared.")] = 20,
     seed: Annotated[int, typer.Option(min=0, help="Of the random states.")] = 0,
     out: Annotated[Path | None, typer.Option("--out", help="Write check.html and check.json to this folder.")] = None,
-    time_limit: Annotated[float, typer.Option(min=0.1, help="Wall seconds for each engine.")] = 120.0,
+    time_limit: Annotated[float, typer.Option(min=0.1, help="Wall seconds for each engine.")] = TIME_LIMIT,
     against: Annotated[Path | None, typer.Option(help="Another file of the robot, instead of engines.")] = None,
     names: Annotated[
         list[str] | None,

@@ -14,6 +14,7 @@ from xml.etree.ElementTree import Element, fromstring, tostring
 import numpy as np
 
 from proofroll.core.errors import InputError
+from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.number_format import counted
 from proofroll.core.plugins import EngineSpec, plain_name
 from proofroll.robots import defining, reading
@@ -31,8 +32,6 @@ from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
 
 _Answer = TypeVar("_Answer")
-# For each engine [s].
-TIME_LIMIT = 120.0
 # The two formulations must agree to a tenth of any tolerance; else their difference raises it.
 _MARGIN = 10.0
 # Format -> the engine that was last found to define it: a guess at whose idle process to ask; until one is known a

@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.engine_abilities import lowest
+from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.plugins import plain_name
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ class Case:
     until: float
     every: float
     timed: bool = False
-    time_limit: float = 120.0
+    time_limit: float = TIME_LIMIT
     asks: tuple[str, ...] = ()
     turns: bool = False
     between: tuple[float, ...] = ()

@@ -6,13 +6,13 @@ import dataclasses
 from typing import Self
 
 from proofroll.core.errors import ProofrollError
+from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.running.case import Case
 from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
 
 # Long enough for the clock and for caches to settle, short enough for many rounds.
 SECONDS = 0.05
-_LIMIT = 60.0
 
 
 class Stopwatch:
@@ -38,7 +38,7 @@ class Stopwatch:
                 return None
         request = {"do": "time", "case": dataclasses.asdict(case), "seconds": seconds or SECONDS}
         try:
-            rate = self._workers[name].ask(request, _LIMIT).get("seconds_per_second")
+            rate = self._workers[name].ask(request, STUDY_TIME_LIMIT).get("seconds_per_second")
         except WorkerDied:
             self._workers.pop(name).close()
             return None

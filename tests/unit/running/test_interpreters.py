@@ -121,7 +121,7 @@ def test_a_worker_that_echoes_another_version_is_no_result(old: Path, tmp_path: 
     from proofroll.running import runner
 
     with pytest.raises(WorkerDied, match=r"version 3.0 of aged ran, and 1.0 had answered"):
-        runner._ask(Liar(), case, tmp_path / "run.npz")  # type: ignore[arg-type]
+        runner._ask(Liar(), case, 60.0, tmp_path / "run.npz")  # type: ignore[arg-type]
 
 
 def writes(text: str) -> Callable[[Path], Path]:

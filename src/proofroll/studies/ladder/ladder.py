@@ -12,6 +12,7 @@ from typing import Any
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.dataset import observe
 from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
+from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
@@ -29,7 +30,6 @@ from proofroll.studies.judging.reference import Reference
 from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, switches
 
 _EVERY = 0.02  # interval between samples [s], as in the comparison files
-_TIME_LIMIT = 60.0  # wall seconds for one case
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class Ladder:
     def _case(self, facts: EngineFacts, model: LadderModel) -> Case:
         parameters = self._given | dict(model.parameters)
         scene = load_scene(self._name, asks=model.asks, **parameters)
-        return case_of(self._name, scene, parameters, facts, self.until, _EVERY, time_limit=_TIME_LIMIT)
+        return case_of(self._name, scene, parameters, facts, self.until, _EVERY, time_limit=STUDY_TIME_LIMIT)
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
         wanted = [point for point in wanted if str(point) not in self.truths]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from proofroll.core.errors import ProofrollError
+from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -22,8 +23,6 @@ PER_PERIOD = 8
 # More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
 # samples still visit all phases of an oscillation.
 _MOST_SAMPLES = 400
-# The truth is computed by two routes at the tightest tolerance, once per place.
-_TRUTH_LIMIT = 60.0
 
 
 @dataclass
@@ -74,7 +73,7 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | M
 def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
     """The truth of every place, or why there is none."""
     _, facts = resolve_with_truth([], runner.workers)
-    cases = [case_at(name, place, facts, _TRUTH_LIMIT) for place in places]
+    cases = [case_at(name, place, facts, STUDY_TIME_LIMIT) for place in places]
     results = runner.run(cases, lambda *_: tell())
     for place, case in zip(places, cases, strict=True):
         result = results[case.key]

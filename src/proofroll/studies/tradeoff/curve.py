@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
@@ -64,7 +65,7 @@ class Question:
         """The scene with these parameters."""
         return load_scene(self.scene, **self.parameters)
 
-    def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = 60.0) -> Case:
+    def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = STUDY_TIME_LIMIT) -> Case:
         """One run, on the loaded scene."""
         return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
 
