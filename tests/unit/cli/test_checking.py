@@ -175,7 +175,7 @@ def test_neither_scene_nor_file(proofroll: Proofroll) -> None:
     """A name of nothing is told what there is."""
     code, out, err = proofroll("check", "sphere_in_cone")
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "sphere_in_cylinder" in err
+    assert "andrews_squeezer" in err
 
 
 @pytest.mark.parametrize("what", ["inclined_plane", str(COMPARISONS / "paper.toml")])

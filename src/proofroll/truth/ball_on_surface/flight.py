@@ -64,7 +64,7 @@ class Landed:
 
 
 def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | None:
-    """What becomes of a ball at the end of a flight.
+    """Outcome of a landing: a bounce, or contact from then on; None: unknown.
 
     A ball that leaves each impact with e times its speed bounces infinitely often in a finite time: below a speed that
     does not matter (:data:`_LOW`) its last impact takes all of it, which gives the wall the same impulse as all the

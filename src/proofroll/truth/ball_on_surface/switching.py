@@ -37,7 +37,7 @@ _SHORTER = 1e-6
 
 @dataclass(frozen=True)
 class Mode:
-    """How a ball moves during a leg.
+    """Mode of a ball's motion during a leg: flight, rolling, slip or rest.
 
     Attributes:
         flight: place [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: it touches the wall.
