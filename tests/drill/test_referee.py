@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from proofroll.core.truth import truth
+from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.assembly import check_start
@@ -16,7 +18,11 @@ from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.truth.mechanism import maximal_taylor
 from proofroll.truth.mechanism.maximal_bodies import Planar, made_bodies
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll_drill.referee.holding import errors, hold
+from proofroll_drill.referee import holding
+from proofroll_drill.referee.balls import BallReferee
+from proofroll_drill.referee.holding import errors, hold, hold_ball
+from proofroll_drill.referee.random_balls import STYLES as STYLES_OF_BALLS
+from proofroll_drill.referee.random_balls import WALLS, random_ball
 from proofroll_drill.referee.random_mechanisms import STYLES, random_mechanism
 
 STARTS = range(40)
@@ -71,3 +77,40 @@ def test_the_referee_notices_what_is_wrong() -> None:
     known = analysed(mechanism).determinate
     assert errors(mechanism, record[0], known)["wrench"][0] > 1e-8
     assert errors(mechanism, record[1], known)["p_WB"][0] > 1e-2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
+    """Centre, velocity and spin of a rolling ball on each wall, by formulas of its own; it lies on the wall."""
+    style, scene = random_ball(seed)
+    referee, body = BallReferee(scene.elements[0]), rolling_ball(scene)
+    state = np.asarray(referee.start(), dtype=np.float64)
+    assert style == f"{WALLS[seed]} rolls"
+    np.testing.assert_allclose(state[:9], np.concatenate([body.p0, body.v0, body.w0]), rtol=1e-13, atol=1e-14)
+    assert abs(referee.run(np.zeros(1, np.longdouble)).seen[0]["gap"]) < 1e-17
+
+
+# A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces.
+@pytest.mark.parametrize("seed", [17, 9, 45])
+def test_no_error_of_the_truth_of_a_ball_lies_beyond_its_bar(seed: int) -> None:
+    """States, forces and events of short motions; `drill referee --balls` has any number."""
+    held = hold_ball(seed)
+    assert held.sound, held.text
+    assert {"p_WB", "v_WB", "w_WB", "N"} <= set(held.worst)
+
+
+def test_random_balls_have_every_wall_and_every_law() -> None:
+    """They roll, are resisted, slip from the start or later, fall, bounce and stay where they land."""
+    styles = {random_ball(seed)[0] for seed in range(25)}
+    assert len(styles) == len(WALLS) * len(STYLES_OF_BALLS)
+
+
+def test_the_referee_of_balls_notices_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An inertia that is a millionth too large shows in the motion."""
+    scene = random_ball(17)[1]
+    (element,) = scene.elements
+    ball = replace(element.ball, inertia_ratio=element.ball.inertia_ratio * (1 + 1e-6))
+    heavier = replace(scene, elements=(replace(element, ball=ball),))
+    monkeypatch.setattr(holding, "random_ball", lambda _: ("", heavier))
+    monkeypatch.setattr(holding, "truth", lambda _, times: truth(scene, times))
+    assert not hold_ball(17).sound

@@ -59,6 +59,7 @@ def unmoved(own: Story, moved: Sequence[Story], pace: float, until: float) -> tu
     knots = np.array([0.0, *(time for _, time in own.events[:number]), *([until] if alike else [])])
     between = knots[:-1] + _BETWEEN * np.diff(knots)
     off = np.max(_uneven(*(story.states(between) for story in stories)), axis=-1) > _UNEVEN
+    off &= np.diff(knots) > 0  # two events at once have nothing between them, and an impact may be one
     return (int(np.argmax(off)), False) if np.any(off) else (number, alike)
 
 

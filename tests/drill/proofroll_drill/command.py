@@ -54,21 +54,22 @@ def mutants(scheduler: Scheduler = None, as_json: Json = False) -> None:
 
 @drill.command()
 def referee(
-    first: Annotated[int, typer.Option(help="Number of the first random mechanism.")] = 0,
+    first: Annotated[int, typer.Option(help="Number of the first random mechanism or ball.")] = 0,
     count: Annotated[int, typer.Option(help="How many.", min=1)] = 20,
+    balls: Annotated[bool, typer.Option(help="Balls instead of mechanisms.")] = False,
     as_json: Json = False,
 ) -> None:
-    """Hold truths of random mechanisms against a solver of its own; exit 1 on an error beyond its bar or a refusal."""
-    from proofroll_drill.referee.holding import hold
+    """Hold truths of random mechanisms, or balls, against a solver of its own; exit 1 on an error beyond its bar."""
+    from proofroll_drill.referee.holding import hold, hold_ball
 
-    rows = []
-    with progress_bar("mechanisms", total=count) as advance:
+    rows, kind = [], "balls" if balls else "mechanisms"
+    with progress_bar(kind, total=count) as advance:
         for seed in range(first, first + count):
-            rows.append(hold(seed))
-            advance(f"mechanism {seed}")
+            rows.append((hold_ball if balls else hold)(seed))
+            advance(str(seed))
     sound = sum(row.sound for row in rows)
-    content = {"tried": len(rows), "sound": sound, "mechanisms": rows}
-    show(content, as_json, lambda: [*(row.text for row in rows), f"{len(rows)} mechanisms tried, {sound} sound."])
+    content = {"tried": len(rows), "sound": sound, kind: rows}
+    show(content, as_json, lambda: [*(row.text for row in rows), f"{len(rows)} {kind} tried, {sound} sound."])
     raise typer.Exit(OK if sound == len(rows) else CONTRADICTED)
 
 

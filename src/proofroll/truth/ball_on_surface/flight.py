@@ -98,7 +98,9 @@ def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | No
             "which turns back its contact point whole, so its spin has no limit; "
             "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
         )
-    v, w = route.impact(body, p, v, w, 0.0, 0.0)
+    # The last of infinitely many leaves no slip to be turned back; where it is the only one, it does, and friction
+    # without bound stops that at once.
+    v, w = route.impact(body, p, v, w, 0.0, e_t if e == 0 and np.isfinite(body.contact.mu_static) else 0.0)
     rest = 2 * e * approach / ((1 - e) * weight) if e else 0.0
     blur = rest**2 * (natural + np.linalg.norm(v)) * _bend(body, p)  # the weight changes meanwhile
     return Landed(rest, float(blur), (p, v, w), _slip(body, v, w, e1))

@@ -40,7 +40,9 @@ def orientation(
     starts = np.repeat(knots[:-1], parts) + h * (np.arange(len(h)) - np.repeat(np.cumsum(parts) - parts, parts))
     q = [_IDENTITY]
     if len(h):
-        at_nodes = spin((starts[:, None] + h[:, None] * nodes).ravel()).reshape(len(h), len(nodes), 3)
+        # An end of a step belongs to it, and a time of a kink to what follows: there an impact may let the spin jump.
+        at = np.minimum(starts[:, None] + h[:, None] * nodes, np.nextafter(starts + h, 0)[:, None])
+        at_nodes = spin(at.ravel()).reshape(len(h), len(nodes), 3)
         for step in turns(h, at_nodes):
             q.append(_left(step) @ q[-1])
     ends = np.concatenate([[0], np.cumsum(parts)])[np.searchsorted(knots, times)]

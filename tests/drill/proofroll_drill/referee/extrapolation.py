@@ -22,20 +22,32 @@ def extrapolated(rate: Callable[[Long], Long], start: Long, times: Long) -> list
     state, now, step, found = start, np.longdouble(0), np.longdouble(0.01), []
     for time in times:
         while now < time:
-            length = min(step, time - now)
-            moved, error = _step(rate, state, length)
-            if not error <= _TIGHT and length > _SMALLEST:
-                step = length * max(0.2, min(0.7, 0.8 * (_TIGHT / error) ** (1 / (2 * _COLUMNS - 1))))
-                continue
-            if not error < 1e-13:
-                raise ArithmeticError(f"the referee's steps fell to nothing at t = {float(now):.4g} s")
-            state, now = moved, now + length
-            step = length * min(2.0, 0.8 * (_TIGHT / max(error, 1e-22)) ** (1 / (2 * _COLUMNS - 1)))
+            state, length, step = tight_step(rate, state, step, time - now)
+            now += length
         found.append(state)
     return found
 
 
-def _step(rate: Callable[[Long], Long], state: Long, length: Any) -> tuple[Long, float]:
+def tight_step(rate: Callable[[Long], Long], state: Long, step: Any, most: Any) -> tuple[Long, Any, Any]:
+    """The state after one step [s] of at most ``most``; how long it was, and how long the next may be.
+
+    Raises:
+        ArithmeticError: no step is small enough.
+    """
+    length = min(step, most)
+    while True:
+        moved, error = one_step(rate, state, length)
+        if error <= _TIGHT or not length > _SMALLEST:
+            break
+        step = length = length * max(0.2, min(0.7, 0.8 * (_TIGHT / error) ** (1 / (2 * _COLUMNS - 1))))
+    if not error < 1e-13:
+        raise ArithmeticError("the referee's steps fell to nothing")
+    grows = min(2.0, 0.8 * (_TIGHT / max(error, 1e-22)) ** (1 / (2 * _COLUMNS - 1)))
+    return moved, length, step if length < step else length * grows  # one that was cut says nothing of the next
+
+
+def one_step(rate: Callable[[Long], Long], state: Long, length: Any) -> tuple[Long, float]:
+    """The state after a step, and how far its last two extrapolations differ, relative to max(1, |state|)."""
     first = rate(state)
     before: list[Long] = []
     now: list[Long] = []

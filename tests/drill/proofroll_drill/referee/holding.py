@@ -1,4 +1,4 @@
-"""Truths of random mechanisms held against the referee: every error in parts of its own bar."""
+"""Truths of random mechanisms and balls held against the referee: every error in parts of its own bar."""
 
 from __future__ import annotations
 
@@ -9,26 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import ProofrollError
+from proofroll.core.events import events_of
+from proofroll.core.truth import truth
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.assembly import check_start
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.two_routes import find_truth
 
+from .balls import BallReferee
+from .random_balls import random_ball
 from .random_mechanisms import random_mechanism
-from .solver import Referee
+from .solver import Referee, long
 
-UNTIL = 0.2  # s
+UNTIL, UNTIL_OF_BALLS = 0.2, 0.5  # s
+_BEYOND = 1e-3  # s after what ends the referee's account, so that the truth has its event
 
 
 @dataclass(frozen=True)
 class Held:
-    """One mechanism.
+    """One mechanism or ball.
 
     Attributes:
         seed, style: which.
-        kinds: of its joints, then of its loops.
-        refused: why there is no truth; empty if there is one.
+        kinds: of its joints, then of its loops; of a ball what it does.
+        refused: why there is no truth, or the truth's own word where it is ill-posed; empty if it is well-posed.
         worst: largest error of each quantity, in parts of its bar.
         determinate: how many components of reactions were compared.
     """
@@ -68,6 +73,44 @@ def hold(seed: int, until: float = UNTIL) -> Held:
         beyond = size > 0
         worst[name] = float((size[beyond] / found.bars[name][beyond]).max(initial=0))
     return Held(seed, style, kinds, "", worst, int(found.determinate.sum()))
+
+
+def hold_ball(seed: int, until: float = UNTIL_OF_BALLS) -> Held:
+    """The truth of a random ball against the referee's, as far as that goes; events too, within their brackets."""
+    style, scene = random_ball(seed)
+    (element,) = scene.elements
+    times = np.linspace(0, until, 6)
+    told = BallReferee(element).run(times.astype(np.longdouble))  # type: ignore[arg-type]  # it is a ball
+    does = " ".join([*(kind for kind, _ in told.events), *["bounce"] * len(told.bounces), told.why])
+    known = len(told.seen)
+    times = np.append(times[:known], [told.end + _BEYOND] if told.end < until else [])
+    try:
+        found = truth(scene, times)
+    except ProofrollError as error:
+        return Held(seed, style, does, str(error), {}, 0)
+    worst = {}
+    for name in ("p_WB", "v_WB", "w_WB", "q_WB", "N", "gap"):
+        if name not in found or not known:
+            continue
+        apart = np.abs(found[name].to_numpy()[:known] - long([one[name] for one in told.seen]))
+        bar = found[name].attrs["error_bar"]
+        largest = float(np.max(apart))
+        worst[name] = largest / bar if bar else (np.inf if largest else 0.0)
+    events, left = events_of(found), list(told.events)
+    for event in events:
+        wide = max(event.time_high - event.time, np.finfo(float).eps * max(event.time, 1e-3))
+        if event.time > told.end + wide:
+            break
+        if event.kind == "bounce":
+            off = min((abs(time - event.time) for time in told.bounces), default=np.inf)
+        else:
+            kind, time = left.pop(0) if left else ("nothing", np.inf)
+            off = abs(time - event.time) if kind == event.kind else np.inf
+        worst["event"] = max(worst.get("event", 0.0), off / wide)
+    said = str(found.attrs.get("ill_posed", ""))
+    if left and not said and "event_time" in found:
+        worst["event"] = np.inf
+    return Held(seed, style, does, said, worst, 0)
 
 
 def errors(mechanism: Mechanism, record: Record, determinate: NDArray[np.bool_]) -> dict[str, Array]:

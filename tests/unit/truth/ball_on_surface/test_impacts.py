@@ -56,6 +56,27 @@ def test_the_bracket_of_the_time_of_rest_holds_it(
     assert found.time_high - found.time_low < 1e-11 * rests
 
 
+def test_a_ball_that_does_not_bounce_leaves_its_only_impact_as_one_that_does() -> None:
+    """With e = 0 the contact point goes on with -e_t u, slips, and is braked; it was stopped by the impact."""
+    scene = load_scene(
+        "bouncing_ball", speed=1.0, restitution=0.0, tangential_restitution=0.5, mu_static=0.5, mu_kinetic=0.2
+    )
+    lands = math.sqrt(2 / G)
+    found = truth(scene, np.array([0.0, lands + 1e-9, lands + 0.2]))
+    np.testing.assert_allclose(found["slip"][1], 0.5, atol=1e-7)
+    brakes = 0.5 / (3.5 * 0.2 * G)  # the contact point is braked by 7/2 μ g
+    assert [event.kind for event in events_of(found)] == ["settle", "slip", "stick"]
+    assert events_of(found)[-1].time == pytest.approx(lands + brakes, abs=1e-11)
+    free = load_scene("bouncing_ball", speed=1.0, restitution=0.0, tangential_restitution=0.5)
+    np.testing.assert_allclose(truth(free, np.array([0.0, lands + 1e-9]))["slip"][1], 0.0, atol=1e-7)
+
+
+def test_an_orientation_is_known_across_impacts() -> None:
+    """The spin jumps there, and both routes take it for what it was before: the bar was 4e-4."""
+    scene = load_scene("bouncing_ball", asks=("orientation",), speed=1.0, mu_static=0.2, side_spin=5.0)
+    assert truth(scene, np.array([0.0, 0.3, 0.7]))["q_WB"].attrs["error_bar"] < 1e-10
+
+
 @settings(max_examples=10, deadline=None)
 @given(
     e=st.floats(0, 1),
