@@ -164,7 +164,7 @@ def bench_adapters(
             except ProofrollError as error:
                 rows.append(AdapterRow(engine, "", preset, "", None, str(error)))
                 continue
-            if preset not in {found for _, found, _ in formulations}:
+            if preset not in {own_preset for _, own_preset, _ in formulations}:
                 rows.append(AdapterRow(engine, "", preset, "", None, f"no formulation has the preset {preset}"))
                 continue
             try:
@@ -172,13 +172,13 @@ def bench_adapters(
             except Refused as error:
                 rows.append(AdapterRow(engine, "", preset, "", None, str(error)))  # once, not for every variant
                 continue
-            for formulation, found, scene in formulations:
+            for formulation, own_preset, scene in formulations:
                 for variant, parameters in (VARIANTS if scene == SCENE else {scene: {}}).items():
                     if progress:
                         progress(f"{engine} {formulation} {variant}")
                     arguments = {
                         "engine": engine,
-                        "options": {"formulation": formulation, "preset": found},
+                        "options": {"formulation": formulation, "preset": own_preset},
                         "parameters": dict(parameters),
                         "rounds": rounds,
                         "seconds": seconds,
@@ -193,7 +193,7 @@ def bench_adapters(
                         worker = Worker()
                     except ProofrollError as error:
                         row = {"ratio": None, "message": str(error)}
-                    rows.append(AdapterRow(engine, formulation, found, variant, **row))
+                    rows.append(AdapterRow(engine, formulation, own_preset, variant, **row))
         finally:
             worker.close()
     return rows

@@ -36,11 +36,11 @@ def adapters(
     if out is not None:
         options.require_writable(out)
     with options.progress_bar("adapters") as advance:
-        found = content(bench_adapters(engine or engine_names(), preset, rounds, seconds, progress=advance))
+        table = content(bench_adapters(engine or engine_names(), preset, rounds, seconds, progress=advance))
     if out is not None:
-        write_text(out, options.json_text(found))
-    options.show(found, as_json, lambda: [adapter_table(found), f"goal: at most {found['goal']:g}"])
-    measured = [item for item in found["engines"].values() if item["ratio"] is not None]
+        write_text(out, options.json_text(table))
+    options.show(table, as_json, lambda: [adapter_table(table), f"goal: at most {table['goal']:g}"])
+    measured = [item for item in table["engines"].values() if item["ratio"] is not None]
     if engine and not measured:
         raise typer.Exit(options.ENGINE)
 

@@ -146,20 +146,20 @@ def margins(excess: Any, available: Any, system: list[tuple[Any, Any]]) -> rolli
 def _reduced(tolerance: float) -> tuple[Any, rolling.Function]:
     import heyoka as hy
 
-    found = rolling.expressions(resistance=True, uniform=True)
+    symbols = rolling.expressions(resistance=True, uniform=True)
     mu = hy.par[len(rolling.PARAMETERS)]
-    available = (found.A * mu * found.N) ** 2
-    return _stopping(found.rolling(), found.excess(mu), available, tolerance)
+    available = (symbols.A * mu * symbols.N) ** 2
+    return _stopping(symbols.rolling(), symbols.excess(mu), available, tolerance)
 
 
 @lru_cache(maxsize=16)
 def _projected(form: projection.Structure, tolerance: float) -> tuple[Any, rolling.Function]:
     import heyoka as hy
 
-    found = projection.equations(form)
-    first, second = found.multipliers
-    available = (hy.par[len(projection.PARAMETERS)] * found.N) ** 2
-    return _stopping(found.system, first**2 + second**2 - available, available, tolerance)
+    symbols = projection.equations(form)
+    first, second = symbols.multipliers
+    available = (hy.par[len(projection.PARAMETERS)] * symbols.N) ** 2
+    return _stopping(symbols.system, first**2 + second**2 - available, available, tolerance)
 
 
 def _stopping(

@@ -152,10 +152,10 @@ def _compiled() -> tuple[Any, rolling.Function]:
     """
     import heyoka as hy
 
-    found = rolling.expressions(resistance=True, uniform=True)
+    symbols = rolling.expressions(resistance=True, uniform=True)
     clock, mu, limit = hy.make_vars("clock"), hy.par[len(_PARAMETERS) - 1], hy.par[len(_PARAMETERS)]
-    system = [*found.rolling()[2:], (clock, hy.expression(1.0))]
-    excess = found.excess(mu)
+    system = [*symbols.rolling()[2:], (clock, hy.expression(1.0))]
+    excess = symbols.excess(mu)
     lanes = hy.recommended_simd_size()
     up = hy.event_direction.positive
     # A lane's next ball has nothing to do with the last one, so no event needs to be kept from coming twice.
@@ -170,4 +170,4 @@ def _compiled() -> tuple[Any, rolling.Function]:
         tol=_TOLERANCE,
         t_events=events,
     )
-    return integrator, margins(excess, (found.A * mu * found.N) ** 2, system)
+    return integrator, margins(excess, (symbols.A * mu * symbols.N) ** 2, system)

@@ -71,8 +71,8 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
     models = _models(scene, free, times, true_p)
     onsets = Onsets(scene, _ONSETS_UNTIL)
     with tempfile.TemporaryDirectory() as folder:
-        found = search(free, until, true_z, ENGINE_BOUND, Runner(Store(Path(folder))), _FINALISTS, progress)
-    finalists = {item.name: item for item in found}
+        configurations = search(free, until, true_z, ENGINE_BOUND, Runner(Store(Path(folder))), _FINALISTS, progress)
+    finalists = {item.name: item for item in configurations}
     with Stopwatch() as stopwatch:
 
         def timed(item: Configuration) -> Callable[[], float | None]:
@@ -90,13 +90,13 @@ def reference(rounds: int, progress: Callable[[str], None]) -> dict[str, Any]:
 
 
 def _models(scene: Any, free: Any, times: FloatArray, true_p: FloatArray) -> dict[str, Timed]:
-    found: dict[str, Timed | None] = {"reduced": compiled(scene, "reduced", times, true_p, REDUCED_BOUND)}
+    models: dict[str, Timed | None] = {"reduced": compiled(scene, "reduced", times, true_p, REDUCED_BOUND)}
     formulations: tuple[Any, ...] = ("rotating_frame", "euler")
     for formulation in formulations:
-        found[f"{formulation} compiled"] = compiled(scene, formulation, times, true_p, PROJECTION_BOUND)
+        models[f"{formulation} compiled"] = compiled(scene, formulation, times, true_p, PROJECTION_BOUND)
         for kind, equations in (("numeric", "projected"), ("written out", "written_out")):
-            found[f"{formulation} {kind}"] = numeric(free, formulation, equations, times, true_p, PROJECTION_BOUND)
-    return {name: model for name, model in found.items() if model is not None}
+            models[f"{formulation} {kind}"] = numeric(free, formulation, equations, times, true_p, PROJECTION_BOUND)
+    return {name: model for name, model in models.items() if model is not None}
 
 
 def _content(
@@ -157,5 +157,5 @@ def _ratio(name: str, slow: str | None, fast: str, timings: Mapping[str, Timing]
     goal = {"goal": GOALS[name], "slow": slow, "fast": fast}
     if slow is None or slow not in timings or fast not in timings:
         return {"value": None, "low": None, "high": None, **goal, "met": False}
-    found: Interval = ratio(timings[slow], timings[fast])
-    return {**dataclasses.asdict(found), **goal, "met": found.value >= GOALS[name]}
+    speed_up: Interval = ratio(timings[slow], timings[fast])
+    return {**dataclasses.asdict(speed_up), **goal, "met": speed_up.value >= GOALS[name]}

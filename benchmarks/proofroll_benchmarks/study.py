@@ -85,15 +85,15 @@ def bench_study(
         resolved = time.perf_counter() - start
         results = runner.run(cases, progress=lambda case, _: progress(case.engine.name) if progress else None)
         wall, processor = time.perf_counter() - start, processor + time.process_time()
-    found = [(case, results[case.key]) for case in cases]
+    cases_run = [(case, results[case.key]) for case in cases]
     return {
         "goal": GOAL,
         "jobs": jobs,
         "load_before": load,
         "wall_seconds": wall,
-        **account([result.spent for _, result in found], wall * jobs, resolved),
-        "processor": by_processor([result.processor for _, result in found], processor),
-        "cases": [_row(case, result) for case, result in found],
+        **account([result.spent for _, result in cases_run], wall * jobs, resolved),
+        "processor": by_processor([result.processor for _, result in cases_run], processor),
+        "cases": [_row(case, result) for case, result in cases_run],
         "first_answer": {name: first_answer(name) for name in engines},
     }
 
@@ -128,9 +128,9 @@ def by_processor(spent: Sequence[Mapping[str, float]], parent: float) -> dict[st
         parent: of the process that asks [s].
     """
     available = parent + sum(value for case in spent for value in case.values())
-    found = account([*spent, {"parent": parent}], available)
-    del found["shares"]["waiting"], found["shares"]["resolving settings"]
-    return found | {"seconds": available}
+    accounted = account([*spent, {"parent": parent}], available)
+    del accounted["shares"]["waiting"], accounted["shares"]["resolving settings"]
+    return accounted | {"seconds": available}
 
 
 def _row(case: Case, result: Result) -> dict[str, Any]:

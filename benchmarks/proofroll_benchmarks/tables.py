@@ -35,10 +35,10 @@ def reference_tables(content: dict[str, Any]) -> Iterator[Table]:
         )
     yield runs
     ratios = plain_table(*unbroken(""), *numeric("ratio", "interval", "goal", ""), title="How many times faster")
-    for name, found in content["ratios"].items():
-        ratios.add_row(_MEANING[name], *_measured(found))
-    found = content["onsets_per_second"]
-    ratios.add_row("first slips in bulk, per second of one core", *_measured(found))
+    for name, measured in content["ratios"].items():
+        ratios.add_row(_MEANING[name], *_measured(measured))
+    measured = content["onsets_per_second"]
+    ratios.add_row("first slips in bulk, per second of one core", *_measured(measured))
     yield ratios
 
 

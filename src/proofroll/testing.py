@@ -64,7 +64,7 @@ def assert_agrees(
     status = run.attrs.get("status", "done") if hasattr(run, "attrs") else "done"
     if status != "done":
         raise AssertionError(f"{name} {status} on {scene.name}: {run.attrs['message']}")
-    found = judge(run, scene, tolerance, because=because)
-    if not found.agrees:
-        raise AssertionError(f"{name} {found}")
-    return found
+    judged = judge(run, scene, tolerance, because=because)
+    if not judged.agrees:
+        raise AssertionError(f"{name} {judged}")
+    return judged

@@ -284,12 +284,12 @@ def _contact(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatAr
                 if not holds and sticks and mu_k != mu_s:
                     impulse, holds = solve(delassus, jacobian.dot(free) + shift, mu_k)
                 after = free + to_joints.dot(impulse)
-                found = float(impulse[2]) / span
-                if not f or abs(found - normal_force) <= 1e-13 * abs(found):
+                normal = float(impulse[2]) / span
+                if not f or abs(normal - normal_force) <= 1e-13 * abs(normal):
                     break
-                normal_force = found
+                normal_force = normal
                 along = tuple((0.5 * (v + after)[:3]).tolist()) if leapfrog and number else (vx, vy, vz)
-            normal_force = found
+            normal_force = normal
             if holds != sticks:
                 sticks = holds
                 events.append((number * dt, sticks))

@@ -39,8 +39,8 @@ def picture(wanted: Figure, study: FigureRuns, form: str) -> bytes:
     try:
         return drawn_file(form, style.SETTINGS, lambda: made, style.PIXELS_PER_INCH, said)
     except ValueError as error:  # mathematics is read only when it is drawn
-        found = " ".join(str(error).split())[:200]
-        raise InputError(f"figure {wanted.name}", "text", f"its text cannot be drawn: {found}") from None
+        reason = " ".join(str(error).split())[:200]
+        raise InputError(f"figure {wanted.name}", "text", f"its text cannot be drawn: {reason}") from None
 
 
 def inline(wanted: Figure, study: FigureRuns, prefix: str) -> str:

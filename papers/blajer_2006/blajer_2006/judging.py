@@ -53,8 +53,8 @@ def rounds_to(value: float, stated: str) -> bool:
 
 
 def _entry(study: FigureRuns, item: Statement, runs: list[str]) -> dict[str, Any]:
-    found = _found(item, [study.runs[name] for name in runs])
-    why = next(_reasons(study, item, runs), "") if found is None else ""
+    value = _found(item, [study.runs[name] for name in runs])
+    why = next(_reasons(study, item, runs), "") if value is None else ""
     return {
         "says": item.says,
         "source": item.source,
@@ -66,9 +66,9 @@ def _entry(study: FigureRuns, item: Statement, runs: list[str]) -> dict[str, Any
         "measure": item.measure,
         "unit": _unit(study, item),
         "stated": _stated(item),
-        "found": found,
+        "found": value,
         "truth": _found(item, [study.truths[name] for name in runs]),
-        "holds": None if found is None else _holds(item, found),
+        "holds": None if value is None else _holds(item, value),
         "why": why,
     }
 

@@ -52,9 +52,11 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
     # The misfit has other minima a fringe away, so the search starts from the best of a grid finer than that.
     grid = np.linspace(low, high, 8 * turns.size)
     best, step = float(min(grid, key=lambda w: fitted(w)[0])), float(grid[1] - grid[0])
-    found = minimize_scalar(lambda w: fitted(w)[0], bounds=(best - step, best + step), options={"xatol": 1e-10 * guess})
-    left, amplitude = fitted(float(found.x))
-    return float(found.x), left / amplitude
+    optimum = minimize_scalar(
+        lambda w: fitted(w)[0], bounds=(best - step, best + step), options={"xatol": 1e-10 * guess}
+    )
+    left, amplitude = fitted(float(optimum.x))
+    return float(optimum.x), left / amplitude
 
 
 def _halves(of: Callable[[FloatArray], float], values: FloatArray) -> tuple[float, float]:
@@ -63,8 +65,8 @@ def _halves(of: Callable[[FloatArray], float], values: FloatArray) -> tuple[floa
 
 
 def _first_extreme(values: FloatArray) -> float:
-    found = extremes(values)
-    return float(found[0]) if found.size else float("nan")
+    turning_points = extremes(values)
+    return float(turning_points[0]) if turning_points.size else float("nan")
 
 
 def _centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -73,8 +75,8 @@ def _centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     Each inner extreme is held against the mean of its two neighbours: a drift of the level, which lengthens every
     swing one way and shortens every swing back, then moves neither, nor does a growing amplitude tilt the level.
     """
-    found = extremes(values)
-    outer, inner = (found[:-2] + found[2:]) / 2, found[1:-1]
+    turning_points = extremes(values)
+    outer, inner = (turning_points[:-2] + turning_points[2:]) / 2, turning_points[1:-1]
     return np.abs(inner - outer) / 2, (inner + outer) / 2
 
 

@@ -26,9 +26,9 @@ def load_figures(name: str) -> Figures:
         InputError: there is none, it is broken, or it is about something else.
     """
     path, content = study_file(name, STUDY)
-    found = validated(Figures, {**content, "name": path.stem}, path.name)
-    _check(path.name, found)
-    return found
+    figures = validated(Figures, {**content, "name": path.stem}, path.name)
+    _check(path.name, figures)
+    return figures
 
 
 def _check(where: str, found: Figures) -> None:

@@ -51,9 +51,9 @@ def rows(study: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def statement_table(content: dict[str, Any]) -> Table:
     """Table of statements, values and verdicts, one line for each."""
-    found = Column("found", justify="right", max_width=24)
+    found_column = Column("found", justify="right", max_width=24)
     table = plain_table(
-        Column("statement"), *unbroken("run"), *numeric("stated"), found, *unbroken(""), title=content["title"]
+        Column("statement"), *unbroken("run"), *numeric("stated"), found_column, *unbroken(""), title=content["title"]
     )
     said = ""
     for item in content["statements"]:

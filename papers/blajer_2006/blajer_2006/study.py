@@ -108,9 +108,9 @@ def run_figures(
     """
     spec = parse_engine(engine or figures.engine)
     facts, truth = resolve([(spec.name, spec.options), (TRUTH, {})], runner.workers)
-    for found in (facts, truth):
-        if isinstance(found, ProofrollError):
-            raise found
+    for facts_of in (facts, truth):
+        if isinstance(facts_of, ProofrollError):
+            raise facts_of
     assert isinstance(facts, EngineFacts)  # for the type checker, as the next line
     assert isinstance(truth, EngineFacts)
     # Asked for only of an engine that has it: without it all but the angles can still be drawn.

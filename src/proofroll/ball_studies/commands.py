@@ -36,7 +36,7 @@ def onset(
 
     time_grid(until, 0.01)
     with options.progress_bar("runs") as advance:
-        found = onset_study(
+        study = onset_study(
             scene,
             options.assignments(settings),
             options.new_runner(out, fresh, jobs, scheduler),
@@ -45,11 +45,11 @@ def onset(
             uncertainty=uncertainty,
             progress=lambda case, _: advance(case.engine.name),
         )
-    options.show(found, as_json, lambda: [summary(found), _onset_table(found)])
-    verdicts = {item.verdict for item in found.engines}
+    options.show(study, as_json, lambda: [summary(study), _onset_table(study)])
+    verdicts = {item.verdict for item in study.engines}
     # Where nobody asked for that engine in particular it is an answer that it cannot, or that it builds something else.
     answers = set() if engine else {Status.REFUSED, Status.WRONG_MODEL}
-    if any(item.verdict in {"failed", "refused"} and item.status not in answers for item in found.engines):
+    if any(item.verdict in {"failed", "refused"} and item.status not in answers for item in study.engines):
         raise typer.Exit(options.ENGINE)
     raise typer.Exit(options.CONTRADICTED if "disagree" in verdicts else options.OK)
 

@@ -69,14 +69,14 @@ class OnsetStudy:
 
 def default_engines(workers: Workers | None = None) -> list[str]:
     """Every formulation of every installed engine that provides bounded friction, with its matched settings."""
-    found: list[str] = []
+    specs: list[str] = []
     for name, told in described(engine_names(), workers).items():
         if isinstance(told, ProofrollError):
-            found.append(name)  # the row says why it cannot run
+            specs.append(name)  # the row says why it cannot run
             continue
         provided = told.provides.items()
-        found += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
-    return found
+        specs += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
+    return specs
 
 
 def onset_study(
@@ -119,13 +119,13 @@ def onset_study(
         names = list(engines) if able is None else able.result()
     specs = [parse_engine(name) for name in names]
     facts = resolve([(spec.name, spec.options) for spec in specs], runner.workers)
-    for found in facts:
-        if isinstance(found, InputError):
-            raise found
-    asked = [found for found in facts if isinstance(found, EngineFacts)]
+    for facts_of_engine in facts:
+        if isinstance(facts_of_engine, InputError):
+            raise facts_of_engine
+    asked = [facts_of_engine for facts_of_engine in facts if isinstance(facts_of_engine, EngineFacts)]
 
     def run(engines: Sequence[EngineFacts], end: float) -> list[tuple[Result, Event | None]]:
-        cases = [case_of(scene, loaded, parameters, found, end, _EVERY) for found in engines]
+        cases = [case_of(scene, loaded, parameters, facts_of_engine, end, _EVERY) for facts_of_engine in engines]
         results = runner.run(cases, progress)
         return [(results[case.key], _first_slip(runner, case, results[case.key])) for case in cases]
 
@@ -137,15 +137,15 @@ def onset_study(
         for index, answer in zip(late, run([asked[index] for index in late], until), strict=True):
             answers[index] = answer
     rows, answered = [], iter(answers)
-    for name, spec, found in zip(names, specs, facts, strict=True):
-        if not isinstance(found, EngineFacts):
-            status = found.status if isinstance(found, WorkerDied) else Status.MISSING
-            rows.append(EngineOnset(name, spec.name, {}, status, str(found), None, None, "failed"))
+    for name, spec, facts_of_engine in zip(names, specs, facts, strict=True):
+        if not isinstance(facts_of_engine, EngineFacts):
+            status = facts_of_engine.status if isinstance(facts_of_engine, WorkerDied) else Status.MISSING
+            rows.append(EngineOnset(name, spec.name, {}, status, str(facts_of_engine), None, None, "failed"))
             continue
         result, first = next(answered)
         apart = None if first is None or truth.time is None else first.time - truth.time
         ended = (result.status, result.message, first, apart, onset_verdict(truth, result, first))
-        rows.append(EngineOnset(name, spec.name, found.settings, *ended))
+        rows.append(EngineOnset(name, spec.name, facts_of_engine.settings, *ended))
     return OnsetStudy(loaded.name, loaded.parameters, until, truth, rows)
 
 

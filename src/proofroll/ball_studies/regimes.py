@@ -97,18 +97,18 @@ def load_regimes(name: str) -> RegimesStudy:
         InputError: there is none, it is broken, or its numbers make no sense.
     """
     path, content = study_file(name, STUDY)
-    found = validated(RegimesStudy, content, path.name, name=path.stem)
-    if not found.rolling_resistance:
+    study = validated(RegimesStudy, content, path.name, name=path.stem)
+    if not study.rolling_resistance:
         raise InputError(f"{path.name}: rolling_resistance", [], "give at least one value in m")
-    for axis, given in (("speed", found.speed), ("mu_static", found.mu_static)):
+    for axis, given in (("speed", study.speed), ("mu_static", study.mu_static)):
         if not 1 <= given.count <= _MOST or not 0 < given.low <= given.high < math.inf:
             shown = f"from {given.low:g} to {given.high:g}, {given.count} values"
             raise InputError(f"{path.name}: {axis}", shown, f"give 0 < low <= high and a count of 1 to {_MOST}")
     with told_of(path.name):
-        bounded("until", found.until, above=0)
-        for resistance in found.rolling_resistance:
-            load_scene(found.scene, rolling_resistance=resistance, speed=found.speed.low, mu_static=found.mu_static.low)
-    return found
+        bounded("until", study.until, above=0)
+        for resistance in study.rolling_resistance:
+            load_scene(study.scene, rolling_resistance=resistance, speed=study.speed.low, mu_static=study.mu_static.low)
+    return study
 
 
 def regime_maps(

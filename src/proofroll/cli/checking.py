@@ -32,17 +32,17 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     Raises:
         InputError: the first thing that is wrong with it.
     """
-    found = checked(name)
+    sound = checked(name)
     if plot is not None:
-        _draw(found, plot)
+        _draw(sound, plot)
     if as_json:
-        options.write_json(found)
+        options.write_json(sound)
         return
-    counts = ", ".join(counted(count, what) for what, count in found.counts.items())
-    needs = f"; engines must provide: {', '.join(found.requires)}" if found.requires else ""
-    about = f"{found.scene}, " if found.kind != "scene" and found.scene else ""
-    sys.stdout.write(f"{found.name} is sound: {found.kind}, {about}{counts}{needs}\n")
-    for line in found.start:
+    counts = ", ".join(counted(count, what) for what, count in sound.counts.items())
+    needs = f"; engines must provide: {', '.join(sound.requires)}" if sound.requires else ""
+    about = f"{sound.scene}, " if sound.kind != "scene" and sound.scene else ""
+    sys.stdout.write(f"{sound.name} is sound: {sound.kind}, {about}{counts}{needs}\n")
+    for line in sound.start:
         sys.stdout.write(f"  {line}\n")
 
 
@@ -121,22 +121,34 @@ def _comparison(path: Path) -> SoundFile:
     from proofroll.running.asking import lent_workers
     from proofroll.studies.comparison.planning import require_fit, row_facts
 
-    found = load_comparison(str(path))
+    comparison = load_comparison(str(path))
     with lent_workers(None) as workers:
-        facts, _ = row_facts(found, list(enumerate(found.rows)), load_scene(found.scene).requires, workers)
-        require_fit(found, facts, workers)
-    counts = {"points": len(found.combinations()), "rows": len(found.rows), "tolerances": len(found.bands)}
-    return SoundFile("comparison", path.stem, str(path), found.scene, counts)
+        facts, _ = row_facts(
+            comparison, list(enumerate(comparison.rows)), load_scene(comparison.scene).requires, workers
+        )
+        require_fit(comparison, facts, workers)
+    counts = {
+        "points": len(comparison.combinations()),
+        "rows": len(comparison.rows),
+        "tolerances": len(comparison.bands),
+    }
+    return SoundFile("comparison", path.stem, str(path), comparison.scene, counts)
 
 
 def _study(path: Path, study: str) -> SoundFile:
     readers = {point.name: point for point in announced(READERS)}
     require_known(f"{path.name}: study", study, readers, "nothing reads such a file; choose from")
-    found = readers[study].load()(str(path))
-    parts = {"entries": found} if isinstance(found, list) else vars(found) if dataclasses.is_dataclass(found) else {}
+    content = readers[study].load()(str(path))
+    parts = (
+        {"entries": content}
+        if isinstance(content, list)
+        else vars(content)
+        if dataclasses.is_dataclass(content)
+        else {}
+    )
     counts = {
         f"[{key}]" if isinstance(value, Mapping) else f"[[{key}]]": len(value)
         for key, value in parts.items()
         if isinstance(value, (list, tuple, Mapping)) and value
     }
-    return SoundFile(study, path.stem, str(path), getattr(found, "scene", ""), counts)
+    return SoundFile(study, path.stem, str(path), getattr(content, "scene", ""), counts)

@@ -72,8 +72,8 @@ def add(
     from proofroll.running.make_environment import add as made
 
     with options.spinner(f"{name}: making an environment") as say:
-        found = made(name, requirement or (), label, python, lambda text: say(f"{name}: {text}"))
-    sys.stdout.write(f"{name}@{found.label}: {name} {found.version}, Python {found.interpreter}, in {found.folder}\n")
+        added = made(name, requirement or (), label, python, lambda text: say(f"{name}: {text}"))
+    sys.stdout.write(f"{name}@{added.label}: {name} {added.version}, Python {added.interpreter}, in {added.folder}\n")
 
 
 @engines.command()

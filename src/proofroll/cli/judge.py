@@ -30,9 +30,9 @@ def judge(
     loaded = load_scene(scene, **options.assignments(settings))  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
     with options.spinner(f"the truth of {loaded.name}"):
-        found = judging.judge(run, loaded, bounds, because=because)
+        judged = judging.judge(run, loaded, bounds, because=because)
     if as_json:
-        options.write_json(found.content())
+        options.write_json(judged.content())
     else:
-        sys.stdout.write(f"{found}\n")
-    raise typer.Exit(options.OK if found.agrees else options.CONTRADICTED)
+        sys.stdout.write(f"{judged}\n")
+    raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)

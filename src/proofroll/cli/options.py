@@ -146,15 +146,15 @@ def _standard_error() -> tuple[Console, bool]:
 
 def assignments(texts: list[str] | None, option: str = "--set") -> dict[str, str]:
     """Reads ``name=value``, as given to an option, or not."""
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     for text in texts or ():
         name, equals, value = text.partition("=")
         if not equals or not name:
             raise InputError(option, text, "write parameter=value")
-        if name in found:
+        if name in values:
             raise InputError(option, text, f"{name} is given twice; give it once")
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
 def require_writable(path: Path, option: str = "--out") -> None:

@@ -63,9 +63,9 @@ def recommend(
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     known = {*study.absent, *(point.engine for point in study.points)}
     not_measured = [] if engine else [name for name in engine_names() if name not in known]
-    found = replace(answered(study, required), not_measured=not_measured)
-    options.show(found, as_json, lambda: answer_lines(found))
-    raise typer.Exit(options.OK if found.answer.choice and found.affordable else options.CONTRADICTED)
+    recommendation = replace(answered(study, required), not_measured=not_measured)
+    options.show(recommendation, as_json, lambda: answer_lines(recommendation))
+    raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
 
 
 def _tolerance(text: str, unit: str) -> Any:
@@ -75,10 +75,10 @@ def _tolerance(text: str, unit: str) -> Any:
     if not text:
         raise InputError("tolerance", "nothing", "give the largest error that you can bear, e.g. --tolerance 1e-3")
     advice = f"write a positive number in {unit}, e.g. 1e-3, or 1 % of the quantity's scale"
-    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
-    if found is None:
+    match = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", text)
+    if match is None:
         raise InputError("tolerance", text, advice)
-    number, given = found[1], found[2] or unit
+    number, given = match[1], match[2] or unit
     if given not in {unit, "%"} and (given[1:] != unit or given[0] not in _PREFIXES):
         raise InputError("tolerance", text, f"the unit of this quantity is {unit}")
     try:

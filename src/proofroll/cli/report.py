@@ -122,13 +122,13 @@ def _of_groups(names: list[str], only: str) -> list[str]:
     for name in names:
         comparison = load_comparison(name)
         groups[name] = group_of(scene_at(comparison, next(iter(comparison.variations(comparison.rows[0])), {})))
-    found: set[str] = set()
+    chosen: set[str] = set()
     for word in (item.strip() for item in only.split(",")):
         matching = {name for name, group in groups.items() if word == group or word in group.split()}
         if not matching:
             raise InputError("--only", word, f"groups are {', '.join(dict.fromkeys(groups.values()))}")
-        found |= matching
-    return [name for name in names if name in found]
+        chosen |= matching
+    return [name for name in names if name in chosen]
 
 
 def _command(

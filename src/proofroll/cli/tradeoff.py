@@ -96,7 +96,7 @@ def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
     """Reads ``parameter=low:high``; each end must be one that the scene can have."""
     from proofroll.files.scene_file import load_scene
 
-    found = {}
+    ranges = {}
     for name, text in options.assignments(texts, "--over").items():
         try:
             low, high = (float(part) for part in text.split(":"))
@@ -106,8 +106,8 @@ def ranges_of(question: Question, texts: list[str]) -> dict[str, list[float]]:
             load_scene(question.scene, **{**question.parameters, name: value})
         if not low < high:
             raise InputError(f"over: {name}", text, "write the lower end first: parameter=low:high")
-        found[name] = [low, high]
-    return found
+        ranges[name] = [low, high]
+    return ranges
 
 
 def measure(

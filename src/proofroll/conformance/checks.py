@@ -121,14 +121,14 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
     all_runs = runs(engine)
     if apart:
         all_runs = ((name, partial(run_apart, engine, _of_one_process(engine, name), name)) for name, _ in all_runs)
-    found = [
+    selected = [
         Check(engine, name, next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""), run)
         for name, run in all_runs
     ]
     for pattern in patterns:
-        if not any(_fits(check.name, pattern) for check in found):
+        if not any(_fits(check.name, pattern) for check in selected):
             raise ValueError(f"no check of {engine.__name__} fits {pattern!r}")
-    return found
+    return selected
 
 
 def _fits(name: str, pattern: str) -> bool:
@@ -160,8 +160,8 @@ def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
             first = cache(partial(_first, engine, settings))
             for check in _OF_PRESETS:
                 yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, first, check)
-            for found, of_found in ((scenes(), _OF_SCENES), (truth_scenes(), _OF_TRUTHS)):
-                for (name, scene), check in itertools.product(found.items(), of_found):
+            for own_scenes, of_found in ((scenes(), _OF_SCENES), (truth_scenes(), _OF_TRUTHS)):
+                for (name, scene), check in itertools.product(own_scenes.items(), of_found):
                     if lacking(engine, formulation, scene):
                         continue  # refused before it is built; that something is left `provides_for_some_scene` holds
                     subject = Subject(engine, settings, scene)

@@ -114,7 +114,7 @@ def bad_settings_give_one_line(engine: Any) -> None:
         bad += [(resolution, value) for value in (0, -1.0, math.nan, math.inf, "text", None)]
     for name, value in bad:
         try:
-            found = resolve_settings(engine, {**chosen, name: value})
+            settings = resolve_settings(engine, {**chosen, name: value})
         except InputError as error:
             text = str(error)
             require("\n" not in text, f"the message about {name}={value!r} has more than one line: {text!r}")
@@ -124,4 +124,4 @@ def bad_settings_give_one_line(engine: Any) -> None:
                 f"{name}={value!r} gave {type(error).__name__} instead of InputError: {error}"
             ) from error
         else:
-            raise AssertionError(f"{name}={value!r} was accepted: {found}")
+            raise AssertionError(f"{name}={value!r} was accepted: {settings}")

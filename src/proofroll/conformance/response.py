@@ -81,8 +81,8 @@ def _times(step: float | None) -> FloatArray:
 
 def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, FloatArray]:
     """State and first reactions of the engine at all times but the first."""
-    found = columns_of(subject.scene, times, subject.samples(times))
-    moved = {name: found[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in found}
+    columns = columns_of(subject.scene, times, subject.samples(times))
+    moved = {name: columns[name].to_numpy()[1:] for name in _sizes(subject.scene, times[-1], true) if name in columns}
     reactions = {name for name, item in subject.scene.observables.items() if item.role == Role.REACTION}
     return {  # what an engine does not say of reactions is no error
         name: values for name, values in moved.items() if name not in reactions or not np.any(np.isnan(values))

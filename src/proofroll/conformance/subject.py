@@ -85,11 +85,11 @@ class Subject:
     def samples(self, times: FloatArray) -> list[Sample]:
         """Samples of the engine at times [s]; the first time is 0."""
         engine = self.build()
-        found = [engine.sample()]
+        samples = [engine.sample()]
         for t in times[1:].tolist():
             engine.advance(t)
-            found.append(engine.sample())
-        return found
+            samples.append(engine.sample())
+        return samples
 
     def finer(self, factor: float) -> Subject:
         """The same with the resolution (step or tolerance) times ``factor``."""
@@ -122,12 +122,12 @@ class Subject:
         step lost or doubled shows as 1e-2. With a tolerance, some hundred steps each contribute about the tolerance.
         """
         if self.settings.resolution is None:
-            found = 1e-9
+            distance = 1e-9
         else:
-            found = (
+            distance = (
                 1e-7 if self.fixed_step else max(1e-9, 1e3 * float(getattr(self.settings, self.settings.resolution)))
             )
-        return max(found, ROUNDINGS * self.epsilon)
+        return max(distance, ROUNDINGS * self.epsilon)
 
     def distance(self, one: Sample, other: Sample) -> float:
         """Largest difference of two states, relative to the size of each quantity in the scene."""

@@ -18,13 +18,13 @@ def announced(group: str) -> tuple[EntryPoint, ...]:
 
 def loaded(group: str) -> list[tuple[EntryPoint, Any]]:
     """The entry points of a group with what they name; one that cannot be loaded is left out, with a warning."""
-    found = []
+    loaded_points = []
     for point in announced(group):
         try:
-            found.append((point, point.load()))
+            loaded_points.append((point, point.load()))
         except (Exception, SystemExit) as error:  # whatever a package does when it is imported
             leave_out(point, f"cannot be loaded ({type(error).__name__}: {error})")
-    return found
+    return loaded_points
 
 
 def leave_out(point: EntryPoint, why: str) -> None:
@@ -43,10 +43,10 @@ _known: dict[tuple[str, ...], EntryPoints] = {}
 def _everything() -> EntryPoints:
     path = tuple(sys.path)  # a copy: another thread may change it meanwhile, and change it back
     if path not in _known:
-        found: dict[str, list[EntryPoint]] = {}
+        by_name: dict[str, list[EntryPoint]] = {}
         for package in distributions(path=list(path)):
             ours = [point for point in package.entry_points if point.group.startswith("proofroll.")]
             if ours:
-                found.setdefault(package.name, ours)  # the first of two of one name is that which is imported
-        _known[path] = EntryPoints(point for points in found.values() for point in points)
+                by_name.setdefault(package.name, ours)  # the first of two of one name is that which is imported
+        _known[path] = EntryPoints(point for points in by_name.values() for point in points)
     return _known[path]

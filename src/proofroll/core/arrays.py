@@ -42,8 +42,8 @@ def _fields(item: Any) -> list[Any]:
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross products of two vectors or lists of vectors, (3,) or (n, 3); several times faster than numpy's."""
-    found: FloatArray = a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1)
-    return found
+    product: FloatArray = a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1)
+    return product
 
 
 def slices(counts: Iterable[int]) -> tuple[slice, ...]:
@@ -66,5 +66,5 @@ def largest_difference(one: FloatArray, other: FloatArray) -> float:
     """Largest difference of two curves; inf where one has what the other has not, or something is not finite."""
     if one.shape != other.shape:
         return float("inf")
-    found = float(np.max(np.abs(one - other), initial=0.0))
-    return found if np.isfinite(found) else float("inf")
+    difference = float(np.max(np.abs(one - other), initial=0.0))
+    return difference if np.isfinite(difference) else float("inf")

@@ -28,7 +28,7 @@ def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float],
         events: when they happened [s].
         late: by how much each may be [s].
     """
-    found = 0.0
+    error = 0.0
     for event in events:
         index = int(np.searchsorted(times, event))
         sides = slice(max(index - _SIDE, 0), index), slice(index, index + _SIDE)
@@ -36,10 +36,10 @@ def beside_events(times: FloatArray, curve: FloatArray, events: Sequence[float],
             continue
         before, after = (_taylor(times[side] - event, curve[side]) for side in sides)
         value, slope, bend = np.max(np.abs(after - before), axis=1)
-        found += late * float(slope + bend * (times[-1] - event))
+        error += late * float(slope + bend * (times[-1] - event))
         if np.any(np.abs(times - event) <= late):
-            found += float(value)
-    return found
+            error += float(value)
+    return error
 
 
 def _taylor(t: FloatArray, values: FloatArray) -> FloatArray:

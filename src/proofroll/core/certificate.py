@@ -150,11 +150,11 @@ def first_difference(lines: list[Line]) -> str | None:
             continue
         if all(np.isnan(line.found)):
             return f"the engine's model does not say its {line.quantity}, which the scene requires"
-        found, expected = told_apart(*worst_numbers(line))
+        built, expected = told_apart(*worst_numbers(line))
         where = f" (the one of {len(line.found)} numbers that is furthest off)" if len(line.found) > _SHOWN else ""
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
-            f"the engine's model differs from the scene: {line.quantity} is {found} instead of "
+            f"the engine's model differs from the scene: {line.quantity} is {built} instead of "
             f"{expected} {line.unit}{where} (relative difference {number(line.difference)}, "
             f"allowed {number(line.tolerance)}){refused}{_single(line)}"
         )

@@ -66,8 +66,8 @@ class Columns:
     @classmethod
     def of(cls, dataset: xr.Dataset) -> Columns:
         """Columns of a dataset."""
-        found = dataset.variables.items()
-        columns = {str(name): Variable(tuple(map(str, v.dims)), v.to_numpy(), v.attrs) for name, v in found}
+        variables = dataset.variables.items()
+        columns = {str(name): Variable(tuple(map(str, v.dims)), v.to_numpy(), v.attrs) for name, v in variables}
         return cls(columns, {str(key): value for key, value in dataset.attrs.items()})
 
     def __contains__(self, name: object) -> bool:
@@ -82,13 +82,13 @@ class Columns:
 
     def at(self, dim: str, chosen: npt.NDArray[np.bool_]) -> Columns:
         """Columns at the chosen places along one dimension."""
-        found = {
+        variables = {
             name: item._replace(values=np.compress(chosen, item.values, item.dims.index(dim)))
             if dim in item.dims
             else item
             for name, item in self.variables.items()
         }
-        return Columns(found, self.attrs)
+        return Columns(variables, self.attrs)
 
     def dataset(self) -> xr.Dataset:
         """The columns as an ``xarray.Dataset``."""

@@ -167,16 +167,16 @@ class Comparison:
 
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:
         """Every combination of parameters, or those that fit ``only``; the scene as it is if nothing varies."""
-        found: list[dict[str, float | Edge]] = [*self.points]
-        if self.vary or not found:
+        points: list[dict[str, float | Edge]] = [*self.points]
+        if self.vary or not points:
             for values in itertools.product(*self.vary.values()):
-                found.append(dict(zip(self.vary, values, strict=True)))
-        return [point for point in found if _fits(point, only or {})]
+                points.append(dict(zip(self.vary, values, strict=True)))
+        return [point for point in points if _fits(point, only or {})]
 
     def variations(self, row: Row) -> list[dict[str, float]]:
         """The combinations of parameters for which the row is run, once every edge has been found."""
-        found = self.combinations(row.only)
-        return [{key: value for key, value in point.items() if isinstance(value, float)} for point in found]
+        points = self.combinations(row.only)
+        return [{key: value for key, value in point.items() if isinstance(value, float)} for point in points]
 
 
 def _fits(point: Mapping[str, object], allowed: Mapping[str, list[float]]) -> bool:

@@ -43,15 +43,15 @@ def columns_of(scene: Scene, times: FloatArray, samples: Sequence[AnySample]) ->
 
 def joined(scene: Scene, parts: Mapping[str, Columns]) -> Columns:
     """Variables of all elements by the elements' names; attributes on which no two elements disagree."""
-    found: dict[str, Variable] = {}
+    variables: dict[str, Variable] = {}
     said: dict[str, Any] = {}
     for element in scene.elements:
-        found |= _labelled(scene, element, parts[element.name].variables)
+        variables |= _labelled(scene, element, parts[element.name].variables)
     for key in dict.fromkeys(key for part in parts.values() for key in part.attrs):
         values = [part.attrs[key] for part in parts.values() if key in part.attrs]
         if all(np.array_equal(value, values[0]) for value in values):
             said[key] = values[0]
-    return Columns(found, {**said, "scene": scene.name, "scene_digest": scene.digest})
+    return Columns(variables, {**said, "scene": scene.name, "scene_digest": scene.digest})
 
 
 def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: FloatArray) -> Columns:
@@ -61,9 +61,9 @@ def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: F
     """
     times = columns["time"].values
     off = np.isin(times, between) & ~np.isin(times, asked)
-    found = columns if np.all(on := np.isin(times, asked)) else columns.at("time", on)
+    on_grid = columns if np.all(on := np.isin(times, asked)) else columns.at("time", on)
     if not np.any(off):
-        return found
+        return on_grid
     states = {scene.label(element, name) for element in scene.elements for name in element.sample_type.widths}
     few = {name: columns[name] for name in columns.variables if name in states or name in scene.observables}
     apart = {
@@ -72,7 +72,7 @@ def off_grid_apart(scene: Scene, columns: Columns, asked: FloatArray, between: F
         if item.dims[:1] == ("time",)
     }
     apart[BETWEEN] = Variable((BETWEEN,), times[off], {"units": "s"})
-    return Columns({**found.variables, **apart}, found.attrs)
+    return Columns({**on_grid.variables, **apart}, on_grid.attrs)
 
 
 def _labelled(scene: Scene, element: Element, variables: Mapping[str, Variable]) -> dict[str, Variable]:
@@ -95,8 +95,10 @@ def part(scene: Scene, element: Element, dataset: xr.Dataset) -> xr.Dataset:
         return dataset
     ending = f".{element.name}"
     own = [name for name in dataset.variables if str(name).endswith(ending)]
-    found = dataset[[name for name in own if name in dataset.data_vars]]
-    return found.rename({name: str(name).removesuffix(ending) for name in (*own, *found.dims) if name not in _SHARED})
+    own_variables = dataset[[name for name in own if name in dataset.data_vars]]
+    return own_variables.rename(
+        {name: str(name).removesuffix(ending) for name in (*own, *own_variables.dims) if name not in _SHARED}
+    )
 
 
 def with_part(scene: Scene, element: Element, dataset: xr.Dataset, own: xr.Dataset) -> xr.Dataset:
@@ -154,13 +156,13 @@ def common_span(
     }
 
     def cut(dataset: xr.Dataset, parts: Mapping[str, xr.Dataset]) -> xr.Dataset:
-        found = dataset.isel(time=slice(count))
+        span = dataset.isel(time=slice(count))
         for element in scene.elements:
             own = parts.get(element.name, part(scene, element, dataset)).isel(time=slice(count))
             if len(scene.elements) > 1 and element.name not in ending and "event_time" in own:
                 own = own.isel(event=own["event_time"].to_numpy() <= end)
-            found = with_part(scene, element, found, own)
-        return found
+            span = with_part(scene, element, span, own)
+        return span
 
     own_truths = {name: true for name, (true, _) in spans.items()}
     own_runs = {key: {name: shorter[key] for name, (_, shorter) in spans.items()} for key in runs}

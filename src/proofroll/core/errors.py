@@ -113,10 +113,10 @@ def _of_engine(frame: traceback.FrameSummary) -> bool:
 
 def lack_behind(error: BaseException) -> BaseException | None:
     """Lack of the machine behind an error: memory, a file, or time (Ctrl-C); None: the engine failed."""
-    found: BaseException | None = error
-    while found is not None and not isinstance(found, (MemoryError, OSError, KeyboardInterrupt)):
-        found = found.__cause__ or found.__context__
-    return found
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, (MemoryError, OSError, KeyboardInterrupt)):
+        cause = cause.__cause__ or cause.__context__
+    return cause
 
 
 def choices(names: Iterable[str]) -> str:

@@ -44,8 +44,8 @@ def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = 
     evaluator = SimpleEval(operators=_OPERATORS, functions={}, names=known)
     del evaluator.nodes[ast.Attribute]
     try:
-        found = Quantity(0.0) + evaluator.eval(text.replace("^", "**").strip())
-        number = float(found.value)
+        quantity = Quantity(0.0) + evaluator.eval(text.replace("^", "**").strip())
+        number = float(quantity.value)
     except ZeroDivisionError:
         raise InputError(field, text, "divides by zero; change the expression or its parameters") from None
     except UnitsDiffer as error:
@@ -57,8 +57,8 @@ def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = 
         raise InputError(field, text, f"is no finite real number; use + - * / ^ and {_list(known)}") from None
     if not math.isfinite(number):
         raise InputError(field, text, "is not finite; change the expression or its parameters")
-    if unit and found.powers is not None and found.powers != powers_of(unit):
-        advice = f"this number is in {unit}, the formula gives {found.unit}; a bare number in a product has no unit"
+    if unit and quantity.powers is not None and quantity.powers != powers_of(unit):
+        advice = f"this number is in {unit}, the formula gives {quantity.unit}; a bare number in a product has no unit"
         raise InputError(field, text, f"{advice}: make a parameter of what has one")
     return number
 

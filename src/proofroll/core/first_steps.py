@@ -71,7 +71,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
         _derivatives(kind, scene, element, chosen, interval) for chosen, interval in ((settings, h), (finer, h / 2))
     )
     order = declared_order(kind, settings, scene) if step else None
-    found = fine + ((fine - coarse) / (2**order - 1) if order else 0.0)
+    limit = fine + ((fine - coarse) / (2**order - 1) if order else 0.0)
     epsilon = EPSILON[precision_of(settings)]
     # a velocity of a point at rest is rounded as that of one at its body's end
     unknown = np.abs(fine - coarse) + np.abs(fine - parabola) + epsilon * rounding
@@ -83,13 +83,13 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
             (DERIVED[1], "rad/s^2", start.angular_acceleration, turning),
         )
     ):
-        difference, bar = (float(np.max(np.abs(x))) / scale for x in (found[row] - expected, unknown[row]))
+        difference, bar = (float(np.max(np.abs(x))) / scale for x in (limit[row] - expected, unknown[row]))
         lines.append(
             Line(
                 scene.label(element, f"{quantity}{_BY}"),
                 unit,
                 tuple(np.ravel(expected).tolist()),
-                tuple(np.ravel(found[row]).tolist()),
+                tuple(np.ravel(limit[row]).tolist()),
                 difference if np.isfinite(difference) else float("inf"),
                 _MARGIN * bar + max(_FLOOR, ROUNDINGS * epsilon) + soft,
                 f"derived from velocities after steps of {number(h)} s and {number(h / 2)} s",
@@ -102,11 +102,11 @@ def softness(engine: Any, scene: Scene) -> float:
     """Largest relative difference that a freshly built engine says its model has, as far as there can be one."""
     built = engine.built()
     each = [built] if len(scene.elements) == 1 else [built[element.name] for element in scene.elements]
-    found = [0.0]
+    tolerances = [0.0]
     for element, own in zip(scene.elements, each, strict=True):
         regularised = getattr(own, "regularised", {})
-        found += [soft.tolerance for name, soft in regularised.items() if name in element.softened]
-    return max(found)
+        tolerances += [soft.tolerance for name, soft in regularised.items() if name in element.softened]
+    return max(tolerances)
 
 
 def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Line]:
@@ -117,11 +117,11 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
     """
     lines = certify(engine, scene, settings)
     granted = {line.quantity: line.tolerance for line in lines if line.standing is not Standing.NOT_REPORTED}
-    found = []
+    derived = []
     for line in derivable(kind, scene, settings):
         said = granted.get(line.quantity.replace(_BY, ""))
-        found.append(line if said is None else replace(line, tolerance=max(line.tolerance, _STIFF) + said))
-    return [*lines, *found]
+        derived.append(line if said is None else replace(line, tolerance=max(line.tolerance, _STIFF) + said))
+    return [*lines, *derived]
 
 
 def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:

@@ -91,8 +91,8 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
 
 def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection[str]]) -> bool:
     """True if a run in this formulation has a model of each element, and of one at least in the formulation itself."""
-    found = [formulation_for(alone.requires, formulation, provides) for alone in each_alone(scene)]
-    return None not in found and formulation in found
+    formulations = [formulation_for(alone.requires, formulation, provides) for alone in each_alone(scene)]
+    return None not in formulations and formulation in formulations
 
 
 def build(kind: Any, scene: Scene, settings: Any) -> Any:
@@ -138,12 +138,12 @@ def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
     Raises:
         Diverged: there is none.
     """
-    found = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
-    if not isinstance(found, element.sample_type) or (found is sample and len(scene.elements) > 1):
+    own = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
+    if not isinstance(own, element.sample_type) or (own is sample and len(scene.elements) > 1):
         each = " for each element, by its name" if len(scene.elements) > 1 else ""
         wanted = element.sample_type.__name__
-        raise Diverged(f"the engine's sample() gave {type(found).__name__} instead of a {wanted}{each}")
-    return found
+        raise Diverged(f"the engine's sample() gave {type(own).__name__} instead of a {wanted}{each}")
+    return own
 
 
 def arrays(scene: Scene, sample: AnySample, t: float) -> Iterator[tuple[str, FloatArray]]:

@@ -48,18 +48,18 @@ def load_engine(name: str) -> Any:
         raise InputError("engine", name, advice)
     point = _entry_point(name)
     try:
-        found = point.load()
+        kind = point.load()
     except ModuleNotFoundError as error:
         raise _not_found(point, error) from None
     except AttributeError as error:
         if place(error):  # arose inside the adapter
             raise
         raise ProofrollError(f"{name} is announced as {point.value}, but {error}: correct the entry point") from None
-    oldest = found.oldest if isinstance(found, SupportsFrom) else ""
-    if oldest and release(found.version()) < release(oldest):
-        said = f"{name} {found.version()} is older than its adapter supports, {oldest}"
+    oldest = kind.oldest if isinstance(kind, SupportsFrom) else ""
+    if oldest and release(kind.version()) < release(oldest):
+        said = f"{name} {kind.version()} is older than its adapter supports, {oldest}"
         raise Missing(f"{said}; install a later {name}")
-    return found
+    return kind
 
 
 def release(version: str) -> tuple[int, ...]:
@@ -94,9 +94,9 @@ def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
 def _installed(requirement: str) -> bool:
     """True if a required distribution is installed; requirements of extras count as installed."""
     name, _, condition = requirement.partition(";")
-    found = re.match(r"[\w.-]+", name)
+    match = re.match(r"[\w.-]+", name)
     with suppress(PackageNotFoundError):
-        return "extra" in condition or found is None or bool(version(found[0]))
+        return "extra" in condition or match is None or bool(version(match[0]))
     return False
 
 

@@ -27,19 +27,19 @@ class UnitsDiffer(Exception):  # noqa: N818 -- says what is wrong; the reader of
 @cache
 def powers_of(unit: str) -> Powers:
     """Powers of base units in a unit as scene files write it, e.g. ``N m s/rad``; a name of no other unit is a base."""
-    found: Powers = {}
+    powers: Powers = {}
     for place, part in enumerate(unit.split("/")):
         for factor in part.split():
             matched = _POWER.fullmatch(factor)
             name, power = (matched[1], float(matched[2])) if matched else (factor, 1.0)
-            found = _product(found, _IN_BASE_UNITS.get(name, {name: 1.0}), -power if place else power)
-    return found
+            powers = _product(powers, _IN_BASE_UNITS.get(name, {name: 1.0}), -power if place else power)
+    return powers
 
 
 def _product(one: Powers, two: Powers, power: float) -> Powers:
     """Powers of one unit times another one to a power."""
-    found = {name: one.get(name, 0.0) + power * two.get(name, 0.0) for name in [*one, *two]}
-    return {name: value for name, value in sorted(found.items()) if value}
+    powers = {name: one.get(name, 0.0) + power * two.get(name, 0.0) for name in [*one, *two]}
+    return {name: value for name, value in sorted(powers.items()) if value}
 
 
 @dataclass(frozen=True)

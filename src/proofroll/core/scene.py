@@ -103,10 +103,10 @@ class Scene:
             InputError: no element has it, or no run of these numbers; ``field`` says where it was named.
         """
         require_known(field, name, self.observables, "there is no such observable; choose from")
-        found = self.observables[name]
-        if found.absent:
-            raise InputError(field, name, found.absent)
-        return found
+        item = self.observables[name]
+        if item.absent:
+            raise InputError(field, name, item.absent)
+        return item
 
     @property
     def natural_time(self) -> float:
@@ -122,9 +122,9 @@ class Scene:
         content = [[type(element).__name__, asdict(element)] for element in self.elements]  # type: ignore[call-overload]
         code = code_of(self.elements)
         everything = [self.name, content, self.asks, *([code] if code else [])]
-        found = hashlib.sha256(json.dumps(everything, sort_keys=True, default=str).encode())
+        digest = hashlib.sha256(json.dumps(everything, sort_keys=True, default=str).encode())
         if self.folder != Path():
             for file in sorted(self.folder.iterdir()):
                 if file.is_file() and file.suffix not in {".toml", ".md", ".bib"}:
-                    found.update(file.name.encode() + file.read_bytes())
-        return found.hexdigest()[:16]
+                    digest.update(file.name.encode() + file.read_bytes())
+        return digest.hexdigest()[:16]

@@ -36,13 +36,13 @@ def with_imports(place: Path) -> list[Path]:
 
     Python's own modules, this package, and other packages that are installed are left out.
     """
-    found, waiting = set[Path](), [place]
+    sources, waiting = set[Path](), [place]
     while waiting:
-        found.add(here := waiting.pop())
+        sources.add(here := waiting.pop())
         files = here.rglob("*.py") if here.is_dir() else [here]
         names = {name for file in files for name in _imported(file)} - sys.stdlib_module_names
-        waiting += {source for name in names if (source := _source(name)) is not None} - found - {OWN}
-    return sorted(found)
+        waiting += {source for name in names if (source := _source(name)) is not None} - sources - {OWN}
+    return sorted(sources)
 
 
 def _imported(file: Path) -> Iterator[str]:

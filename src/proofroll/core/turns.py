@@ -43,19 +43,19 @@ def samples_between(scene: Scene, times: FloatArray, step: float | None = None) 
         return np.zeros(0)
     until = float(times[-1])
     longest = max(min(known), min(EVERY, until / _FEW), until / _MOST)
-    found: list[FloatArray] = []
+    stretches: list[FloatArray] = []
     for start, length in zip(times[:-1], np.diff(times), strict=True):
         count = int(np.ceil(length / longest * (1 - 1e-9)))
         if count < 2:
             continue
         if step is None:
-            found.append(start + length * np.arange(1, count) / count)
+            stretches.append(start + length * np.arange(1, count) / count)
             continue
         steps = round(length / step)
         if abs(steps * step - length) <= 1e-6 * step:
             some = max(1, int(longest / step * (1 + 1e-9)))
-            found.append(start + step * np.arange(some, steps, some))
-    return np.concatenate([np.zeros(0), *found])
+            stretches.append(start + step * np.arange(some, steps, some))
+    return np.concatenate([np.zeros(0), *stretches])
 
 
 def doubt(

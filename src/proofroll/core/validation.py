@@ -51,12 +51,12 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
     for name in (name for name in content if name in own):
         raise no_such_key(f"{where}: {name}", content[name], _keys(kind, (), own))
     try:
-        found: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
+        content_of_kind: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
     except ValidationError as error:
         raise _first_problem(error, where, kind, content, own) from None
-    for place, given in _turned(content, found):
+    for place, given in _turned(content, content_of_kind):
         raise InputError(f"{where}: {'.'.join(place)}", given, "this is not a number; give one")
-    return found
+    return content_of_kind
 
 
 def _turned(content: Any, found: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
@@ -87,19 +87,19 @@ def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str
         hints = [get_type_hints(table, include_extras=True) for table in tables]
         inside = [table for hint in hints if part in hint for table in _tables(hint[part])]
         tables = inside or [table for table in tables if getattr(table, "kind", None) == part] or tables
-    found = [item.metadata.get("key", item.name) for table in tables for item in fields(table) if item.init]
-    return [key for key in dict.fromkeys(found) if place or key not in own]
+    keys = [item.metadata.get("key", item.name) for table in tables for item in fields(table) if item.init]
+    return [key for key in dict.fromkeys(keys) if place or key not in own]
 
 
 def _place(location: Iterable[str | int], content: Any) -> list[str]:
     """Place of a problem as the file has it, without the names of types that pydantic puts in between."""
-    found = []
+    places = []
     for part in location:
         inside = isinstance(content, Mapping) and part in content
         inside = inside or (isinstance(content, (list, tuple)) and isinstance(part, int) and part < len(content))
-        found += [str(part)] * inside
+        places += [str(part)] * inside
         content = content[part] if inside else content
-    return found
+    return places
 
 
 def _first_problem(
@@ -146,11 +146,11 @@ def units_of_kind(table: type, kind: object) -> dict[str, Unit]:
 
 def all_units_of(*types: type) -> dict[str, str]:
     """Every unit that a number of these dataclasses may have, by its key, and by kind and place where these decide."""
-    found: dict[str, str] = {}
+    units: dict[str, str] = {}
     for each in types:
         for item in fields(each):
             unit = item.metadata.get("unit", "")
             for kind, own in unit.items() if isinstance(unit, Mapping) else [("", unit)]:
                 for place, one in enumerate([own] if isinstance(own, str) else own):
-                    found[".".join(filter(None, [item.name, kind, str(place or "")]))] = one
-    return {name: unit for name, unit in found.items() if unit}
+                    units[".".join(filter(None, [item.name, kind, str(place or "")]))] = one
+    return {name: unit for name, unit in units.items() if unit}

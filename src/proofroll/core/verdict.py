@@ -245,15 +245,15 @@ def _reason(
 ) -> str:
     """Reason of the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
     truth_error_bar, own_bar = bars
-    found, allowed, bar = *_told_apart(error, tolerance), f"{number(truth_error_bar)}{unit}"
+    shown_error, allowed, bar = *_told_apart(error, tolerance), f"{number(truth_error_bar)}{unit}"
     if truth_error_bar > tolerance:
         return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}"
     if verdict == Verdict.NOT_JUDGED:
         whose = "the truth's error bar"
         if own_bar > truth_error_bar:
             bar, whose = f"{number(own_bar)}{unit}", "for the run shows it only between two times"
-        return f"not judged: error {found}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
-    text = f"error {found}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
+        return f"not judged: error {shown_error}{unit} ± {bar}, {whose}, may be within {allowed}{unit} or beyond"
+    text = f"error {shown_error}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
         text = "not finite, or not as many values as the truth"
     if rungs.finding == LimitFinding.NO_LADDER:

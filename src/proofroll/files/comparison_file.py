@@ -33,9 +33,9 @@ def comparison_names() -> list[str]:
 
 def further_comparison_names() -> list[str]:
     """Names, with their folder, of the comparisons that a report without names leaves out, sorted."""
-    found = {path: folder for folder in study_folders() for path in folder.glob("*/*.toml")}
-    comparisons = [path for path in found if path.name != "scene.toml" and study_of(path) is None]
-    return sorted(path.relative_to(found[path]).with_suffix("").as_posix() for path in comparisons)
+    folders = {path: folder for folder in study_folders() for path in folder.glob("*/*.toml")}
+    comparisons = [path for path in folders if path.name != "scene.toml" and study_of(path) is None]
+    return sorted(path.relative_to(folders[path]).with_suffix("").as_posix() for path in comparisons)
 
 
 def _order(path: Path) -> float:

@@ -52,9 +52,9 @@ def read_csv(text: str) -> xr.Dataset:
     columns: dict[str, dict[tuple[str, ...], Any]] = {}
     units: dict[str, set[str]] = {}
     for index, field in enumerate(header):
-        found = _HEADER.fullmatch(field)
-        name, *labels = (found["name"] if found else "").split("/")
-        if not name or found is None:
+        match = _HEADER.fullmatch(field)
+        name, *labels = (match["name"] if match else "").split("/")
+        if not name or match is None:
             raise ValueError(
                 f"column {index + 1} is called {field!r}; the header has names with units, as q.pivot [rad]"
             )
@@ -62,8 +62,8 @@ def read_csv(text: str) -> xr.Dataset:
         if tuple(labels) in own:
             raise ValueError(f"two columns are called {'/'.join((name, *labels))}")
         own[tuple(labels)] = numbers[:, index]
-        if found["unit"] is not None:
-            units.setdefault(name, set()).add(found["unit"].strip() or "1")
+        if match["unit"] is not None:
+            units.setdefault(name, set()).add(match["unit"].strip() or "1")
     if "time" not in columns:
         raise ValueError("it has no column time [s]; its first line has the names")
     variables: dict[str, Any] = {}
@@ -90,17 +90,17 @@ def _dimension(name: str, level: int, labels: Sequence[str]) -> str:
 
 
 def _numbers(header: list[str], rows: list[list[str]]) -> Any:
-    found = []
+    numbers = []
     for line, row in enumerate(rows, start=2):
         if not row:
             continue
         if len(row) != len(header):
             raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
         try:
-            found.append([float(field) for field in row])
+            numbers.append([float(field) for field in row])
         except ValueError as error:
             raise ValueError(f"line {line}: {error}") from None
-    return np.array(found).reshape(len(found), len(header))
+    return np.array(numbers).reshape(len(numbers), len(header))
 
 
 def _array(name: str, columns: Mapping[tuple[str, ...], Any]) -> tuple[Any, list[tuple[str, ...]]]:

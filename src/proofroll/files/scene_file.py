@@ -174,12 +174,12 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, 
     for name in tables:
         if name not in known:
             raise no_such_key(f"{where}: {name}", tables[name], [*sorted(_OWN), *known])
-    found: list[Element] = []
+    elements: list[Element] = []
     for kind in kinds:
         own = {name: tables[name] for name in kind.tables if name in tables}
         if own:
-            found += kind.read(own, gravity, numbers, where)
-    return tuple(found)
+            elements += kind.read(own, gravity, numbers, where)
+    return tuple(elements)
 
 
 def _names(asks: object) -> list[str]:

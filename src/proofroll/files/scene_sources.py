@@ -56,5 +56,5 @@ def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
 
 @cache
 def _sources() -> dict[str, type[SceneSource]]:
-    found = (source for _, source in loaded(GROUP))
-    return {ending: source for source in found for ending in source.endings}
+    sources = (source for _, source in loaded(GROUP))
+    return {ending: source for source in sources for ending in source.endings}

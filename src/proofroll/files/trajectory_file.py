@@ -125,12 +125,12 @@ def read(path: Path) -> xr.Dataset:
 
     # Times stay numbers of seconds, and no number stands for an absent one.
     try:
-        found = xr.load_dataset(
+        dataset = xr.load_dataset(
             io.BytesIO(ordinary_content(path)), engine="scipy", decode_times=False, mask_and_scale=False
         )
     except (TypeError, LookupError):
         raise ValueError(f"{path} is cut off, or no netCDF-3") from None
-    return found.assign({name: item.astype(str) for name, item in found.variables.items() if item.dtype == object})
+    return dataset.assign({name: item.astype(str) for name, item in dataset.variables.items() if item.dtype == object})
 
 
 def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
@@ -143,14 +143,14 @@ def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             said, attrs = json.loads(file[_ABOUT])
-            found = {
+            variables = {
                 name: Variable(tuple(dims), file[name], own)
                 for name, (dims, own) in said.items()
                 if names is None or name in names
             }
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path} is no stored trajectory") from error
-    return Columns(found, attrs)
+    return Columns(variables, attrs)
 
 
 def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:

@@ -61,11 +61,11 @@ def against(
         InputError: a file is wrong, or a name is none of its joints'.
     """
     with lent_workers(None) as workers:
-        (file, robot, by), (second, found, by_other) = (
+        (file, robot, by), (second, other_robot, by_other) = (
             _meant(each, base, root, time_limit, workers) for each in (path, other)
         )
-        matched = _matched(robot, found, names or {})
-        renamed = _renamed(found, matched)
+        matched = _matched(robot, other_robot, names or {})
+        renamed = _renamed(other_robot, matched)
         truth = RobotTruth.of(robot, random_states(robot, states, seed))
         bar = bar_of(truth)
         there, here = (each.name if path.name != other.name else str(each) for each in (other, path))
@@ -74,12 +74,12 @@ def against(
             turned = RobotTruth.of(renamed, random_states(renamed, states, seed))
             row = judged(second, turned, bar_of(turned), EngineSpec(here, {}), _answer(robot, turned), workers)
             rows = [row] if row.status == "explained" else rows
-    ours, theirs = ({joint.name for joint in each.moving} for each in (robot, found))
+    ours, theirs = ({joint.name for joint in each.moving} for each in (robot, other_robot))
     return AgainstCheck(
         file=str(path),
         kind=file.kind,
         base=base if "urdf" in {file.kind, second.kind} else "as in the file",
-        lint=[*_lint(file, robot), *(_of_file(other, finding) for finding in _lint(second, found))],
+        lint=[*_lint(file, robot), *(_of_file(other, finding) for finding in _lint(second, other_robot))],
         truth=UsedTruth(by, bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=[_as_file(row) for row in rows],
@@ -139,14 +139,16 @@ def _matched(robot: Robot, other: Robot, names: Mapping[str, str]) -> dict[str, 
     taken = set(names.values())
     if len(taken) < len(names):
         raise InputError("--map", ", ".join(names.values()), "each joint has one partner")
-    found = dict(names) | {name: name for name in ours if name not in names and name in theirs and name not in taken}
+    partners = dict(names) | {name: name for name in ours if name not in names and name in theirs and name not in taken}
     free = [
         [name for name, joint in each.items() if joint.kind == "free" and name not in known]
-        for each, known in ((ours, found), (theirs, set(found.values())))
+        for each, known in ((ours, partners), (theirs, set(partners.values())))
     ]
     if all(len(left) == 1 for left in free):
-        found[free[0][0]] = free[1][0]
-    return {name: found[name] for name in ours if name in found and ours[name].dofs == theirs[found[name]].dofs}
+        partners[free[0][0]] = free[1][0]
+    return {
+        name: partners[name] for name in ours if name in partners and ours[name].dofs == theirs[partners[name]].dofs
+    }
 
 
 def _renamed(other: Robot, matched: Mapping[str, str]) -> Robot:

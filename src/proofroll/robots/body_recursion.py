@@ -66,11 +66,11 @@ def _subspace(joint: RobotJoint, R: Array) -> Array:
         E = R.transpose(0, 2, 1)
         return np.block([[np.zeros_like(E), E], [E, np.zeros_like(E)]])
     if joint.kind == "prismatic":
-        found = np.concatenate([np.zeros(3), joint.axis])[:, None]
+        subspace = np.concatenate([np.zeros(3), joint.axis])[:, None]
     else:
         turning = np.vstack([np.eye(3), zero + skew(joint.child_position)])
-        found = turning if joint.kind == "spherical" else turning @ joint.axis[:, None]
-    return np.broadcast_to(found, (len(R), *found.shape))
+        subspace = turning if joint.kind == "spherical" else turning @ joint.axis[:, None]
+    return np.broadcast_to(subspace, (len(R), *subspace.shape))
 
 
 def _spatial(body: RobotBody) -> Array:

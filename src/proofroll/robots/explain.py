@@ -76,8 +76,8 @@ class Search:
         """
         if truth.states.count > _TRIED_AT:
             few = dataclasses.replace(self, reading=self.reading.first(_TRIED_AT))
-            found, layer = few._searched(truth.first(_TRIED_AT))
-            step = self._proven(truth, found)
+            causes, layer = few._searched(truth.first(_TRIED_AT))
+            step = self._proven(truth, causes)
             if step is not None and first_failing(step.found, self.tolerances) == layer:
                 return step.causes, layer
         return self._searched(truth)
@@ -124,13 +124,13 @@ class Search:
         if robot is None or robot is step.truth.robot or (self.reading.joints and not robot.moving):
             return None
         truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
-        found = differences(truth, self.reading)
-        if layer not in found:
+        left = differences(truth, self.reading)
+        if layer not in left:
             return None
         known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
-        before, after = step.found[layer], found[layer]
+        before, after = step.found[layer], left[layer]
         cause = RobotCause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
-        return _Step(truth, found, (*step.causes, cause))
+        return _Step(truth, left, (*step.causes, cause))
 
     def _rank(self, step: _Step, layer: str) -> tuple[int, float]:
         """Best first: one after which the most layers hold from the start, then the smallest difference."""

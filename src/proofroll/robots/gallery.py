@@ -82,8 +82,8 @@ def locate(entry: Entry) -> Path | None:
         inside = files(entry.package) or []
     except PackageNotFoundError:
         return None
-    found = next((item for item in inside if f"/{item}".endswith(f"/{entry.file}")), None)
-    return None if found is None else Path(str(found.locate()))
+    entry_file = next((item for item in inside if f"/{item}".endswith(f"/{entry.file}")), None)
+    return None if entry_file is None else Path(str(entry_file.locate()))
 
 
 def gallery(

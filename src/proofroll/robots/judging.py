@@ -58,9 +58,9 @@ def judged(
         return row
     tolerances = {layer: max(answer.tolerances.get(layer, TOLERANCE), _MARGIN * bar) for layer in LAYERS}
     tolerances["joints"] = 0.0
-    found = differences(truth, answer.reading)
+    off = differences(truth, answer.reading)
     layers = {
-        layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in found.items()
+        layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in off.items()
     }
     search = Search(file, answer.reading, plain_name(spec.name), tolerances, _recompiler(file, workers))
     causes, unexplained = search.causes(truth)
@@ -73,7 +73,7 @@ def judged(
         layers=layers,
         causes=causes,
         fed=answer.fed,
-        where=None if holds else worst_place(truth, answer.reading, str(first_failing(found, tolerances))),
+        where=None if holds else worst_place(truth, answer.reading, str(first_failing(off, tolerances))),
         unexplained=unexplained,
         held=Whole(sum(answer.reading.dofs), sum(answer.reading.mass.values())),
         offending=_offending(truth, answer.reading),
@@ -113,15 +113,15 @@ def _recompiler(file: RobotFile, workers: Workers | None) -> Callable[[Element],
 def _offending(truth: RobotTruth, held: Reading) -> list[str]:
     """Joints whose carried body an engine holds with another mass, centre of mass or inertia, or lacks."""
     groups = truth.robot.groups
-    found = [name for name in groups if name not in held.joints]
+    offending = [name for name in groups if name not in held.joints]
     spin = max((float(np.abs(group.inertia).max()) for group in groups.values()), default=1.0) or 1.0
     for name, group in groups.items():
         if name in held.mass:
             off = max(abs(held.mass[name] - group.mass), float(np.abs(held.inertia[name] - group.inertia).max()) / spin)
             apart = float(np.abs(held.com[name] - group.com).max()) if group.mass > 0 < held.mass[name] else 0.0
             if max(off, apart) > 1e-6:
-                found.append(name)
-    return found
+                offending.append(name)
+    return offending
 
 
 def meaning(

@@ -111,8 +111,8 @@ class RobotTruth:
                 joint.name: self.like.torques.get(joint.name, np.zeros((count, joint.dofs)))
                 for joint in self.robot.moving
             }
-        found = self.inverse + self.passive
-        return {name: found[:, columns] for name, columns in self.robot.columns.items()}
+        torques = self.inverse + self.passive
+        return {name: torques[:, columns] for name, columns in self.robot.columns.items()}
 
 
 # What acts in joints beside M a + h.
@@ -143,33 +143,33 @@ def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:
     reduced = {name for name in followers if name not in dofs}
     unlike = {name for name in expected.keys() | dofs.keys() if expected.get(name) != dofs.get(name)} - reduced
     free = followers - reduced - set(reading.coupled)
-    found = {"joints": float(len(unlike | free))}
+    off = {"joints": float(len(unlike | free))}
     common = [name for name in reading.joints if expected.get(name) == dofs[name]]
     if not common:
-        return found
+        return off
     G, theirs = _selection(robot, common, reduced), _columns(reading, common)
     groups = robot.groups
     both = [name for name in common if name in reading.mass]
     scales = truth.scales
     masses = [reading.mass[name] - groups[name].mass for name in both]
-    found["mass"] = abs(sum(masses)) / scales["mass"]
-    found["kinematics"] = _kinematics(truth, reading, both)
-    found["bodies"] = _largest(
+    off["mass"] = abs(sum(masses)) / scales["mass"]
+    off["kinematics"] = _kinematics(truth, reading, both)
+    off["bodies"] = _largest(
         [abs(mass) / scales["mass"] for mass in masses]
         + [_apart(reading.com[name], reading.mass[name], groups[name], scales["mass"]) for name in both]
         + [np.abs(reading.inertia[name] - groups[name].inertia).max() / scales["bodies"] for name in both]
     )
     M = G.T @ d.M @ G
-    found["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], M, scales["mass matrix"])
+    off["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], M, scales["mass matrix"])
     for layer, own, expected_torque in (("gravity", reading.g, d.g), ("bias", reading.h, d.h)):
-        found[layer] = _off(own[:, theirs], expected_torque @ G, scales[layer])
+        off[layer] = _off(own[:, theirs], expected_torque @ G, scales[layer])
     if reading.inverse is not None:
-        found["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
+        off["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
     if reading.forward is not None and not truth.singular:
         given = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
         reached = reading.forward[:, theirs] @ G.T
-        found["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
-    return found
+        off["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
+    return off
 
 
 def first_failing(found: dict[str, float], tolerances: dict[str, float]) -> str | None:

@@ -27,10 +27,10 @@ _KNOWN = {
 def lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
     """Findings in a file and in its meaning, errors first."""
     own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
-    found = [
+    findings = [
         LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))
     ]
-    return sorted(found, key=lambda finding: ("error", "warning", "note").index(finding.level))
+    return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
 
 
 def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:

@@ -28,16 +28,16 @@ def _below(
 
 def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
     """Class -> the attributes that it gives to elements of a tag, those of the classes around it included."""
-    found: dict[str, dict[str, str]] = {}
+    classes: dict[str, dict[str, str]] = {}
 
     def collect(default: Element, outer: dict[str, str]) -> None:
         name = default.get("class", _MAIN)
-        found[name] = found.get(name, {}) | outer
+        classes[name] = classes.get(name, {}) | outer
         for given in default.findall(tag):
-            found[name] |= given.attrib
+            classes[name] |= given.attrib
         for inner in default.findall("default"):
-            collect(inner, found[name])
+            collect(inner, classes[name])
 
     for default in root.findall("default"):
         collect(default, {})
-    return found
+    return classes

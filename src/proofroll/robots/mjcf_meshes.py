@@ -106,11 +106,11 @@ def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> 
 
 def _mesh_folder(root: Element, folder: Path) -> tuple[Path, bool]:
     """The folder of meshes, and whether paths in their names do not count; taken out of the file."""
-    found: dict[str, str] = {}
+    attributes: dict[str, str] = {}
     for compiler in root.iter("compiler"):
         for key in ("texturedir", "assetdir", "meshdir", "strippath"):
-            found[key] = compiler.attrib.pop(key, found.get(key, ""))
-    return folder / (found.get("meshdir") or found.get("assetdir", "")), found.get("strippath") == "true"
+            attributes[key] = compiler.attrib.pop(key, attributes.get(key, ""))
+    return folder / (attributes.get("meshdir") or attributes.get("assetdir", "")), attributes.get("strippath") == "true"
 
 
 def _forget(root: Element, attribute: str, kept: set[str]) -> None:

@@ -156,15 +156,15 @@ class Robot:
 
         What is fixed to the world is carried by :data:`WORLD`.
         """
-        found = {WORLD: (WORLD, np.zeros(3), np.eye(3))}
+        welded = {WORLD: (WORLD, np.zeros(3), np.eye(3))}
         for joint in self.joints:
             if joint.dofs:
-                found[joint.child] = (joint.name, np.zeros(3), np.eye(3))
+                welded[joint.child] = (joint.name, np.zeros(3), np.eye(3))
             else:
-                home, p, R = found[joint.parent]
+                home, p, R = welded[joint.parent]
                 turned = R @ joint.rotation
-                found[joint.child] = (home, p + R @ joint.position - turned @ joint.child_position, turned)
-        return found
+                welded[joint.child] = (home, p + R @ joint.position - turned @ joint.child_position, turned)
+        return welded
 
     @cached_property
     def groups(self) -> dict[str, RobotBody]:
@@ -173,7 +173,7 @@ class Robot:
         for name, (home, p, R) in self.welded.items():
             if home != WORLD:
                 parts[home].append((self.bodies[name], p, R))
-        return {name: composed(name, found) for name, found in parts.items()}
+        return {name: composed(name, parts_of_joint) for name, parts_of_joint in parts.items()}
 
     def change(self, **changes: Any) -> Robot:
         """The robot with some attributes replaced."""

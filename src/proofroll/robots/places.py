@@ -32,7 +32,7 @@ def worst_place(truth: RobotTruth, reading: Reading, layer: str) -> str | None:
                 return f"body {bodies[worst]}: {what} {one[index]:.6g}, true {other[index]:.6g}"
     if layer == "kinematics":
         true_poses = poses(truth.robot, truth.states)
-        found = [
+        differences = [
             (float(np.abs(held - true).max(axis=axes)[state]), name, what, state)
             for name in common
             if name in reading.position
@@ -42,7 +42,7 @@ def worst_place(truth: RobotTruth, reading: Reading, layer: str) -> str | None:
             )
             for state in [int(np.argmax(np.abs(held - true).max(axis=axes)))]
         ]
-        off, name, what, state = max(found, default=(0.0, "", "", 0))
+        off, name, what, state = max(differences, default=(0.0, "", "", 0))
         return f"body {bodies[name]}: {what} off by {off:.3g} at state {state}" if name else None
     if layer in _TORQUES:
         found_held, expected = {

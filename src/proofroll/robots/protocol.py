@@ -189,13 +189,13 @@ def evaluate(
         if state.forward is not None:
             own = np.asarray(state.forward(np.linalg.solve(T.T, torque)))
             rows["forward"].append(np.asarray(np.linalg.solve(T, own - state.drift), dtype=np.float64))
-    return {name: np.array(found) if found else None for name, found in rows.items()}
+    return {name: np.array(values) if values else None for name, values in rows.items()}
 
 
 def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int, ...]) -> Array:
     """Rates of an engine's joints in its order; of one that the file does not have, or has otherwise, zero."""
     count = len(next(iter(rates.values())))
-    found = ((rates.get(name), np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True))
+    pairs = ((rates.get(name), np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True))
     parts = [np.zeros((count, 0))]
-    parts += [zero if rate is None or rate.shape[1] != zero.shape[1] else rate for rate, zero in found]
+    parts += [zero if rate is None or rate.shape[1] != zero.shape[1] else rate for rate, zero in pairs]
     return np.concatenate(parts, axis=1)

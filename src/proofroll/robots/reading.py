@@ -96,10 +96,10 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     told = worker.request(call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
     reading = None
     if not told["refused"]:
-        with np.load(arrays, allow_pickle=False) as found:
-            values: dict[str, Any] = {name: found[name] if name in found.files else None for name in _ARRAYS}
+        with np.load(arrays, allow_pickle=False) as stored:
+            values: dict[str, Any] = {name: stored[name] if name in stored.files else None for name in _ARRAYS}
             for name in _BY_JOINT:
-                values[name] = dict(zip(told[name], found[name], strict=True))
+                values[name] = dict(zip(told[name], stored[name], strict=True))
         values |= {name: tuple(told[name]) for name in ("joints", "dofs", "coupled", "remarks")}
         reading = Reading(**values)
     return ReaderAnswer(told["version"], told["says"], told["tolerances"], reading, told["refused"], told["fed"])
@@ -211,12 +211,12 @@ def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
     Raises:
         InputError: one is neither true nor false.
     """
-    found = {}
+    options = {}
     for key, value in given.items():
         if str(value).lower() not in {"true", "false"}:
             raise InputError(f"{engine}: {key}", value, "write true or false")
-        found[key] = str(value).lower() == "true"
-    return found
+        options[key] = str(value).lower() == "true"
+    return options
 
 
 def call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str, Any]:

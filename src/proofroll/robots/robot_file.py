@@ -171,11 +171,11 @@ def numbers(element: Element, attribute: str, default: str | None, count: int) -
     if text is None:
         raise InputError(field, None, "the attribute is missing")
     try:
-        found = [float(part) for part in text.split()]
+        values = [float(part) for part in text.split()]
     except ValueError:
         raise InputError(field, text, "write numbers") from None
-    if len(found) != count:
+    if len(values) != count:
         raise InputError(field, text, f"write {count} number{'s' if count > 1 else ''}")
-    if not all(map(math.isfinite, found)):
+    if not all(map(math.isfinite, values)):
         raise InputError(field, text, "numbers must be finite")
-    return found
+    return values

@@ -46,13 +46,13 @@ class Dynamics:
 def passive(robot: Robot, states: RobotStates) -> Array:
     """Damping, Coulomb friction and springs as a torque against the motion, shape (states, n)."""
     v = states.stacked(states.velocity, robot)
-    found = np.zeros_like(v)
+    torques = np.zeros_like(v)
     for joint in robot.moving:
         columns = robot.columns[joint.name]
-        found[:, columns] = joint.damping * v[:, columns] + joint.friction * np.sign(v[:, columns])
+        torques[:, columns] = joint.damping * v[:, columns] + joint.friction * np.sign(v[:, columns])
         if joint.stiffness and joint.name in states.angle:
-            found[:, columns] += joint.stiffness * (states.angle[joint.name] - joint.rest)[:, None]
-    return found
+            torques[:, columns] += joint.stiffness * (states.angle[joint.name] - joint.rest)[:, None]
+    return torques
 
 
 def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
@@ -74,12 +74,12 @@ def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
 
 def poses(robot: Robot, states: RobotStates) -> dict[str, tuple[Array, Array]]:
     """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
-    found = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
+    placed = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
     for joint in robot.joints:
-        p, R = found[joint.parent]
+        p, R = placed[joint.parent]
         r, Q = within(joint, states)
-        found[joint.child] = (p + _rotate(R, r), R @ Q)
-    return found
+        placed[joint.child] = (p + _rotate(R, r), R @ Q)
+    return placed
 
 
 def _rotate(R: Array, r: Array) -> Array:
@@ -88,10 +88,10 @@ def _rotate(R: Array, r: Array) -> Array:
 
 def skew(r: Array) -> Array:
     """The matrix of r × for each row."""
-    found = np.zeros((*r.shape[:-1], 3, 3))
-    found[..., 0, 1], found[..., 0, 2], found[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
-    found[..., 1, 0], found[..., 2, 0], found[..., 2, 1] = r[..., 2], -r[..., 1], r[..., 0]
-    return found
+    matrix = np.zeros((*r.shape[:-1], 3, 3))
+    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
+    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = r[..., 2], -r[..., 1], r[..., 0]
+    return matrix
 
 
 @dataclasses.dataclass
@@ -136,13 +136,13 @@ def armature(robot: Robot) -> Array:
 
 def turned_armature(robot: Robot, v: Array) -> Array:
     """Force of armature along axes that turn with a free body: −armature ω × v, shape (states, n)."""
-    found = np.zeros_like(v)
+    torques = np.zeros_like(v)
     for joint in robot.moving:
         if joint.turning:
             rate = v[:, robot.columns[joint.name]]
             columns = slice(robot.columns[joint.name].start, robot.columns[joint.name].start + 3)
-            found[:, columns] = -joint.armature * np.cross(rate[:, 3:], rate[:, :3])
-    return found
+            torques[:, columns] = -joint.armature * np.cross(rate[:, 3:], rate[:, :3])
+    return torques
 
 
 def _carried(

@@ -149,14 +149,14 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
         raise InputError(f"<joint {name} type>", element.get("type"), f"the check covers {known}")
     ends = {}
     for end in ("parent", "child"):
-        found = element.find(end)
-        ends[end] = "" if found is None else found.get("link", "")
+        end_element = element.find(end)
+        ends[end] = "" if end_element is None else end_element.get("link", "")
         if ends[end] not in links:
             raise InputError(f"<joint {name} {end}>", ends[end], "there is no such link")
     position, rotation = _origin(element)
     axis = np.array([1.0, 0.0, 0.0])
-    if kind != "fixed" and (found := element.find("axis")) is not None:
-        axis = np.array(numbers(found, "xyz", "1 0 0", 3))
+    if kind != "fixed" and (end_element := element.find("axis")) is not None:
+        axis = np.array(numbers(end_element, "xyz", "1 0 0", 3))
     length = math.hypot(*axis)
     if not length:
         raise InputError(f"<joint {name} axis>", axis.tolist(), "an axis needs a direction; give one of length 1")

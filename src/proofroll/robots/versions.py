@@ -42,9 +42,9 @@ def between(file: str, old: str, new: str) -> VersionsStudy:
     rows = check(Path(file), [old, new]).engines
     layers, changed = [], []
     for layer in dict.fromkeys(name for row in rows for name in row.layers):
-        found = [row.layers.get(layer) for row in rows]
-        held = [None if item is None else item.holds for item in found]
-        shown = [None if item is None else "holds" if item.holds else amount(item.difference) for item in found]
+        both_layers = [row.layers.get(layer) for row in rows]
+        held = [None if item is None else item.holds for item in both_layers]
+        shown = [None if item is None else "holds" if item.holds else amount(item.difference) for item in both_layers]
         layers.append(LayerVersions(layer, shown[0], shown[1], held[0] != held[1]))
         if held[0] != held[1]:
             changed.append(f"{layer}: {shown[0] or 'not offered'} → {shown[1] or 'not offered'}")

@@ -34,7 +34,7 @@ def _answers(
     requests: Sequence[tuple[str, Mapping[str, Any]]], workers: Workers | None, seconds: float = _START_UP_SECONDS
 ) -> list[dict[str, Any] | ProofrollError]:
     """Answers of engines to requests, or their errors, in the order given; their processes start together."""
-    found: dict[int, dict[str, Any] | ProofrollError] = {}
+    answers: dict[int, dict[str, Any] | ProofrollError] = {}
 
     def ask(engine: str, lent: Workers) -> None:
         for index, (name, request) in enumerate(requests):
@@ -42,14 +42,14 @@ def _answers(
                 continue
             try:
                 with _waiting_for(engine), lent.lend(engine) as worker:
-                    found[index] = worker.request(request, seconds)
+                    answers[index] = worker.request(request, seconds)
             except ProofrollError as error:
-                found[index] = error
+                answers[index] = error
 
     # Most of it is the start of the processes and the import of the engines.
     with lent_workers(workers) as lent, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         list(pool.map(lambda engine: ask(engine, lent), dict.fromkeys(name for name, _ in requests)))
-    return [found[index] for index in range(len(requests))]
+    return [answers[index] for index in range(len(requests))]
 
 
 def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
@@ -67,13 +67,13 @@ def describe(engine: str, workers: Workers | None = None) -> EngineDescription:
 def described(engines: Iterable[str], workers: Workers | None = None) -> dict[str, EngineDescription | ProofrollError]:
     """Description of each engine, or the error in asking it."""
     names = list(dict.fromkeys(engines))
-    found: dict[str, EngineDescription | ProofrollError] = {}
+    descriptions: dict[str, EngineDescription | ProofrollError] = {}
     for name, told in zip(names, _answers([(n, {"do": "describe", "engine": n}) for n in names], workers), strict=True):
         if isinstance(told, ProofrollError):
-            found[name] = told
+            descriptions[name] = told
         else:
-            found[name] = EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
-    return found
+            descriptions[name] = EngineDescription(**{**told, "terms": [Term(**term) for term in told["terms"]]})
+    return descriptions
 
 
 def resolve(
@@ -101,10 +101,10 @@ def resolve_with_truth(
     Raises:
         ProofrollError: the truth cannot be asked.
     """
-    *found, truth = resolve([*engines, ("truth", {})], workers, requires)
+    *facts, truth = resolve([*engines, ("truth", {})], workers, requires)
     if not isinstance(truth, EngineFacts):
         raise truth
-    return found, truth
+    return facts, truth
 
 
 def prepare(engine: str, workers: Workers) -> None:

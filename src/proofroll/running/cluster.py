@@ -183,7 +183,7 @@ class Cluster:
     def _fetch(self, sent: Sequence[tuple[Any, Case, Arrived]], failed: Callable[[Exception], None]) -> None:
         """Hands each case, with what a worker sent for it, to the run that it is of."""
         try:
-            found = self._client.gather([future for future, _, _ in sent])
+            answers = self._client.gather([future for future, _, _ in sent])
         except Exception as error:
             from distributed.scheduler import KilledWorker
 
@@ -197,7 +197,7 @@ class Cluster:
                 ((_, case, arrived),) = sent
                 arrived(case, lambda _: _raise(WorkerDied(Status.CRASHED, said)))
             return
-        for (_, case, arrived), (content, data) in zip(sent, found, strict=True):
+        for (_, case, arrived), (content, data) in zip(sent, answers, strict=True):
             arrived(case, partial(_made, content, data))
 
     def _gone(self, error: Exception | None) -> ProofrollError:
@@ -219,8 +219,8 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
     """Writes the trajectory that a worker sent; the result that came with it."""
     if data is not None:
         path.write_bytes(data)
-    found = Result.from_dict(content)
-    return dataclasses.replace(found, trajectory=found.trajectory and path.name)
+    result = Result.from_dict(content)
+    return dataclasses.replace(result, trajectory=result.trajectory and path.name)
 
 
 def _files(case: Case) -> dict[str, bytes]:

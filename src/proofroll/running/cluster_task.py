@@ -71,13 +71,13 @@ def installed() -> dict[str, str]:
         if extra is None or extra[1] in extras:
             names.add(re.split(r"[\s;<>=!~\[(]", text, maxsplit=1)[0])
     root = Path(proofroll.__file__).parent
-    found = {"python": platform.python_version(), "proofroll's code": digest([root / "engines", root / "truth"])}
+    versions_of = {"python": platform.python_version(), "proofroll's code": digest([root / "engines", root / "truth"])}
     for name in sorted(names, key=str.lower):
         try:
-            found[name] = version(name)
+            versions_of[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "absent"
-    return found
+            versions_of[name] = "absent"
+    return versions_of
 
 
 def run_case(asked: Asked, content: dict[str, Any], files: Mapping[str, bytes]) -> tuple[dict[str, Any], bytes | None]:
@@ -182,6 +182,6 @@ def _check(asked: Asked, case: Case, workers: Workers) -> None:
 
 def unfit(here: Mapping[str, str], there: Mapping[str, str]) -> Unfit:
     """The error that names what differs, as the command's own machine and this one have it."""
-    one, other = (", ".join(f"{name} {value}" for name, value in found.items()) for found in (here, there))
+    one, other = (", ".join(f"{name} {value}" for name, value in versions.items()) for versions in (here, there))
     said = f"a worker of the cluster, on {socket.gethostname()}, has other versions: here {one}; there {other}"
     return Unfit(f"{said}; install the same on both")

@@ -71,8 +71,8 @@ def root() -> Path:
 
 def remembered() -> list[Environment]:
     """Remembered environments, by name and label."""
-    found = (_read(stamp.parent) for stamp in sorted(root().glob(f"*/*/{STAMP}")))
-    return [item for item in found if item is not None]
+    environments = (_read(stamp.parent) for stamp in sorted(root().glob(f"*/*/{STAMP}")))
+    return [item for item in environments if item is not None]
 
 
 def find(name: str, label: str) -> Environment | None:

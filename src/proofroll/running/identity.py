@@ -49,7 +49,7 @@ def describe(engine: str) -> dict[str, Any]:
         for formulation, by_preset in kind.presets.items()
     }
     inherent = kind.inherent.items() if isinstance(kind, CannotLeaveOut) else ()
-    found = EngineDescription(
+    description = EngineDescription(
         name=engine,
         version=kind.version(),
         interpreter=sys.executable,
@@ -62,7 +62,7 @@ def describe(engine: str) -> dict[str, Any]:
         defaults=plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
         oldest=kind.oldest if isinstance(kind, SupportsFrom) else "",
     )
-    return dataclasses.asdict(found)
+    return dataclasses.asdict(description)
 
 
 def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) -> dict[str, Any]:
@@ -97,11 +97,11 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
 
 def truth_version() -> str:
     """Version of proofroll, and of the libraries that integrate the truth."""
-    found = [f"proofroll {proofroll.__version__}"]
+    versions_of = [f"proofroll {proofroll.__version__}"]
     for name in ("numpy", "scipy", "heyoka"):
         with contextlib.suppress(metadata.PackageNotFoundError):
-            found.append(f"{name} {metadata.version(name)}")
-    return ", ".join(found)
+            versions_of.append(f"{name} {metadata.version(name)}")
+    return ", ".join(versions_of)
 
 
 def libraries(engine: str) -> dict[str, str]:
@@ -112,13 +112,13 @@ def libraries(engine: str) -> dict[str, str]:
     program = path_of(engine)
     if program is not None:
         return {"program": hashlib.sha256(program.read_bytes()).hexdigest()[:12]}
-    found = {"python": platform.python_version()}
+    versions = {"python": platform.python_version()}
     for name in ("numpy", "scipy"):
-        found[name] = metadata.version(name)
+        versions[name] = metadata.version(name)
     if place_of(engine):
         packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
-        found["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
-    return found
+        versions["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
+    return versions
 
 
 def digest(sources: Iterable[Path]) -> str:

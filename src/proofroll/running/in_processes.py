@@ -26,8 +26,8 @@ def in_processes(function: Callable[[Item], Found], items: Sequence[Item], worke
         try:
             # Not map, which cancels the rest when interrupted: a pool whose processes are then ended complains.
             with interrupt_held():
-                found = [pool.submit(function, item) for item in items]
-            for one in found:
+                futures = [pool.submit(function, item) for item in items]
+            for one in futures:
                 yield one.result()
         except BaseException:
             for process in active_children():

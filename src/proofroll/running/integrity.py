@@ -33,11 +33,11 @@ def changed(kind: Any) -> str | None:
     if not _watched:
         return None
     now, package = _held(), kind.__module__.partition(".")[0]
-    for name, found in now.items():
-        before = _watched.setdefault(name, found)
-        if any(one is not other for one, other in zip(before, found, strict=True)):
+    for name, held in now.items():
+        before = _watched.setdefault(name, held)
+        if any(one is not other for one, other in zip(before, held, strict=True)):
             return name
-        if package != OWN.name and str(getattr(found[0], "__module__", "")).partition(".")[0] == package:
+        if package != OWN.name and str(getattr(held[0], "__module__", "")).partition(".")[0] == package:
             return name
     return None
 
@@ -45,7 +45,7 @@ def changed(kind: Any) -> str | None:
 def _held() -> dict[str, tuple[Any, ...]]:
     """Functions, classes, what these have, and constants of all modules that judge, by their full names."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith(_JUDGING)]
-    return {name: found for module in modules for name, found in _of_module(module)}
+    return {name: held for module in modules for name, held in _of_module(module)}
 
 
 def _of_module(module: ModuleType) -> Iterator[tuple[str, tuple[Any, ...]]]:

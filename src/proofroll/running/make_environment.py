@@ -111,14 +111,14 @@ def package_of(engine: str) -> str:
 def _require_supported(name: str, requirements: Sequence[str]) -> None:
     """Asks the engine that is installed here, if any, from which version on its adapter supports it."""
     package = package_of(name) or name
-    pinned = [found for text in requirements if (found := _PINNED.fullmatch(text)) and found[1] == package]
+    pinned = [match for text in requirements if (match := _PINNED.fullmatch(text)) and match[1] == package]
     oldest = ""
     with contextlib.suppress(ProofrollError):  # nobody is here to be asked
         oldest = describe(name).oldest if pinned else ""
-    for found in pinned:
-        if oldest and release(found[2]) < release(oldest):
+    for match in pinned:
+        if oldest and release(match[2]) < release(oldest):
             advice = f"the adapter of {name} supports {oldest} and later; nothing was installed"
-            raise InputError("--requirement", found[0], advice)
+            raise InputError("--requirement", match[0], advice)
 
 
 def _made(
@@ -175,13 +175,13 @@ def _interpreter(python: str) -> Path:
     """The Python from which an environment is made."""
     if not python:
         return Path(sys.executable)
-    found = shutil.which(str(Path(python).expanduser()))
-    if found is None:
+    program = shutil.which(str(Path(python).expanduser()))
+    if program is None:
         raise InputError("--python", python, "there is no such program; give the command or the path of a Python")
     try:
         # A command may be a script around the real one, as pyenv's are.
         told = _call(
-            [found, "-c", "import sys; print(sys.executable); print(sys.version_info[0], sys.version_info[1])"]
+            [program, "-c", "import sys; print(sys.executable); print(sys.version_info[0], sys.version_info[1])"]
         )
         executable, version = told.splitlines()[-2:]
         numbers = tuple(map(int, version.split()))

@@ -52,15 +52,15 @@ def resident_gb(process: int) -> float:
 
 def descendants(process: int) -> list[int]:
     """Children of a process, and theirs; none where the system has no ``/proc``."""
-    found: list[int] = []
+    processes: list[int] = []
     queue = [process]
     while queue:
         with contextlib.suppress(OSError):
             for task in Path(f"/proc/{queue.pop()}/task").iterdir():
                 children = (task / "children").read_text(encoding="ascii").split()
-                found += map(int, children)
+                processes += map(int, children)
                 queue += map(int, children)
-    return found
+    return processes
 
 
 def volunteer() -> None:

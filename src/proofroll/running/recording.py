@@ -124,8 +124,8 @@ def record(
     taken = dict(zip(reached.tolist(), samples, strict=True)) | {at: one for at, one in between.items() if at < last}
     columns = columns_of(scene, np.array(sorted(taken)), [taken[at] for at in sorted(taken)])
     columns = off_grid_apart(scene, columns, asked, np.array(sorted(between)))
-    for owner, found in events:
-        columns = add_events(scene, owner, columns, found)
+    for owner, own_events in events:
+        columns = add_events(scene, owner, columns, own_events)
     remarks = tuple(engine.remarks()) if isinstance(engine, TellsRemarks) else ()
     return Recording(columns, failure, wall, (wall, inside), sampling, remarks, ended, passed)
 

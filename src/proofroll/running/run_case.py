@@ -73,10 +73,10 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         building = spent.seconds["building"]
         step = step_of(engine, settings)
         require_whole_steps(times, step)
-        found = certificate(kind, engine, scene, settings)
-        difference = first_difference(found)
+        lines_of_certificate = certificate(kind, engine, scene, settings)
+        difference = first_difference(lines_of_certificate)
         spent.on("certificate")
-        lines = [line.as_dict() for line in found]
+        lines = [line.as_dict() for line in lines_of_certificate]
         if difference is not None:
             return Result(Status.WRONG_MODEL, difference, certificate=lines, versions=versions)
         counting = samples_between(scene, times, step) if case.turns else times[:0]
@@ -104,7 +104,7 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
         trajectory=out.name,
     )
     said = {"status": result.status.value, "message": result.message, "wall_seconds": result.wall_seconds}
-    said |= manifest(case.engine.name, case.engine.settings, scene, versions, found)
+    said |= manifest(case.engine.name, case.engine.settings, scene, versions, lines_of_certificate)
     write(recording.columns.assign(**said), out)
     spent.on("writing")
     return result
@@ -159,8 +159,8 @@ class _TimeAccounts:
         """
         now = time.perf_counter(), time.process_time()
         for index, account in enumerate((self.seconds, self.processor)):
-            found = {key.replace("_", " "): part[index] for key, part in parts.items()}
-            found[cause] = now[index] - self._since[index] - sum(found.values())
-            for key, value in found.items():
+            spent = {key.replace("_", " "): part[index] for key, part in parts.items()}
+            spent[cause] = now[index] - self._since[index] - sum(spent.values())
+            for key, value in spent.items():
                 account[key] = account.get(key, 0.0) + value
         self._since, _TimeAccounts._counted = now, now[1]

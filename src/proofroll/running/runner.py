@@ -252,13 +252,13 @@ class Runner:
 def _ask(worker: Worker, case: Case, limit: float, out: Path) -> Result:
     request = {"do": "run", "case": dataclasses.asdict(case), "out": str(out.absolute())}  # an engine may change folder
     try:
-        found = Result.from_dict(worker.request(request, limit))
+        result = Result.from_dict(worker.request(request, limit))
         name = plain_name(case.engine.name)
-        ran = found.versions.get(name)
+        ran = result.versions.get(name)
         if ran != case.engine.version:
             raise WorkerDied(Status.CRASHED, f"version {ran} of {name} ran, and {case.engine.version} had answered")
-        waited = worker.waited - sum(found.spent.values())  # a new process starts, and messages go to and fro
-        return dataclasses.replace(found, spent=found.spent | {"process start": waited})
+        waited = worker.waited - sum(result.spent.values())  # a new process starts, and messages go to and fro
+        return dataclasses.replace(result, spent=result.spent | {"process start": waited})
     except Missing as error:
         return Result(Status.MISSING, str(error))
 
@@ -269,9 +269,9 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
         return _ask(worker, case, limit, out)
     seconds = None
     try:
-        found = _ask(worker, case, limit, out)
-        seconds = sum(found.processor.values()) or None
-        return found
+        result = _ask(worker, case, limit, out)
+        seconds = sum(result.processor.values()) or None
+        return result
     except WorkerDied as error:
         if error.status is Status.TIMEOUT and limit < case.time_limit:
             raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None

@@ -97,10 +97,10 @@ def simulate(
         from proofroll.core.truth import truth
 
         times = time_grid(until, EVERY if every is None else every)
-        found = truth(scene, times, samples_between(scene, times))
-        message = found.attrs.get("ill_posed", "two independent routes agree")
-        found = found.assign_attrs(status="done", message=message)
-        return found.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
+        dataset = truth(scene, times, samples_between(scene, times))
+        message = dataset.attrs.get("ill_posed", "two independent routes agree")
+        dataset = dataset.assign_attrs(status="done", message=message)
+        return dataset.assign_attrs(manifest("truth", {}, scene, versions("truth", truth_version())))
     kind, resolved = _resolved(scene, engine, settings)
     times = time_grid(until, sampling_interval(fixed_step(resolved)) if every is None else every)
     built = multi_element.build(kind, scene, resolved)

@@ -83,29 +83,29 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
     An engine that is not looked at must do the same as one that is: they end at one place.
     """
     last = float(recording.columns["time"].values[-1])
-    stops, found, runs = [t for t in recording.passed if t <= last], CleanRuns(), list[_CleanRun]()
-    while len(runs) < _TIMED_RUNS and found.wall < _TIMED_SECONDS:
+    stops, timed, runs = [t for t in recording.passed if t <= last], CleanRuns(), list[_CleanRun]()
+    while len(runs) < _TIMED_RUNS and timed.wall < _TIMED_SECONDS:
         engine, before = build(kind, scene, settings), time.process_time()
         run = _clean_run(engine, stops, _ENOUGH_SECONDS)
         runs.append(run)
-        found.processor += time.process_time() - before
-        found.wall += run.wall
+        timed.processor += time.process_time() - before
+        timed.wall += run.wall
         apart = _apart(scene, run.sample, recording.passed[run.t])
         if apart > _SAME:
-            found.remarks.append(
+            timed.remarks.append(
                 f"no speed is told: the run that is timed ends at {run.t:g} s elsewhere than the one that is judged "
                 f"({number(apart)} of its size)"
             )
-            return found
-    found.rates = [run.wall / run.t for run in runs]
+            return timed
+    timed.rates = [run.wall / run.t for run in runs]
     usual = recording.sampling[0] / len(recording.passed)
     put_off = min(runs, key=lambda run: run.sampling)
     if is_put_off(put_off.wall - put_off.sampling, put_off.sampling, usual):
-        found.remarks.append(
+        timed.remarks.append(
             f"{put_off.sampling / put_off.wall:.0%} of a run's time pass in its last sample(), and count: advance() "
             "returns before the state is there"
         )
-    return found
+    return timed
 
 
 def is_put_off(advancing: float, sampling: float, usual: float) -> bool:

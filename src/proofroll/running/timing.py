@@ -85,22 +85,22 @@ def interleaved(
         once_above: what takes longer than this in the first round [s] is measured no more, and that value counts.
     """
     order = random.Random(0)
-    found: dict[str, list[float]] = {name: [] for name in tasks}
+    seconds_of: dict[str, list[float]] = {name: [] for name in tasks}
     once: dict[str, Timing] = {}
     for _ in range(rounds + 1):
-        names = [name for name in found if name not in once]
+        names = [name for name in seconds_of if name not in once]
         order.shuffle(names)
         for name in names:
             seconds = tasks[name]()
             if progress:
                 progress(name)
             if seconds is None:
-                del found[name]
+                del seconds_of[name]
             else:
-                found[name].append(seconds)
-                if len(found[name]) == 1 and seconds > once_above:
+                seconds_of[name].append(seconds)
+                if len(seconds_of[name]) == 1 and seconds > once_above:
                     once[name] = Timing((seconds,))
-    return {name: once.get(name) or Timing(tuple(values[1:]), tuple(values[:1])) for name, values in found.items()}
+    return {name: once.get(name) or Timing(tuple(values[1:]), tuple(values[:1])) for name, values in seconds_of.items()}
 
 
 def ratio(numerator: Timing, denominator: Timing) -> Interval:

@@ -70,7 +70,7 @@ def cited(subjects: Iterable[str]) -> list[Cited]:
     """
     engines: dict[str, list[str]] = {}
     scenes: dict[str, None] = {}
-    for kind, name, version in (found for subject in subjects for found in _named(subject)):
+    for kind, name, version in (named for subject in subjects for named in _named(subject)):
         if kind == "scene":
             scenes[name] = None
             continue
@@ -98,10 +98,10 @@ def _named(subject: str) -> list[_Named]:
     """The scenes and engines that a subject is about."""
     path = Path(subject)
     if path.suffix in {".json", NETCDF, STORED} and path.is_file():
-        found = list(_walk(_document(path)))
-        if not found:
+        named = list(_walk(_document(path)))
+        if not named:
             raise InputError("result", path.name, "it names neither an engine nor a scene; name a file of proofroll's")
-        return found
+        return named
     if means_scene(subject):
         return [("scene", subject, "")]
     if subject in engine_names():
@@ -194,12 +194,12 @@ def entries(folder: Path) -> list[str]:
     if not path.is_file():
         return []
     text = path.read_text(encoding="utf-8")
-    found = [match[0] for match in _ENTRY.finditer(text)]
+    references = [match[0] for match in _ENTRY.finditer(text)]
     rest = [line for line in _ENTRY.sub("", text).splitlines() if line.strip() and not line.startswith("%")]
-    if rest or not all("title" in fields(entry) for entry in found):
+    if rest or not all("title" in fields(entry) for entry in references):
         said = rest[0] if rest else "an entry without a title"
         raise InputError(str(path), said, "write entries of BibTeX, a line for each field: name = {value},")
-    return found
+    return references
 
 
 def fields(entry: str) -> dict[str, str]:

@@ -44,10 +44,10 @@ NOT_RUN = frozenset({REFUSED, WRONG_MODEL})
 
 def meanings(scene: Scene) -> Mapping[str, str]:
     """Every kind of failure that a run of the scene may show, with its meaning."""
-    found = dict(MEANINGS)
+    kinds = dict(MEANINGS)
     for element in scene.elements:
-        found |= element.failures
-    return found
+        kinds |= element.failures
+    return kinds
 
 
 @dataclass(frozen=True)

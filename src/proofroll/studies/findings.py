@@ -88,12 +88,12 @@ def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
     Raises:
         InputError: a file that is no finding, or an engine without one.
     """
-    found = [read_finding(path) for path in sorted(data_folder("findings").glob("*.md"))]
+    every_finding = [read_finding(path) for path in sorted(data_folder("findings").glob("*.md"))]
     wanted = list(engines)
-    known = sorted({item.engine for item in found})
+    known = sorted({item.engine for item in every_finding})
     for name in wanted:
         require_known("engine", name, known, "there is no finding about it; choose")
-    return [item for item in found if not wanted or item.engine in wanted]
+    return [item for item in every_finding if not wanted or item.engine in wanted]
 
 
 def read_finding(path: Path) -> EngineFinding:

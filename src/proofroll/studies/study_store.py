@@ -41,18 +41,18 @@ def versions() -> dict[str, str]:
     """
     plug_ins = [point for group in (GROUP, ELEMENTS, TRUTHS) for point in announced(group) if point.dist is not None]
     names = _required() | {point.dist.name for point in plug_ins if point.dist is not None}
-    found = {}
+    versions_of = {}
     for name in sorted(names, key=str.lower):
         try:
-            found[name] = version(name)
+            versions_of[name] = version(name)
         except PackageNotFoundError:
             continue
     for top in sorted({point.module.partition(".")[0] for point in plug_ins} - {"proofroll"}):
-        found[f"code of {top}"] = _code_of(top)
+        versions_of[f"code of {top}"] = _code_of(top)
     for item in remembered():
         content = "\n".join([item.version, item.interpreter, *item.packages])
-        found[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
-    return found
+        versions_of[f"{item.name}@{item.label}"] = hashlib.sha256(content.encode()).hexdigest()[:12]
+    return versions_of
 
 
 def _code_of(top: str) -> str:
@@ -96,9 +96,9 @@ def measured() -> Measured:
 
 def changes(measured: Measured) -> list[str]:
     """Inputs that changed since the study was measured, as short texts; empty if it is still valid here."""
-    found = []
+    differences = []
     then, now = measured.machine, machine()
-    found += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
+    differences += [f"{key} {then.get(key)} then, {value} now" for key, value in now.items() if then.get(key) != value]
     then, now = measured.versions, versions()
     own = _required()
     for name in sorted(then.keys() | now.keys(), key=str.lower):
@@ -107,10 +107,10 @@ def changes(measured: Measured) -> list[str]:
         if "@" in name and name not in now:
             continue  # an environment that is gone was not made anew with something else
         if then.get(name) != now.get(name):
-            found.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
+            differences.append(f"{name} {then.get(name, 'absent')} then, {now.get(name, 'absent')} now")
     if measured.code != code():
-        found.append("proofroll's own code has changed")
-    return found
+        differences.append("proofroll's own code has changed")
+    return differences
 
 
 def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:

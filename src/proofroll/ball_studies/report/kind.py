@@ -47,8 +47,8 @@ class BallReport(ReportKind):
 
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)
         labels = ("as a whole", "where the ball touches the wall")
-        found = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
-        return found, "" if found else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
+        pictures = [item.picture(label) for item, label in zip(overview(shown.wall, shown), labels, strict=False)]
+        return pictures, "" if pictures else f"There is no drawing for a wall of the kind {type(shown.wall).__name__}."
 
     truth_facts = staticmethod(onsets.truth_facts)
     run_facts = staticmethod(onsets.run_facts)

@@ -84,15 +84,15 @@ def _run_facts(truth: Onset | None, run: Run, store: Store) -> RunSlips:
 def ill_posed(truths: Sequence[ReportedTruth]) -> list[str]:
     """Sentence on first slips that are sensitive below parameter precision; empty if there are none."""
     onsets = [(truth.point, truth.own.onset) for truth in truths if truth.own is not None]
-    found = [(point, onset) for point, onset in onsets if onset.verdict == "ill-posed"]
-    if not found:
+    undecided = [(point, onset) for point, onset in onsets if onset.verdict == "ill-posed"]
+    if not undecided:
         return []
-    known = f"{100 * found[0][1].uncertainty:.3g} %"
-    where = "; ".join(point for point, _ in found)
+    known = f"{100 * undecided[0][1].uncertainty:.3g} %"
+    where = "; ".join(point for point, _ in undecided)
     return [
-        f"In {len(found)} of {len(onsets)} cases the first slip is ill-posed ({where}): a change of the friction or "
-        f"the rolling resistance by {known} makes it, removes it or moves it to another rise of the needed friction. "
-        "No setting is judged there."
+        f"In {len(undecided)} of {len(onsets)} cases the first slip is ill-posed ({where}): a change of the friction "
+        f"or the rolling resistance by {known} makes it, removes it or moves it to another rise of the needed "
+        "friction. No setting is judged there."
     ]
 
 

@@ -64,14 +64,14 @@ def _outside(item: xr.Dataset) -> int | None:
 def counts(maps: Sequence[xr.Dataset]) -> list[dict[str, Any]]:
     """Summary of the maps for a report: counts of runs by regime, and the analytic boundaries."""
     kept = ("rolling_resistance", "until", "runs", "counts", "outside_boundaries")
-    found = [{key: item[key] for key in kept} for item in regime_content(maps)["maps"]]
-    for entry, item in zip(found, maps, strict=True):
+    summaries = [{key: item[key] for key in kept} for item in regime_content(maps)["maps"]]
+    for entry, item in zip(summaries, maps, strict=True):
         entry["axes"] = {
             name: {"low": float(item[name].min()), "high": float(item[name].max()), "count": item.sizes[name]}
             for name in ("speed", "mu_static")
         }
         entry["boundaries"] = boundaries(item)
-    return list(plain(found))
+    return list(plain(summaries))
 
 
 def boundaries(item: xr.Dataset) -> dict[str, str]:
@@ -140,7 +140,7 @@ def _drawn(maps: Sequence[xr.Dataset], size: tuple[float, float]) -> Figure:
             title=f"rolling resistance f = {item.attrs['rolling_resistance']:g} m, {item.attrs['until']:g} s",
         )
     handles: list[Any] = [Patch(color=_COLOURS[regime], label=word) for regime, word in _WORDS.items()]
-    for name, formula in next((found for item in maps if (found := boundaries(item))), {}).items():
+    for name, formula in next((formulas for item in maps if (formulas := boundaries(item))), {}).items():
         dashes, meaning = _LINES[name]
         handles.append(Line2D([], [], color="black", ls=dashes, lw=1, label=f"{formula}: {meaning}"))
     figure.legend(handles=handles, loc="outside lower center", ncols=max(1, int(size[0] / _ENTRY)), frameon=False)

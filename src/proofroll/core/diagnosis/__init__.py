@@ -146,14 +146,14 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
     """
     proven = [cause for item in hypotheses for cause in item.test(evidence) if cause.proven]
     proven.sort(key=lambda cause: (cause.fitted, cause.left))
-    found: list[Cause] = []
+    causes: list[Cause] = []
     for cause in proven:
-        rivals = [other for other in found if _share(cause, other)]
+        rivals = [other for other in causes if _share(cause, other)]
         if not rivals:
-            found.append(cause)
+            causes.append(cause)
         elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
-            found.append(dataclasses.replace(cause, alternative=True))
-    known = [cause for cause in found if cause.says and not any(_unsure(cause, other) for other in proven)]
+            causes.append(dataclasses.replace(cause, alternative=True))
+    known = [cause for cause in causes if cause.says and not any(_unsure(cause, other) for other in proven)]
     told = [cause for cause in known if not cause.alternative]
     # an alternative is one to a cause that is told
     return told + [cause for cause in known if cause.alternative and any(_share(cause, first) for first in told)]

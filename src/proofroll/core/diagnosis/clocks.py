@@ -32,10 +32,10 @@ def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, f
     """Delay of the reported values [s], and the differences without and with it; None: too few samples."""
     from scipy.interpolate import make_interp_spline
 
-    found = _comparable(time, said, true)
-    if found is None:
+    comparable = _comparable(time, said, true)
+    if comparable is None:
         return None
-    flat, held = found
+    flat, held = comparable
     end = _SPLINE if len(time) >= _MANY else _END
     inner = slice(end, -end)
     flat, curve = flat[inner], make_interp_spline(time, held, k=_SPLINE)
@@ -54,12 +54,12 @@ def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[flo
     """Factor on the speed of reported time, and the differences without and with it; None: too few samples."""
     from scipy.interpolate import make_interp_spline
 
-    found = _comparable(time, said, true)
-    if found is None:
+    comparable = _comparable(time, said, true)
+    if comparable is None:
         return None
     since = time - time[0]
     inner = since <= since[-1] / (1 + _PACE)
-    curve, flat = make_interp_spline(since, found[1], k=_SPLINE), found[0][inner]
+    curve, flat = make_interp_spline(since, comparable[1], k=_SPLINE), comparable[0][inner]
 
     def left(faster: float) -> FloatArray:
         return np.asarray(flat - curve(since[inner] * (1 + float(np.clip(faster, -_PACE, _PACE))))).ravel()

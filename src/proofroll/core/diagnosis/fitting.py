@@ -185,9 +185,9 @@ def any_gravity(
         for held in residuals(evidence):
             at = held.left(falling(element, g))
             slopes = [held.left(falling(element, g + axis)) - at for axis in np.eye(3)]
-            found = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
-            found = np.where(np.abs(found) < 1e-6 * max(float(np.max(np.abs(found))), 1e-300), 0.0, found)
-            says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in found)}) m/s^2"
-            yield held.cause("direction of gravity", says, falling(element, found), "look at the axes of gravity", 3)
+            gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
+            gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
+            says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
+            yield held.cause("direction of gravity", says, falling(element, gravity), "look at the axes of gravity", 3)
 
     return test

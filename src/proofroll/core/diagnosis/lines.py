@@ -82,13 +82,13 @@ def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothes
 
 def _otherwise(line: Mapping[str, Any]) -> str:
     """Text of a quantity built wrongly: its factor, if one factor explains it, and both numbers."""
-    found, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
+    built, expected = (np.asarray(line[key], dtype=np.float64) for key in ("found", "expected"))
     own = {field.name: line[field.name] for field in dataclasses.fields(Line)}
     one, other = told_apart(*worst_numbers(Line(**own), _SHOWN))
     shown = f"{one} instead of {other}{'' if line['unit'] == '1' else ' ' + line['unit']}"
-    square = float(expected @ expected) if found.shape == expected.shape else 0.0
-    factor = float(found @ expected) / square if square else 0.0
-    alike = square > 0 and bool(np.max(np.abs(found - factor * expected)) <= _ALIKE * np.max(np.abs(expected)))
+    square = float(expected @ expected) if built.shape == expected.shape else 0.0
+    factor = float(built @ expected) / square if square else 0.0
+    alike = square > 0 and bool(np.max(np.abs(built - factor * expected)) <= _ALIKE * np.max(np.abs(expected)))
     return f"{line['quantity']} {said_factor(factor)} ({shown})" if alike else f"{line['quantity']} {shown}"
 
 

@@ -70,7 +70,7 @@ def diagnosed(
     judged = list(judgements)
     wrong = {item.observable for item in judged if item.verdict in _WRONG}
     right = {item.observable for item in judged if item.verdict in _RIGHT}
-    found, seen = [], what_is_right(scene, judged)
+    diagnoses, seen = [], what_is_right(scene, judged)
     for element in scene.elements:
         ending = f".{element.name}" if len(scene.elements) > 1 else ""
         own = [
@@ -84,8 +84,10 @@ def diagnosed(
         true = None if truth is None else part(scene, element, truth)
         settled = frozenset(name.removesuffix(ending) for name in right if name.endswith(ending))
         evidence = Evidence(element, own, ran, true, step, settled)
-        found += [Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]]
-    return found
+        diagnoses += [
+            Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]
+        ]
+    return diagnoses
 
 
 def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:

@@ -70,13 +70,13 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
         "late", "the whole state is the true one, at times that are shifted by one time or stretched by one factor"
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
-        found = both(evidence)
-        if found is None:
+        pair = both(evidence)
+        if pair is None:
             return
-        said, true = (state(evidence.element, data) for data in found)
+        said, true = (state(evidence.element, data) for data in pair)
         if said.shape != true.shape or not above_round_off(apart(said, true), float(np.max(np.abs(true)))):
             return
-        time, weights = found[1]["time"].to_numpy(), _alike(said, true)
+        time, weights = pair[1]["time"].to_numpy(), _alike(said, true)
         said, true = said * weights, true * weights
         moved = late(time, said, true)
         if moved is not None:
@@ -124,10 +124,10 @@ def reported_vectors(
         "sample by sample; no equation is needed",
     )
     def test(evidence: Evidence) -> Iterator[Cause]:
-        found = both(evidence)
-        if found is None or clock.proven(evidence):
+        pair = both(evidence)
+        if pair is None or clock.proven(evidence):
             return
-        run, truth = found
+        run, truth = pair
         time, own = truth["time"].to_numpy(), frames(evidence)
         for name, (what, unit) in units.items():
             said, true, size = run[name].to_numpy(), truth[name].to_numpy(), least(evidence.element, name)
@@ -146,10 +146,10 @@ def reported_quaternions(true_ones: Callable[[Evidence], FloatArray]) -> Hypothe
 
     @hypothesis("quaternion", "the true quaternions in another order or inverted are what is said, up to their sign")
     def test(evidence: Evidence) -> Iterator[Cause]:
-        found = both(evidence)
-        if found is None or "q_WB" not in found[0]:
+        pair = both(evidence)
+        if pair is None or "q_WB" not in pair[0]:
             return
-        said, true = found[0]["q_WB"].to_numpy(), true_ones(evidence)
+        said, true = pair[0]["q_WB"].to_numpy(), true_ones(evidence)
         if said.shape != true.shape:
             return
         if len(said) > 1 and apart(np.abs(said[0]), np.abs(true[0])) < _START:

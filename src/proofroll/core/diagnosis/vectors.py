@@ -208,9 +208,9 @@ def product(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
     """Matrices times vectors, NaN where a component that is NaN has a share in it."""
     unknown = np.isnan(vectors)
     size = float(np.max(np.abs(matrices), initial=0.0))
-    found = np.einsum("...ij,...j->...i", matrices, np.where(unknown, 0.0, vectors))
+    products = np.einsum("...ij,...j->...i", matrices, np.where(unknown, 0.0, vectors))
     lost = np.einsum("...ij,...j->...i", np.abs(matrices) > _SHARE * size, unknown.astype(float)) > 0
-    return np.where(lost, np.nan, found)
+    return np.where(lost, np.nan, products)
 
 
 def _distinct(values: FloatArray, size: float) -> int:

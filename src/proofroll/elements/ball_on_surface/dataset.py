@@ -34,11 +34,11 @@ def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[BallSam
         force=stacked(forces),
         q_WB=stacked([s.q_WB for s in samples]),
     )
-    found = dict(made.variables)
+    variables = dict(made.variables)
     if all(s.sticking is not None for s in samples):
         sticking = np.array([s.sticking for s in samples], dtype=np.int8)
-        found["sticking"] = Variable(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
-    return Columns(found, made.attrs)
+        variables["sticking"] = Variable(("time",), sticking, {"units": "1", "long_name": "1 sticks, 0 slips"})
+    return Columns(variables, made.attrs)
 
 
 def columns(
@@ -70,10 +70,10 @@ def columns(
     sliding = slip_velocity(body.ball.radius, e1, v_WB, w_WB) - wall_velocity(body, p_WB, e1)
     slip = np.einsum("tij,ti->tj", frame, sliding)
 
-    found: dict[str, Variable] = {}
+    variables: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, units: str, meaning: str, *dims: str) -> None:
-        found[name] = Variable(("time", *dims), values, {"units": units, "long_name": meaning})
+        variables[name] = Variable(("time", *dims), values, {"units": units, "long_name": meaning})
 
     put("p_WB", p_WB, "m", "centre of the ball in the world", "xyz")
     put("v_WB", v_WB, "m/s", "velocity of the centre in the world", "xyz")
@@ -85,7 +85,7 @@ def columns(
         period = surface.periods[index]
         if period is not None:
             said = doubt(times, u[:, index], rates[:, index], period, turn_interval(body))
-            found[name] = found[name]._replace(attrs={**found[name].attrs, **said})
+            variables[name] = variables[name]._replace(attrs={**variables[name].attrs, **said})
         put(f"{name}_rate", rates[:, index], f"{unit}/s", f"rate of {name}")
     for index in range(3):
         put(f"omega{index + 1}", spin[:, index], "rad/s", f"angular velocity about e{index + 1}")
@@ -101,10 +101,14 @@ def columns(
             put("needed_friction", np.hypot(local[:, 1], local[:, 2]) / -local[:, 0], "1", "friction needed, |F|/N")
     put("gap", surface.gap(p_WB), "m", "distance of the ball from the wall")
     put("energy", energy(body, p_WB, v_WB, w_WB), "J", "kinetic plus potential energy")
-    return Columns(found | axes(times), _smallest(found))
+    return Columns(variables | axes(times), _smallest(variables))
 
 
 def _smallest(variables: Mapping[str, Variable]) -> dict[str, float]:
     """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
-    found = variables["N"][1] if "N" in variables else np.zeros(0)
-    return {f"{SMALLEST}N": float(np.min(found[1:] if len(found) > 1 else found))} if len(found) else {}
+    normal_force = variables["N"][1] if "N" in variables else np.zeros(0)
+    return (
+        {f"{SMALLEST}N": float(np.min(normal_force[1:] if len(normal_force) > 1 else normal_force))}
+        if len(normal_force)
+        else {}
+    )

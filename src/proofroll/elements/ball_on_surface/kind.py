@@ -51,28 +51,28 @@ class BallOnSurfaceKind:
         """One element for each contact, with the ball, the surface and the start that it names."""
         units = BallOnSurfaceKind.units
         filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}
-        found = validated(BallTables, filled, where)
-        balls = {ball.name: ball for ball in found.balls}
-        surfaces = {surface.name: surface for surface in found.surfaces}
-        _check_names(found, where)
-        for surface in found.surfaces:
+        contents = validated(BallTables, filled, where)
+        balls = {ball.name: ball for ball in contents.balls}
+        surfaces = {surface.name: surface for surface in contents.surfaces}
+        _check_names(contents, where)
+        for surface in contents.surfaces:
             if isinstance(surface, Declared):
                 surface.checked()
-        starts = {start.body: start for start in found.initial}
+        starts = {start.body: start for start in contents.initial}
         elements = []
-        for index, contact in enumerate(found.contacts):
+        for index, contact in enumerate(contents.contacts):
             if contact.body not in starts:
                 raise InputError(
                     f"{where}: initial", contact.body, "say how this ball starts; add an [[initial]] of it"
                 )
-            if any(contact.body == other.body for other in found.contacts[:index]):
+            if any(contact.body == other.body for other in contents.contacts[:index]):
                 raise InputError(f"{where}: contacts.{index}.body", contact.body, "a ball touches one surface")
             ball = balls[contact.body]
             try:
                 elements.append(BallOnSurface(ball, surfaces[contact.surface], contact, starts[ball.name], gravity))
             except InputError as error:
                 raise error.within(f"{where}: initial", ball.name) from None
-        for name in balls.keys() - {contact.body for contact in found.contacts}:
+        for name in balls.keys() - {contact.body for contact in contents.contacts}:
             raise InputError(
                 f"{where}: contacts", name, "this ball touches no surface; add a contact or remove the ball"
             )

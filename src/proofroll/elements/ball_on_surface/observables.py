@@ -231,8 +231,8 @@ def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
         return np.asarray(np.max(np.abs(reported - local), axis=-1))
 
     t, (few, between) = dataset["time"].to_numpy(), _off_grid(dataset)
-    found = apart({name: dataset[name].to_numpy() for name in _FORCES}, t)[ENDS:-ENDS]
-    return np.concatenate([found, apart(few, between)]) if "N" in few else found
+    audit = apart({name: dataset[name].to_numpy() for name in _FORCES}, t)[ENDS:-ENDS]
+    return np.concatenate([audit, apart(few, between)]) if "N" in few else audit
 
 
 def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -249,13 +249,13 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
         along = np.einsum("tij,ti->tj", surface.frame(curve(times))[..., 1:], v_WB - moving)
         return np.asarray(np.linalg.norm(along, axis=-1))
 
-    found = apart(t, dataset["v_WB"].to_numpy())[ENDS:-ENDS]
+    audit = apart(t, dataset["v_WB"].to_numpy())[ENDS:-ENDS]
     if "q_WB" in dataset:
         turned = body.ball.radius * _turning_apart(t, dataset["q_WB"].to_numpy(), dataset["w_WB"].to_numpy())
-        found = np.maximum(found, turned[ENDS : len(t) - ENDS])
+        audit = np.maximum(audit, turned[ENDS : len(t) - ENDS])
     few, times = _off_grid(dataset)
     if not len(times):
-        return found
+        return audit
     # Along the wall: how far off it the ball is, is the gap's business.
     away = surface.position(surface.locate(few["p_WB"])) - surface.position(curve(times))
     since = np.min(np.abs(times[:, None] - t), axis=1)
@@ -267,7 +267,7 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
         attitudes = np.stack([dataset["q_WB"].to_numpy()[last], few["q_WB"]])
         turned = _apart(attitudes, (t[last], times), (t, dataset["w_WB"].to_numpy()))
         off.append(body.ball.radius * turned / (times - t[last]))
-    return np.concatenate([found, np.max(off, axis=0)])
+    return np.concatenate([audit, np.max(off, axis=0)])
 
 
 def _off_grid(dataset: xr.Dataset) -> tuple[dict[str, FloatArray], FloatArray]:

@@ -24,22 +24,22 @@ _FAR = 10.0
 
 def optional_terms(element: BallOnSurface, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:
     """Rolling resistance, bounded friction and orientation; see :class:`proofroll.core.element.Element`."""
-    found: list[OptionalTerm] = []
+    terms: list[OptionalTerm] = []
     if "rolling_resistance" in parameters:
         f = element.contact.rolling_resistance or _RESISTANCE * element.ball.radius
         because = (
             "the scene has it" if element.contact.rolling_resistance else f"the scene has none; here with f = {f:g} m"
         )
         put, taken = {"rolling_resistance": f}, {"rolling_resistance": 0.0}
-        found.append(OptionalTerm("rolling resistance", because, put, taken))
+        terms.append(OptionalTerm("rolling resistance", because, put, taken))
     if "mu_static" in parameters:
         unbounded = dict.fromkeys((n for n in ("mu_static", "mu_kinetic") if n in parameters), math.inf)
         if math.isfinite(element.contact.mu_static):
             if BallCapability.SLIPPING_START not in element.requires:  # which has no motion without a bound
-                found.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
+                terms.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
         else:
             far = _FAR * (float(np.nanmax(truth["needed_friction"].to_numpy())) or 1.0)
             because = f"the scene has no bound; here one of {far:.3g}, {_FAR:g} times what rolling needs"
-            found.append(OptionalTerm("bounded friction", because, dict.fromkeys(unbounded, far)))
+            terms.append(OptionalTerm("bounded friction", because, dict.fromkeys(unbounded, far)))
     because, need = "nothing else depends on it", BallCapability.ORIENTATION
-    return [*found, OptionalTerm("orientation asked", because, asks=("orientation",), capability=need)]
+    return [*terms, OptionalTerm("orientation asked", because, asks=("orientation",), capability=need)]

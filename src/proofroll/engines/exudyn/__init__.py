@@ -126,17 +126,17 @@ class Exudyn:
         """See :class:`proofroll.core.engine_abilities.TellsDefaults`: the settings of a simulation."""
         import exudyn
 
-        found: dict[str, Any] = {}
+        defaults: dict[str, Any] = {}
 
         def flatten(where: str, values: Mapping[str, Any]) -> None:
             for name, value in values.items():
                 if isinstance(value, Mapping):
                     flatten(f"{where}{name}.", value)
                 else:
-                    found[where + name] = value.tolist() if hasattr(value, "tolist") else str(value)
+                    defaults[where + name] = value.tolist() if hasattr(value, "tolist") else str(value)
 
         flatten("", exudyn.SimulationSettings().GetDictionary())
-        return found
+        return defaults
 
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel:

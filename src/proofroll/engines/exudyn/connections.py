@@ -137,5 +137,5 @@ class Connections:
 
     def body(self, name: str, output: Any, at: Array) -> Array:
         """A quantity at a place of a body, from its centre of mass."""
-        found = self._system.GetObjectOutputBody(self._bodies[name], output, at, exu.ConfigurationType.Current)
-        return np.array(found)
+        quantity = self._system.GetObjectOutputBody(self._bodies[name], output, at, exu.ConfigurationType.Current)
+        return np.array(quantity)

@@ -22,26 +22,26 @@ def new_settings(*, dependent: bool, explicit: Any = None) -> Any:
     Constraints that may be ``dependent`` need a linear solver that looks for it; ``explicit`` is the type of an
     explicit solver.
     """
-    found = exu.SimulationSettings()
-    renamed = not hasattr(found, "solution")
+    settings = exu.SimulationSettings()
+    renamed = not hasattr(settings, "solution")
     if dependent:
         kind = exu.LinearSolverType.EigenDense
         if renamed:
-            found.linearSolverType = kind
+            settings.linearSolverType = kind
         else:
-            found.linearSolver.solverType = kind
-        (found.linearSolverSettings if renamed else found.linearSolver).ignoreSingularJacobian = True
+            settings.linearSolver.solverType = kind
+        (settings.linearSolverSettings if renamed else settings.linearSolver).ignoreSingularJacobian = True
     if renamed:
-        found.solutionSettings.writeSolutionToFile = found.solutionSettings.sensorsStoreAndWriteFiles = False
+        settings.solutionSettings.writeSolutionToFile = settings.solutionSettings.sensorsStoreAndWriteFiles = False
     else:
-        found.solution.file.write = found.solution.sensors.active = False
+        settings.solution.file.write = settings.solution.sensors.active = False
     if explicit is not None:
-        time = found.timeIntegration
+        time = settings.timeIntegration
         if renamed:
             time.explicitIntegration.dynamicSolverType = explicit
         else:
             time.solverType = explicit
-    return found
+    return settings
 
 
 def add_rigid_body(system: Any, mass: float, inertia: Sequence[float], node: Any) -> Any:
@@ -55,9 +55,9 @@ def add_rigid_body(system: Any, mass: float, inertia: Sequence[float], node: Any
 
 def rigid_body(system: Any, number: Any) -> dict[str, Any]:
     """Rigid body as Exudyn holds it: ``mass``, ``inertia`` as above, ``centerOfMass``."""
-    found = system.GetObject(number)
-    prefix = "" if "mass" in found else "physics"
-    return {name: found[_named(prefix, name)] for name in ("mass", "inertia", "centerOfMass")}
+    item = system.GetObject(number)
+    prefix = "" if "mass" in item else "physics"
+    return {name: item[_named(prefix, name)] for name in ("mass", "inertia", "centerOfMass")}
 
 
 def _named(prefix: str, name: str) -> str:

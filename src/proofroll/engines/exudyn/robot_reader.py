@@ -179,19 +179,19 @@ class _Tree:
     def mass_matrix(self) -> Array:
         """The mass matrix."""
         self.solver.ComputeMassMatrix(self.mbs)
-        found = np.array(self.solver.GetSystemMassMatrix())
-        if not np.all(np.isfinite(found)):
+        matrix = np.array(self.solver.GetSystemMassMatrix())
+        if not np.all(np.isfinite(matrix)):
             raise Refused("the mass matrix of its tree is not finite, as where a joint moves no mass")
-        return found
+        return matrix
 
     def frames(self) -> dict[str, tuple[Array, Array]]:
         """Position and rotation of the body that each joint carries."""
-        found = {}
+        frames = {}
         for name, marker in self.markers.items():
             p = self.mbs.GetMarkerOutput(marker, Output.Position)
             R = np.array(self.mbs.GetMarkerOutput(marker, Output.RotationMatrix)).reshape(3, 3)
-            found[name] = (np.array(p), R @ self.turn[name].T)
-        return found
+            frames[name] = (np.array(p), R @ self.turn[name].T)
+        return frames
 
     def held(self) -> tuple[dict[str, float], dict[str, Array], dict[str, Array]]:
         """Mass, centre of mass and inertia of each link, read back."""

@@ -108,9 +108,11 @@ class Mujoco(SteppedModel):
         """See :class:`proofroll.core.engine_abilities.TellsDefaults`: options, and what a bare geom has."""
         model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
         options = {name: getattr(model.opt, name) for name in dir(model.opt) if not name.startswith("_")}
-        found = {f"option {key}": np.asarray(value).tolist() for key, value in options.items() if not callable(value)}
+        defaults = {
+            f"option {key}": np.asarray(value).tolist() for key, value in options.items() if not callable(value)
+        }
         geom = ("solref", "solimp", "friction", "condim", "margin", "gap", "priority")
-        return found | {f"geom {name}": np.asarray(getattr(model, f"geom_{name}")[0]).tolist() for name in geom}
+        return defaults | {f"geom {name}": np.asarray(getattr(model, f"geom_{name}")[0]).tolist() for name in geom}
 
     @classmethod
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self | MujocoMechanism:

@@ -156,12 +156,12 @@ class BoundedFriction:
 
     def coefficients(self, read: Callable[[], float]) -> tuple[float, float]:
         """Coefficients while the ball sticks and while it slips, with ``read`` giving that of the model as it is."""
-        now, found = self._mu, []
+        now, coefficients = self._mu, []
         for mu in (self._static, self._kinetic):
             self._write(mu)
-            found.append(read())
+            coefficients.append(read())
         self._write(now)
-        return found[0], found[1]
+        return coefficients[0], coefficients[1]
 
     def correct(self, data: Any, N: float) -> None:
         """Takes the lift that MuJoCo's cone gives to a slipping contact out of its reference acceleration.

@@ -211,7 +211,7 @@ class MujocoMechanism(SteppedModel):
         R = axes.reshape(-1, 3, 3)
         rows = self._equality_rows(data)
         rank = independent(rows)
-        found = self._accelerations(data)
+        accelerations = self._accelerations(data)
         return MechanismBuilt(
             mass=model.body_mass[bodies].copy(),
             com=model.body_ipos[bodies].copy(),
@@ -222,9 +222,9 @@ class MujocoMechanism(SteppedModel):
             rows=len(rows),
             rank=rank,
             mobility=int(model.nv) - rank,
-            acceleration=found["acceleration"],
-            angular_acceleration=found["angular_acceleration"],
-            regularised=self._softened(data, rows, found) if len(rows) else {},
+            acceleration=accelerations["acceleration"],
+            angular_acceleration=accelerations["angular_acceleration"],
+            regularised=self._softened(data, rows, accelerations) if len(rows) else {},
         )
 
     def _axis(self, data: Any, number: int, kind: str) -> Array:
@@ -250,11 +250,11 @@ class MujocoMechanism(SteppedModel):
     def _accelerations(self, data: Any) -> dict[str, Array]:
         """Accelerations of the bodies' origins, and angular ones, shape (bodies, 3) each."""
         mujoco.mj_rnePostConstraint(self._model, data)
-        found = np.zeros((len(self._bodies), 6))
-        for row, body in zip(found, self._bodies, strict=True):
+        rows = np.zeros((len(self._bodies), 6))
+        for row, body in zip(rows, self._bodies, strict=True):
             mujoco.mj_objectAcceleration(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
         # MuJoCo's are those that a sensor feels
-        return {"acceleration": found[:, 3:] + self._model.opt.gravity, "angular_acceleration": found[:, :3].copy()}
+        return {"acceleration": rows[:, 3:] + self._model.opt.gravity, "angular_acceleration": rows[:, :3].copy()}
 
     def _softened(self, data: Any, rows: Array, soft: dict[str, Array]) -> dict[str, Regularised]:
         """Tolerances for MuJoCo's soft loops: its answer against that of its own matrices with hard loops.
@@ -268,11 +268,11 @@ class MujocoMechanism(SteppedModel):
         data.qacc[:] = without + into @ np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing
         at_rest = self._settings.impedances[0]
         because = f"loops are soft, of impedance {at_rest:g} at rest; hard ones would change that much"
-        found = {}
+        regularised = {}
         for name, hard in self._accelerations(data).items():
             difference = float(np.abs(hard - soft[name]).max() / max(np.abs(hard).max(), np.finfo(float).tiny))
-            found[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
-        return found
+            regularised[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
+        return regularised
 
     def _evaluate(self, data: Any) -> None:
         self._drive(self._model, data)
@@ -283,8 +283,8 @@ class MujocoMechanism(SteppedModel):
 
 def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:
     """Signals with the field of MjData and the place in it where they act: targets, and drives that change."""
-    found = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
+    signals = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
     for number, joint in enumerate(mechanism.joints):
         if varies(joint.torque):
-            found.append((joint.torque, "qfrc_applied", int(model.joint(f"{number}.0").dofadr[0])))
-    return found
+            signals.append((joint.torque, "qfrc_applied", int(model.joint(f"{number}.0").dofadr[0])))
+    return signals

@@ -66,7 +66,7 @@ def _off(model: Any, flag: str) -> bool:
 
 def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
     """Body -> its pose in the file, and whether each of its shapes, in the file's order, collides with anything."""
-    found: dict[str, dict[str, Any]] = {
+    sources: dict[str, dict[str, Any]] = {
         names[index]: {
             "collides": [],
             "position": np.array(model.body_pos[index]),
@@ -76,9 +76,9 @@ def _sources(model: Any, names: list[str]) -> dict[str, dict[str, Any]]:
     }
     for index in range(model.ngeom):
         name = names[int(model.geom_bodyid[index])]
-        if name in found:
-            found[name]["collides"].append(bool(model.geom_contype[index] or model.geom_conaffinity[index]))
-    return found
+        if name in sources:
+            sources[name]["collides"].append(bool(model.geom_contype[index] or model.geom_conaffinity[index]))
+    return sources
 
 
 def _joint(
@@ -107,13 +107,13 @@ def _joint(
 
 def _mimics(model: Any) -> tuple[Mimic, ...]:
     """Linear couplings of joints; others are constraints that the comparison leaves out."""
-    found, coupling = [], int(mujoco.mjtEq.mjEQ_JOINT)
+    mimics, coupling = [], int(mujoco.mjtEq.mjEQ_JOINT)
     for index in range(model.neq):
         first, other = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
         factors = model.eq_data[index][:5]
         if model.eq_type[index] == coupling and other >= 0 and model.eq_active0[index] and not np.any(factors[2:]):
-            found.append(Mimic(model.joint(first).name, model.joint(other).name, float(factors[1]), float(factors[0])))
-    return tuple(found)
+            mimics.append(Mimic(model.joint(first).name, model.joint(other).name, float(factors[1]), float(factors[0])))
+    return tuple(mimics)
 
 
 def _first(value: Any) -> float:

@@ -151,10 +151,10 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
         middle = low + part * (upper - low)
         if not low < middle < upper:
             middle = (low + upper) / 2
-        found = excess(middle)
-        if found > 0:
-            low, at_low, at_upper = middle, found, at_upper / (2 if before > 0 else 1)
+        off = excess(middle)
+        if off > 0:
+            low, at_low, at_upper = middle, off, at_upper / (2 if before > 0 else 1)
         else:
-            upper, at_upper, at_low = middle, found, at_low / (2 if before < 0 else 1)
-        before = 1 if found > 0 else -1
+            upper, at_upper, at_low = middle, off, at_low / (2 if before < 0 else 1)
+        before = 1 if off > 0 else -1
     return upper

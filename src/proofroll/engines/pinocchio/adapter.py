@@ -97,9 +97,11 @@ class Pinocchio:
     def defaults() -> Mapping[str, Any]:
         """See :class:`proofroll.core.engine_abilities.TellsDefaults`: gravity, and settings of the proximal solver."""
         solver = pin.ProximalSettings()
-        found = {f"proximal {name}": getattr(solver, name) for name in ("absolute_accuracy", "relative_accuracy", "mu")}
-        found |= {"proximal max_iter": solver.max_iter}
-        return found | {"gravity": pin.Model().gravity.linear.tolist()}
+        defaults = {
+            f"proximal {name}": getattr(solver, name) for name in ("absolute_accuracy", "relative_accuracy", "mu")
+        }
+        defaults |= {"proximal max_iter": solver.max_iter}
+        return defaults | {"gravity": pin.Model().gravity.linear.tolist()}
 
     @classmethod
     def build(cls, scene: Scene, settings: PinocchioSettings) -> ContactRun | RowsRun | MechanismRun:

@@ -73,8 +73,10 @@ class ConstraintDynamics:
         if self._ready is not data:
             pin.initConstraintDynamics(model, data, self.constraints, self._results)
             self._ready = data
-        found: Array = pin.constraintDynamics(model, data, q, v, tau, self.constraints, self._results, self._proximal)
-        return found
+        acceleration: Array = pin.constraintDynamics(
+            model, data, q, v, tau, self.constraints, self._results, self._proximal
+        )
+        return acceleration
 
     def reactions(self, data: Any, q: Array, v: Array) -> tuple[Array, Any, Array]:
         """Acceleration; forces on Pinocchio's joints of springs and loops; force and moment on body_b of each loop."""

@@ -168,17 +168,17 @@ class ContactSteps:
             if f:
                 torque = self.resistance(triad, along, normal_force, span)
             free = v + span * pin.aba(model, data, q, v, torque)
-            impulse, found, status = self._solved(delassus, jacobian.dot(free) + shift)
+            impulse, normal, status = self._solved(delassus, jacobian.dot(free) + shift)
             after = free + to_joints.dot(impulse)
-            found /= span
+            normal /= span
             # On a plane N is right at once, but the direction of the resistance is not yet.
-            if not f or (abs(found - normal_force) <= _SETTLED * abs(found) and (number or not centred)):
+            if not f or (abs(normal - normal_force) <= _SETTLED * abs(normal) and (number or not centred)):
                 break
-            normal_force = found
+            normal_force = normal
             # the resistance is that at the present time, which with leapfrog is the middle of the kick
             if centred:
                 along = (0.5 * (v + after)[:3]).tolist()
-        return Kick(after, impulse, found, status)
+        return Kick(after, impulse, normal, status)
 
     def _closing(self, gap: float, triad: Sequence[float], v: Sequence[float]) -> float:
         """Speed [m/s] with which the ball may come to the wall, at most: that the gap closes within the step.

@@ -97,8 +97,8 @@ class FreeFlyer(BallWithRows):
 
     def rows(self, data: Any, q: FloatArray, v: FloatArray) -> ContactRows:
         """See :class:`~proofroll.engines.pinocchio.ball_with_rows.BallWithRows`; the wall's, then those of rolling."""
-        moving, *found = self._at(data, q, v)
-        return ContactRows(np.array(moving[1:10]).reshape(3, 3).T, *found)
+        moving, *rest = self._at(data, q, v)
+        return ContactRows(np.array(moving[1:10]).reshape(3, 3).T, *rest)
 
     def _only_rows(self, data: Any, q: FloatArray, v: FloatArray) -> FloatArray:
         if self._orientation:

@@ -131,14 +131,14 @@ class MechanismRun:
         """Directions in which the joints' own velocities turn or slide, in the world."""
         data = self._model.createData()
         pin.computeJointJacobians(self._model, data, q)
-        found = np.full((len(self._mechanism.joints), 3), np.nan)
+        axes = np.full((len(self._mechanism.joints), 3), np.nan)
         for number, (joint, index) in enumerate(zip(self._mechanism.joints, self.tree.joint, strict=True)):
             if joint.kind in AXIS_COLUMN:
                 J = pin.getJointJacobian(self._model, data, index, pin.LOCAL_WORLD_ALIGNED)
                 J = J.reshape(6, self._model.nv)  # of a single column it is a vector
                 column = J[:, self._model.joints[index].idx_v + AXIS_COLUMN[joint.kind]]
-                found[number] = column[:3] if joint.kind == "prismatic" else column[3:]
-        return found
+                axes[number] = column[:3] if joint.kind == "prismatic" else column[3:]
+        return axes
 
     def _mass_matrix_error(self, q: Array) -> float:
         """The mass matrix of crba, which the equations use, against unit accelerations of rnea."""

@@ -154,8 +154,8 @@ class NullSpace:
         tau = tree.drives(q, v)
         if not tree.loops:
             if not tree.springs:
-                found: Array = pin.aba(model, data, q, v, tau)
-                return found
+                acceleration: Array = pin.aba(model, data, q, v, tau)
+                return acceleration
             pin.forwardKinematics(model, data, q, v)
             pin.updateFramePlacements(model, data)
             return np.array(pin.aba(model, data, q, v, tau, tree.pulls(data)))

@@ -76,8 +76,8 @@ class PinocchioRobots:
             mass[name], com[name], inertia[name] = float(placed.mass), np.array(placed.lever), np.array(placed.inertia)
         return Reading(
             joints, dofs, mass, com, inertia,
-            {name: np.array([X.translation for X in found]) for name, found in frames.items()},
-            {name: np.array([X.rotation for X in found]) for name, found in frames.items()},
+            {name: np.array([X.translation for X in placements]) for name, placements in frames.items()},
+            {name: np.array([X.rotation for X in placements]) for name, placements in frames.items()},
             remarks=("option mimic=true",) if reduced else (),
             **arrays,
         )  # fmt: skip
@@ -99,33 +99,33 @@ def _columns(request: Request, model: Any) -> list[tuple[str, int, int]]:
 
     Several joints in one body of an MJCF are one composite joint of the model.
     """
-    found: list[tuple[str, int, int]] = []
+    columns: list[tuple[str, int, int]] = []
     twins = _twins(model)
     for index in range(1, model.njoints):
         joint, name = model.joints[index], str(model.names[index])
         if index in twins:
             first, number = twins[index]
-            found += [(f"{part} ({number})", index, dof) for part, other, dof in list(found) if other == first]
+            columns += [(f"{part} ({number})", index, dof) for part, other, dof in list(columns) if other == first]
             continue
         if request.kind == "urdf" and name == "root_joint":
             name = request.base_joint
         if joint.shortname() == "JointModelComposite":
             parts = [part.nv for part in joint.extract().joints]
-            found += [(part, index, nv) for part, nv in zip(_composite(request, model, index), parts, strict=True)]
+            columns += [(part, index, nv) for part, nv in zip(_composite(request, model, index), parts, strict=True)]
         elif joint.nv:
-            found.append((name, index, int(joint.nv)))
-    return found
+            columns.append((name, index, int(joint.nv)))
+    return columns
 
 
 def _twins(model: Any) -> dict[int, tuple[int, int]]:
     """Joints whose name an earlier joint has: index -> index of the first, and which of them it is, from 2."""
     first: dict[str, int] = {}
-    found: dict[int, tuple[int, int]] = {}
+    twins: dict[int, tuple[int, int]] = {}
     for index, name in enumerate(map(str, model.names)):
         if name in first:
-            found[index] = (first[name], 2 + sum(other == first[name] for other, _ in found.values()))
+            twins[index] = (first[name], 2 + sum(other == first[name] for other, _ in twins.values()))
         first.setdefault(name, index)
-    return found
+    return twins
 
 
 def _composite(request: Request, model: Any, index: int) -> list[str]:

@@ -91,19 +91,19 @@ class ClosedFormModel(ReducedModel):
         if body.contact.rolling_resistance > 0:
             raise Refused("there is no closed form with rolling resistance; take formulation=equations")
         super().__init__(body)
-        found = closed_form(body, np.zeros(1))
-        if found is None:
+        motion = closed_form(body, np.zeros(1))
+        if motion is None:
             raise Refused(
                 "closed forms are known on a plane and in a cylinder along whose axis gravity points, not here; "
                 "take formulation=equations"
             )
-        self._motion = found
+        self._motion = motion
 
     def advance(self, t: float) -> None:
         """See :class:`ReducedModel`."""
-        found = closed_form(self._body, np.array([t]))
-        assert found is not None  # whether there is one does not depend on time
-        self._motion = found
+        motion = closed_form(self._body, np.array([t]))
+        assert motion is not None  # whether there is one does not depend on time
+        self._motion = motion
 
     def motion(self) -> BallMotion:
         """See :class:`ReducedModel`."""

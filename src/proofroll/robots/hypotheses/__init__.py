@@ -70,8 +70,8 @@ class RobotEvidence:
         if not edit(root):
             return None
         before, after = self.recompiled(self.root), self.recompiled(root)
-        found = None if before is None or after is None else self.carried_over(before, with_weightless(after))
-        return None if found is None else EditedRobot.of(found, root)
+        robot = None if before is None or after is None else self.carried_over(before, with_weightless(after))
+        return None if robot is None else EditedRobot.of(robot, root)
 
     def carried_over(self, before: Robot, after: Robot) -> Robot | None:
         """The robot with all that differs between two others; None: nothing does."""
@@ -137,5 +137,5 @@ def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], Robo
 def hypotheses() -> tuple[RobotHypothesis, ...]:
     """All causes in the modules of this package, by their names."""
     modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
-    found = [item for module in modules for item in vars(module).values() if isinstance(item, RobotHypothesis)]
-    return tuple(sorted(found, key=lambda item: item.id))
+    causes = [item for module in modules for item in vars(module).values() if isinstance(item, RobotHypothesis)]
+    return tuple(sorted(causes, key=lambda item: item.id))

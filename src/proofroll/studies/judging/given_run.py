@@ -115,11 +115,11 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
 def _whole(run: xr.Dataset, scene: Scene) -> bool:
     """True if a file that was once a run has all variables of its motion."""
     try:
-        found = observe(scene, run)
+        observed = observe(scene, run)
     except (KeyError, AttributeError):  # of xarray, for a variable or an attribute of one that is not there
         return False
     motion = [name for name, item in scene.observables.items() if item.headline and item.role is Role.MOTION]
-    return all(name in found for name in motion)
+    return all(name in observed for name in motion)
 
 
 def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
@@ -168,8 +168,8 @@ def _dataset(run: Run) -> xr.Dataset:
     _check_lengths(given)
     said = {str(name): dict(getattr(run[name], "attrs", {})) for name in run}
     dims = {name: ("time", *(f"{name}_{axis}" for axis in range(1, np.ndim(v)))) for name, v in given.items()}
-    found = {name: (dims[name], values, said[name]) for name, values in given.items()}
-    return xr.Dataset({name: item for name, item in found.items() if name != "time"}, {"time": found["time"]})
+    variables = {name: (dims[name], values, said[name]) for name, values in given.items()}
+    return xr.Dataset({name: item for name, item in variables.items() if name != "time"}, {"time": variables["time"]})
 
 
 def _from_file(path: Path) -> Run:

@@ -53,18 +53,18 @@ class Compared:
 
     def __str__(self) -> str:
         """Difference of the quantity with its time, its tolerance, and the error bar of the truth."""
-        found = self.judgement
-        unit = "" if found.unit == "1" else f" {found.unit}"
+        judgement = self.judgement
+        unit = "" if judgement.unit == "1" else f" {judgement.unit}"
         when = "" if self.at is None else f" at {self.at:.4g} s"
-        error, allowed = number(found.error, 3), number(found.tolerance, 3)
-        said = f"{found.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
-        if not np.isfinite(found.error):
-            said = f"{found.observable} is not finite, or has not as many values as the truth"
-        bar = f"the truth is known to {number(found.truth_error_bar)}{unit}"
-        if found.verdict is Verdict.NOT_JUDGED:
+        error, allowed = number(judgement.error, 3), number(judgement.tolerance, 3)
+        said = f"{judgement.observable} is off by {error}{unit}{when}, allowed {allowed}{unit}"
+        if not np.isfinite(judgement.error):
+            said = f"{judgement.observable} is not finite, or has not as many values as the truth"
+        bar = f"the truth is known to {number(judgement.truth_error_bar)}{unit}"
+        if judgement.verdict is Verdict.NOT_JUDGED:
             bar = f"not judged, for {bar} only"
-        remarks = ["the question is ill-posed here"] if found.verdict is Verdict.ILL_POSED else []
-        return "; ".join([said, bar, *remarks, *found.remarks])
+        remarks = ["the question is ill-posed here"] if judgement.verdict is Verdict.ILL_POSED else []
+        return "; ".join([said, bar, *remarks, *judgement.remarks])
 
 
 @dataclass(frozen=True)
@@ -102,11 +102,13 @@ class Judged:
         head, *lines = str(self).splitlines()
         rows = []
         for item in self.compared:
-            found, sign = item.judgement, "✓" if item.agrees else "✗"
-            unit = "" if found.unit == "1" else f" {found.unit}"
-            numbers = (number(value) + unit for value in (found.error, found.tolerance, found.truth_error_bar))
+            judgement, sign = item.judgement, "✓" if item.agrees else "✗"
+            unit = "" if judgement.unit == "1" else f" {judgement.unit}"
+            numbers = (
+                number(value) + unit for value in (judgement.error, judgement.tolerance, judgement.truth_error_bar)
+            )
             when = "" if item.at is None else f"{item.at:.4g} s"
-            rows.append((found.observable, f"{sign} {found.verdict.value}", *numbers, when))
+            rows.append((judgement.observable, f"{sign} {judgement.verdict.value}", *numbers, when))
         columns = ("", "verdict", "off by", "allowed", "truth known to", "at")
         return html_table(head, columns, rows, map(str.strip, lines[len(rows) :]))
 
@@ -164,13 +166,13 @@ def judge(
 
 def _unjudged(given: GivenRun, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
     """Reasons that further variables of the user's run are not judged, by name."""
-    found = {}
+    reasons = {}
     for name, why in given.besides.items():
         if not _comparable(reference, name):
-            found[name] = "the truth has nothing of that name"
+            reasons[name] = "the truth has nothing of that name"
         elif why or name not in judged:
-            found[name] = why or _NO_TOLERANCE
-    return found
+            reasons[name] = why or _NO_TOLERANCE
+    return reasons
 
 
 def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mapping[str, Tolerance]) -> dict[str, str]:
@@ -181,11 +183,11 @@ def _events_left(scene: Scene, observed: Mapping[str, FloatArray], judged: Mappi
 
 def _unsure(dataset: xr.Dataset, reference: Reference, judged: Mapping[str, Tolerance]) -> dict[str, str]:
     """Reasons that variables of a whole run are too coarsely sampled to judge, by name."""
-    found = {}
+    reasons = {}
     for name in judged.keys() | {name for name, item in reference.scene.observables.items() if item.headline}:
         if name in dataset and UNCERTAIN in dataset[name].attrs:
-            found[f"turns of {name}" if name in judged else name] = str(dataset[name].attrs[UNCERTAIN])
-    return dict(sorted(found.items()))
+            reasons[f"turns of {name}" if name in judged else name] = str(dataset[name].attrs[UNCERTAIN])
+    return dict(sorted(reasons.items()))
 
 
 def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
@@ -194,8 +196,8 @@ def _truth(scene: Scene, times: FloatArray, between: FloatArray) -> xr.Dataset:
     if key not in _truths:
         late = times[0] > 0
         asked = np.concatenate([[0.0], times]) if late else times
-        found = truth(scene, asked, samples_between(scene, asked), between)
-        _truths[key] = found.isel(time=slice(1, None)) if late else found
+        dataset = truth(scene, asked, samples_between(scene, asked), between)
+        _truths[key] = dataset.isel(time=slice(1, None)) if late else dataset
         while len(_truths) > _MOST_TRUTHS:
             del _truths[next(iter(_truths))]
     return _truths[key]
@@ -255,10 +257,10 @@ def _tolerance(name: str, given: object, unit: str) -> Tolerance:
     if isinstance(given, int | float) and not isinstance(given, bool):
         given = f"{given!r} {unit}"
     text = str(given).strip()
-    found = Tolerance.parse(f"tolerance of {name}", text if " " in text else text.replace("%", " %"))
-    if not found.relative and found.unit != unit:
+    bound = Tolerance.parse(f"tolerance of {name}", text if " " in text else text.replace("%", " %"))
+    if not bound.relative and bound.unit != unit:
         raise InputError(f"tolerance of {name}", given, f"its unit is {unit}")
-    return found
+    return bound
 
 
 def _comparable(reference: Reference, name: str) -> bool:
@@ -289,12 +291,12 @@ def _compared(
             values = turned_alike(values, true)
         scale, doubt = _size(reference, name, true, _unit(reference, name)), Doubt.NONE
         own = 0.0
-    found = judge_curve(
+    judgement = judge_curve(
         name, _unit(reference, name), values, true,
         truth_error_bar=bar, tolerance=bound.absolute(scale), scale=scale, limit=None, doubt=doubt,
         own_bar=own, sampled_bar=reference.sampled_bar, between=between,
     )  # fmt: skip
-    return Compared(found, _farthest(values, true, dataset["time"].to_numpy()))
+    return Compared(judgement, _farthest(values, true, dataset["time"].to_numpy()))
 
 
 def _farthest(values: FloatArray, true: FloatArray, times: FloatArray) -> float | None:

@@ -97,13 +97,13 @@ class Reference:
 
     def observed(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """The observables of an engine's trajectory of this scene."""
-        found = observe(self.scene, dataset)
+        curves = observe(self.scene, dataset)
         for element in self.scene.elements:
             own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
             if "event_kind" in own or "event_kind" in true:
-                found[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
+                curves[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
         both = (dataset, self.dataset)
-        sure = {name: on_turns_of(self.curves.get(name), values, name, both) for name, values in found.items()}
+        sure = {name: on_turns_of(self.curves.get(name), values, name, both) for name, values in curves.items()}
         return {name: values for name, values in sure.items() if values is not None}
 
     def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:

@@ -111,11 +111,11 @@ class Ladder:
         self._run_truths([dict(s.on.parameters) for s in self.switches if s.on is not None], progress)
         facts = resolve([(model.engine, model.options) for model in models.values()], self._runner.workers)
         cases: dict[str, Case] = {}
-        for (key, model), found in zip(models.items(), facts, strict=True):
-            if isinstance(found, EngineFacts):
-                cases[key] = self._case(found, model)
+        for (key, model), engine_facts in zip(models.items(), facts, strict=True):
+            if isinstance(engine_facts, EngineFacts):
+                cases[key] = self._case(engine_facts, model)
             else:
-                self.answers[key] = ModelAnswer(None, absence(found))
+                self.answers[key] = ModelAnswer(None, absence(engine_facts))
         results = self._runner.run(cases.values(), lambda case, _: progress(case.engine.name))
         for key, case in cases.items():
             self.answers[key] = self._answer(models[key], case, results[case.key])

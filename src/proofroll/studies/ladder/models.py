@@ -114,38 +114,38 @@ def switches(
     ladder: Sequence[Rung], engines: Mapping[str, EngineDescription | ProofrollError], scene: Scene, truth: xr.Dataset
 ) -> list[Switch]:
     """Every optional term: the scene's in one model of each engine and level, the engine's in each that has it."""
-    found: list[Switch] = []
+    switches_of_terms: list[Switch] = []
     models = [(rung.level, rung.model) for rung in ladder if rung.model is not None and not rung.variant]
     seen: set[tuple[str, Level]] = set()
     for level, model in models:
         told = engines[model.engine]
         assert isinstance(told, EngineDescription)  # it has a rung
         if (model.engine, level) not in seen:
-            found += _of_the_scene(model, scene, truth, told.inherent.get(model.formulation, {}))
+            switches_of_terms += _of_the_scene(model, scene, truth, told.inherent.get(model.formulation, {}))
         seen.add((model.engine, level))
     for _, model in models:
         told = engines[model.engine]
         assert isinstance(told, EngineDescription)
-        found += [
+        switches_of_terms += [
             Switch(term.name, "engine", model, _with(model, term.on), _with(model, term.off), term.because)
             for term in told.terms
             if model.formulation in term.formulations
         ]
-    return found
+    return switches_of_terms
 
 
 def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:
     """Switches of the optional terms of the scene's elements."""
-    found: list[Switch] = []
+    switches_of_terms: list[Switch] = []
     for element in scene.elements:
         for term in element.optional_terms(scene.parameters, part(scene, element, truth)):
             if term.capability in inherent:
-                found.append(Switch(term.name, "scene", model, None, None, inherent[term.capability]))
+                switches_of_terms.append(Switch(term.name, "scene", model, None, None, inherent[term.capability]))
             elif not term.asks or not scene.asks:
                 on = LadderModel(model.engine, model.options, term.put, term.asks)
                 off = LadderModel(model.engine, model.options, term.taken)
-                found.append(Switch(term.name, "scene", model, on, off, term.because))
-    return found
+                switches_of_terms.append(Switch(term.name, "scene", model, on, off, term.because))
+    return switches_of_terms
 
 
 class Need(StrEnum):

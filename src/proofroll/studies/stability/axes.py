@@ -51,14 +51,14 @@ class Axis:
         Raises:
             InputError: the axis names a parameter that the scene does not have.
         """
-        found = {}
+        parameters = {}
         for name, term in self.parameters.items():
             for known in (name, *([term.times] if isinstance(term.times, str) else ())):
                 advice = f"{scene.name} has no such parameter; choose from"
                 require_known(f"axes: {self.name}", known, scene.parameters, advice)
             factor = scene.parameters[term.times] if isinstance(term.times, str) else term.times
-            found[name] = factor * value**term.power
-        return found
+            parameters[name] = factor * value**term.power
+        return parameters
 
 
 def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:

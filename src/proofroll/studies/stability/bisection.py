@@ -53,13 +53,13 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
     boundary a pass may be luck. What is known is never asked again. A rung for which None is sent, and all finer ones,
     are left out as too long.
     """
-    found: SearchResult[V] = SearchResult(limit=size)
-    seen = found.seen
+    result: SearchResult[V] = SearchResult(limit=size)
+    seen = result.seen
     rung, in_a_row = 0, 0
-    while rung < found.limit:
+    while rung < result.limit:
         verdict = yield rung
         if verdict is None:
-            found.limit = rung
+            result.limit = rung
             rung = (max(seen, default=-1) + rung) // 2
             if rung < 0 or rung in seen:
                 break
@@ -69,19 +69,19 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
         if in_a_row == 2:
             break
         following = rung + ((stride + 1) // 2 if verdict.accurate else stride)
-        if following >= found.limit:
-            following = (rung + found.limit) // 2
+        if following >= result.limit:
+            following = (rung + result.limit) // 2
             if following == rung:
                 break
         rung = following
     for passes in (attrgetter("stable"), attrgetter("accurate")):
-        while (wanted := _next(found, passes)) is not None:
+        while (wanted := _next(result, passes)) is not None:
             verdict = yield wanted
             if verdict is None:
-                found.limit = min(found.limit, wanted)
+                result.limit = min(result.limit, wanted)
             else:
                 seen[wanted] = verdict
-    return found
+    return result
 
 
 def _next(found: SearchResult[V], passes: Callable[[V], bool]) -> int | None:

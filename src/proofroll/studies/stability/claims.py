@@ -75,22 +75,26 @@ class Claim:
 
     def contradictions(self, points: Sequence[BoundaryPoint]) -> list[str]:
         """Contradictions by the points of a map, as sentences; none where a run met the limit of time."""
-        found = []
+        sentences = []
         about = [p for p in points if self._about(p) and not p.problem and not p.timed_out]
         if self.same:
             for curve, axis in dict.fromkeys((point.curve, point.axis) for point in about):
                 along = [p for p in about if (p.curve, p.axis) == (curve, axis)]
                 said = dependence(along, self.boundary)
                 if said:
-                    found.append(f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere")
+                    sentences.append(
+                        f"{curve} along {axis}: {self.boundary} up to {said}, expected the same everywhere"
+                    )
         expected = self.failure and not any(point.sides[self.boundary].failure for point in about)
         if about and expected and not any(point.cut for point in about):
-            found.append(f"{self.engine}: nothing fails beyond {self.boundary}, expected: {' or '.join(self.failure)}")
+            sentences.append(
+                f"{self.engine}: nothing fails beyond {self.boundary}, expected: {' or '.join(self.failure)}"
+            )
         for point in about:
             side = point.sides[self.boundary]
             where = f"{point.curve} at {point.axis} = {point.value:g}"
-            found += [f"{where}: {sentence}" for sentence in self._wrong(side, point.cut)]
-        return found
+            sentences += [f"{where}: {sentence}" for sentence in self._wrong(side, point.cut)]
+        return sentences
 
     def _about(self, point: BoundaryPoint) -> bool:
         spec = parse_engine(self.engine)
@@ -103,24 +107,24 @@ class Claim:
 
     def _wrong(self, side: Boundary, cut: bool) -> list[str]:
         """Contradictions by one boundary; a missing boundary is none if the search was ``cut`` for its many steps."""
-        found = []
+        sentences = []
         largest = side.largest
         if self.never and largest is not None:
-            found.append(f"{self.boundary} at a step or tolerance of {largest:g}, expected at none")
+            sentences.append(f"{self.boundary} at a step or tolerance of {largest:g}, expected at none")
         if self.number is not None:
             value = side.numbers.get(self.number)
             low, high = self.between
             if value is None and cut:
-                return found
+                return sentences
             if value is None or not low <= value <= high:
                 said = "no step is" if value is None else f"{value:.3g} is the largest"
-                found.append(f"{self.boundary}: {self.number}: {said}, expected between {low:g} and {high:g}")
+                sentences.append(f"{self.boundary}: {self.number}: {said}, expected between {low:g} and {high:g}")
         if self.failure and side.failure and side.failure not in self.failure:
-            found.append(f"beyond {self.boundary}: {side.failure}, expected: {' or '.join(self.failure)}")
+            sentences.append(f"beyond {self.boundary}: {side.failure}, expected: {' or '.join(self.failure)}")
         if self.silent is not None and side.failure and side.silent != self.silent:
             words = {True: "silent", False: "said so"}
-            found.append(f"beyond {self.boundary}: {words[side.silent]}, expected: {words[self.silent]}")
-        return found
+            sentences.append(f"beyond {self.boundary}: {words[side.silent]}, expected: {words[self.silent]}")
+        return sentences
 
 
 @dataclass(frozen=True)
@@ -167,10 +171,10 @@ def file_for(scene: str) -> StabilityFile:
 def _load(path: Path) -> StabilityFile:
     where = path.name
     content = study_content(path, STUDY)
-    found = validated(StabilityFile, content, where, name=path.stem)
+    file = validated(StabilityFile, content, where, name=path.stem)
     with told_of(where):
-        _check(where, found)
-    return found
+        _check(where, file)
+    return file
 
 
 def _check(where: str, found: StabilityFile) -> None:

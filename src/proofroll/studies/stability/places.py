@@ -51,7 +51,7 @@ class Place:
 def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | MappedPlace]:
     """Every value of every axis, without the truth yet; mapped is one that has no scene, with the reason."""
     default = load_scene(name)
-    found: list[Place | MappedPlace] = []
+    places: list[Place | MappedPlace] = []
     for axis in axes:
         for value in effort.values_of(axis):
             # A default that is given is left out, so that axes share the runs of the place where they meet.
@@ -61,13 +61,13 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | M
             try:
                 scene = load_scene(name, **given)
             except ProofrollError as error:
-                found.append(MappedPlace(axis.name, value, given, str(error)))
+                places.append(MappedPlace(axis.name, value, given, str(error)))
                 continue
             intervals = round(PER_PERIOD * (value if axis.horizon else effort.periods))
             stride = 1 + 2 * (intervals // (2 * _MOST_SAMPLES))
             every = stride * scene.natural_time / PER_PERIOD
-            found.append(Place(axis.name, value, given, scene, every * max(1, intervals // stride), every))
-    return found
+            places.append(Place(axis.name, value, given, scene, every * max(1, intervals // stride), every))
+    return places
 
 
 def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:

@@ -23,13 +23,13 @@ _ENOUGH = 3
 
 def step_numbers(scene: Scene, h: float = 1.0, truth: xr.Dataset | None = None) -> list[StepNumber]:
     """The numbers of a step ``h`` [s], of all elements."""
-    found = []
+    numbers = []
     for element in scene.elements:
         own = None if truth is None else part(scene, element, truth)
-        found += [
+        numbers += [
             StepNumber(scene.label(element, n.name), n.symbol, n.meaning, n.value) for n in element.step_numbers(h, own)
         ]
-    return found
+    return numbers
 
 
 def values(scene: Scene, h: float, truth: xr.Dataset | None = None) -> dict[str, float]:

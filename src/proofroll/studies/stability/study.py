@@ -50,9 +50,9 @@ def make_stability(
         InputError: something that does not exist.
         ProofrollError: the folder cannot be written.
     """
-    found = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
+    stability_map = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
     path = stability_path(folder, asked.scene, axes, engines, effort)
-    study = with_programs(found, stability_study(found), path.with_suffix(""), runner.workers)
+    study = with_programs(stability_map, stability_study(stability_map), path.with_suffix(""), runner.workers)
     study = replace(study, claims=MapClaims(asked.name, asked.contradictions(study)))
     keep(study, path)
     return study, path
@@ -147,15 +147,15 @@ def _side(point: MapPoint, name: str) -> Boundary:
 
 def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
     """Most constant dimensionless number of every curve, axis and boundary, along the axis."""
-    found = []
+    explained = []
     for curve in dict.fromkeys(point.curve for point in points):
         for axis in dict.fromkeys(point.axis for point in points):
             for name in BOUNDARIES:
                 sides = [point.sides[name] for point in points if point.curve == curve and point.axis == axis]
                 best = explanation([side.numbers for side in sides if side.reached and side.numbers])
                 if best is not None:
-                    found.append(ExplainedBoundary(**asdict(best), curve=curve, axis=axis, boundary=name))
-    return found
+                    explained.append(ExplainedBoundary(**asdict(best), curve=curve, axis=axis, boundary=name))
+    return explained
 
 
 def _scale_findings(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:

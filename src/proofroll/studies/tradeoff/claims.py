@@ -64,14 +64,14 @@ class TradeoffClaims:
         return self._said(study, None, "undecided")
 
     def _said(self, study: TradeoffStudy, verdict: bool | None, word: str) -> list[str]:
-        found = (item for item in self.judged(study) if item.holds is verdict)
-        return [f"{self.name}, {word}: {item.claim}; {item.found}" for item in found]
+        judged = (item for item in self.judged(study) if item.holds is verdict)
+        return [f"{self.name}, {word}: {item.claim}; {item.found}" for item in judged]
 
 
 def claims_for(scene: str) -> TradeoffClaims | None:
     """The claims about a scene as its file has them, or None if there is no file."""
-    found = (_claims(path, content) for path, content in study_files(STUDY) if content.get("scene") == scene)
-    return next(found, None)
+    files = (_claims(path, content) for path, content in study_files(STUDY) if content.get("scene") == scene)
+    return next(files, None)
 
 
 def load_claims(path: str | Path) -> TradeoffClaims:
@@ -92,10 +92,10 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
                 claim["tolerance"] = Tolerance.parse(f"{where}: {kind}.{index}.tolerance", claim.get("tolerance"))
                 if kind == "cheapest" and isinstance(claim.get("engine"), str):
                     claim["engine"] = [claim["engine"]]
-    found = validated(TradeoffClaims, given, where, name=path.stem)
+    claims = validated(TradeoffClaims, given, where, name=path.stem)
     with told_of(where):
-        _check(where, found)
-    return found
+        _check(where, claims)
+    return claims
 
 
 def _check(where: str, found: TradeoffClaims) -> None:

@@ -60,8 +60,8 @@ class Holds:
         steps = [point.step for point in held if point.step is not None]
         if not steps:
             return ClaimJudgement(said, self.because, False, "no step of the sweep does")
-        found = f"the coarsest that does is {max(steps):g}"
-        return ClaimJudgement(said, self.because, math.isclose(max(steps), self.step), found)
+        shown = f"the coarsest that does is {max(steps):g}"
+        return ClaimJudgement(said, self.because, math.isclose(max(steps), self.step), shown)
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ class Converges:
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(said, self.because, None, unknown)
         curves = {point.curve for point in study.points if fits(point, self.engine)}
-        found = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
-        orders = [(b.order_low or b.order, b.order_high or b.order) for b in found if b.order]
+        budgets = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
+        orders = [(b.order_low or b.order, b.order_high or b.order) for b in budgets if b.order]
         if not orders:
             return ClaimJudgement(said, self.because, False, "no order shows")
         shown = "what shows is " + ", ".join(f"{low:.3g} to {high:.3g}" for low, high in orders)

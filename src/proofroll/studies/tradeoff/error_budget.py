@@ -66,7 +66,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     bar, single = _bar(used, quantity), curve.floor(quantity)
     if single:  # runs with smaller steps show their roundings alone
         used = used[: max(sum((p.step or 0.0) >= (single.best.step or 0.0) for p in used), 3)]
-    found = CurveBudget(
+    budget_of_curve = CurveBudget(
         engine=curve.facts.name,
         curve=curve.engine,
         quantity=quantity,
@@ -75,7 +75,11 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         coarse="too few runs reached the end" if curve.facts.resolution else NOTHING,
     )
     if len(used) < 3:
-        return replace(found, fine=found.coarse, sentence=f"{found.coarse[0].upper()}{found.coarse[1:]}.")
+        return replace(
+            budget_of_curve,
+            fine=budget_of_curve.coarse,
+            sentence=f"{budget_of_curve.coarse[0].upper()}{budget_of_curve.coarse[1:]}.",
+        )
     values = [point.curves[quantity] for point in used]
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
@@ -101,8 +105,8 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     model_form, error = size(limit.values - true), used[-1].errors[quantity]
     first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
     coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))
-    found = replace(
-        found,
+    budget_of_curve = replace(
+        budget_of_curve,
         model_form=model_form,
         model_form_bar=limit.error_bar,
         order=order.value,
@@ -119,7 +123,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         fine_step=steps[-1],
         fine_error=error,
     )
-    return replace(found, sentence=_sentence(found, unit, str(curve.facts.resolution)))
+    return replace(budget_of_curve, sentence=_sentence(budget_of_curve, unit, str(curve.facts.resolution)))
 
 
 def _contradicted(order: Order, declared: int | None) -> bool:

@@ -170,8 +170,8 @@ def holding(study: TradeoffStudy, required: Requirements, *, here: bool = False)
     """
     absolute = absolute_tolerance(study, required)
     within = replace(study, over={}) if here else study
-    found = [p for p in study.points if _asked(p, required) and why_it_fails(within, p, required, absolute) is None]
-    return sorted(found, key=lambda p: p.cost)
+    points = [p for p in study.points if _asked(p, required) and why_it_fails(within, p, required, absolute) is None]
+    return sorted(points, key=lambda p: p.cost)
 
 
 def _require_measured(study: TradeoffStudy, required: Requirements) -> None:

@@ -141,11 +141,11 @@ def _fronts(found: Tradeoff, curves: Sequence[Curve], numbers: Mapping[str, int]
 
 def _points(curve: Curve, quantities: Sequence[str], numbers: Mapping[str, int]) -> list[MeasuredPoint]:
     envelopes = {name: curve.envelope(name) for name in quantities}
-    found = []
+    points = []
     for index, point in enumerate(curve.points):
         held = {name: errors[index] for name, errors in envelopes.items() if name in point.errors}
-        found.append(_point(curve, point, numbers[point.case.key], held))
-    return found
+        points.append(_point(curve, point, numbers[point.case.key], held))
+    return points
 
 
 def _point(curve: Curve, point: CurvePoint, number: int, envelope: dict[str, float]) -> MeasuredPoint:
@@ -176,11 +176,11 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
     """The fields of :class:`~proofroll.studies.tradeoff.records.MeasuredCost`."""
     if timing is None:
         return {}
-    found = timing.interval
+    interval = timing.interval
     return {
-        "seconds_per_second": found.value,
-        "interval": (found.low, found.high) if found.confidence else None,
-        "confidence": found.confidence,
+        "seconds_per_second": interval.value,
+        "interval": (interval.low, interval.high) if interval.confidence else None,
+        "confidence": interval.confidence,
         "rounds": list(timing.values),
         "measurements": len(timing.values),
     }

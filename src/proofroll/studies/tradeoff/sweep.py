@@ -140,22 +140,22 @@ def _further(
     """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays."""
     if curve.facts.resolution is None or not curve.points:
         return []
-    found = []
+    values = []
     scale = references[question.every].scale(question.quantity) or 1.0
     coarsest, finest = curve.points[0], curve.points[-1]
     ladder = [question.step(factor) for factor in _COARSER] if curve.fixed_step else _LOOSER
     coarser = next((value for value in ladder if value not in curve.tried), None)
     whole = coarsest.errors.get(question.quantity, np.inf) < BROKEN * scale
     if coarser is not None and whole and not curve.saturated(question.quantity):
-        found.append(coarser)
+        values.append(coarser)
     if not curve.fixed_step:
-        return found
+        return values
     finer = next((step for step in map(question.step, finer_steps) if step not in curve.tried), None)
     if finer is not None and len(curve.points) > 1:
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
         if now < (1 - gain) * before:
-            found.append(finer)
-    return found
+            values.append(finer)
+    return values
 
 
 def _run(

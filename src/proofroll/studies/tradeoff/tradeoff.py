@@ -119,12 +119,12 @@ def tradeoff(
     finer, gain = (BRIEF_FINER, BRIEF_GAIN) if brief else (FINER, GAIN)
     references = sweep(question, curves, runner, told, finer, gain)
     ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
-    found = Tradeoff(question, curves, absent, references, over=ranges, brief=brief)
+    study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief)
     _, truth = resolve_with_truth([], runner.workers)
-    _time(found, question.case(found.reference.scene, truth, question.every), runner.workers, rounds, tell)
+    _time(study, question.case(study.reference.scene, truth, question.every), runner.workers, rounds, tell)
     if ranges:
-        _check(found, truth, runner, told)
-    return found
+        _check(study, truth, runner, told)
+    return study
 
 
 def _time(found: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:
@@ -216,5 +216,5 @@ def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, bri
 def restricted(folder: Path, question: Question) -> list[Path]:
     """Files of the studies of a question that are restricted to some engines."""
     whole = stored(folder, question)
-    found = whole.parent.glob(f"{whole.stem}-*.json")
-    return sorted(path for path in found if not path.stem.endswith("-brief") and path.suffixes == [".json"])
+    paths = whole.parent.glob(f"{whole.stem}-*.json")
+    return sorted(path for path in paths if not path.stem.endswith("-brief") and path.suffixes == [".json"])

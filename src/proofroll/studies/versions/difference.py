@@ -174,7 +174,7 @@ def _numbers(item: Plan, before: Run, after: Run, results: Mapping[str, Result],
 
 
 def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:
-    found = NumbersApart()
+    largest = NumbersApart()
     values, others = observe(scene, one), observe(scene, other)
     for name, mine in values.items():
         item, theirs = scene.observables[name], others.get(name)
@@ -188,7 +188,7 @@ def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str,
             continue
         difference = float(np.nanmax(np.abs(mine[:count] - theirs[:count]), initial=0.0))
         relative = difference / (sizes.get(name) or float(np.nanmax(np.abs(mine), initial=0.0)) or 1.0)
-        if not relative < found.relative:  # also where it is not a number: then they differ
+        if not relative < largest.relative:  # also where it is not a number: then they differ
             kind = NumberKind.CHANGED if relative > ROUND_OFF else NumberKind.ROUND_OFF
-            found = NumbersApart(name, item.unit, difference, relative, kind)
-    return found
+            largest = NumbersApart(name, item.unit, difference, relative, kind)
+    return largest

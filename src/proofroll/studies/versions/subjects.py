@@ -25,11 +25,11 @@ def comparisons_about(subject: str, engine: str) -> list[Comparison]:
         InputError: there is no such thing, or it has nothing of this engine.
     """
     if not subject:
-        found = [load_comparison(name).briefly() for name in comparison_names()]
-        found = [item for item in found if _rows_of(item, engine)]
-        if not found:
+        comparisons = [load_comparison(name).briefly() for name in comparison_names()]
+        comparisons = [item for item in comparisons if _rows_of(item, engine)]
+        if not comparisons:
             raise InputError("engine", engine, "no comparison has rows of it; name a scene or a comparison")
-        return found
+        return comparisons
     try:
         scene_folder(subject)
     except InputError:

@@ -127,13 +127,13 @@ def compared(
     plans = [plan(dataclasses.replace(item, timed=False), sides, runner.workers) for item in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
     results = runner.run(cases.values(), lambda case, _: progress(case.engine.name))
-    found: list[tuple[Plan, Run, Run]] = []
+    pairs: list[tuple[Plan, Run, Run]] = []
     for item in plans:
         runs = evaluate(item, results, runner).runs
         one, other = ([run for run in runs if parse_engine(run.row.engine).name == side] for side in sides)
-        found += [(item, before, after) for before, after in zip(one, other, strict=True)]
-    differences = [case_difference(item, before, after, results, runner) for item, before, after in found]
-    speeds = _speeds(found, runner, rounds, progress) if rounds else {}
+        pairs += [(item, before, after) for before, after in zip(one, other, strict=True)]
+    differences = [case_difference(item, before, after, results, runner) for item, before, after in pairs]
+    speeds = _speeds(pairs, runner, rounds, progress) if rounds else {}
     old, new = (EngineVersion(name, its.version, its.interpreter) for name, its in zip(sides, told, strict=True))
     return VersionsStudy(
         engine=plain_name(parse_engine(sides[0]).name),
@@ -143,7 +143,7 @@ def compared(
         rows=_rows(differences, speeds),
         cases=differences,
         defaults=_defaults(*told),
-        hosts=hosts(run.result for _, *pair in found for run in pair),
+        hosts=hosts(run.result for _, *pair in pairs for run in pair),
         changed=[f"{_where(case)}: {what}" for case in differences for what in case.changed],
         lost=[
             f"{name} {_where(case)}: {side.message}"

@@ -179,9 +179,9 @@ def projected(form: Structure, tolerance: float) -> CompiledEquations:
     """Compiled integrator like :func:`rolling.reduced`, with the forces N, λ1 and λ2."""
     import heyoka as hy
 
-    found = equations(form)
-    outputs = [*(rate for _, rate in found.system), found.N, *found.multipliers]
+    symbols = equations(form)
+    outputs = [*(rate for _, rate in symbols.system), symbols.N, *symbols.multipliers]
     return CompiledEquations(
-        integrator=hy.taylor_adaptive(found.system, [1.0] * len(found.system), tol=tolerance),
-        evaluate=Function(outputs, found.state),
+        integrator=hy.taylor_adaptive(symbols.system, [1.0] * len(symbols.system), tol=tolerance),
+        evaluate=Function(outputs, symbols.state),
     )

@@ -142,12 +142,12 @@ def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquati
     """
     import heyoka as hy
 
-    found = expressions(resistance, uniform)
-    system = found.rolling()
-    outputs = [*(rate for _, rate in system), found.per_A * found.b2, found.per_A * found.b3, found.N]
+    symbols = expressions(resistance, uniform)
+    system = symbols.rolling()
+    outputs = [*(rate for _, rate in system), symbols.per_A * symbols.b2, symbols.per_A * symbols.b3, symbols.N]
     return CompiledEquations(
         integrator=hy.taylor_adaptive(system, [1.0] * len(system), tol=tolerance),
-        evaluate=Function(outputs, found.state),
+        evaluate=Function(outputs, symbols.state),
     )
 
 

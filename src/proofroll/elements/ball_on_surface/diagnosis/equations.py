@@ -77,10 +77,10 @@ class Law:
 
 def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
     """The run at its samples; None: too few of them lie between events."""
-    found = [_states(body, part) for part in stretches(dataset)]
-    if not found:
+    parts = [_states(body, part) for part in stretches(dataset)]
+    if not parts:
         return None
-    columns = zip(*(dataclasses.astuple(part) for part in found), strict=True)
+    columns = zip(*(dataclasses.astuple(part) for part in parts), strict=True)
     whole = [None if column[0] is None else np.concatenate(column) for column in columns]
     pick = np.unique(np.linspace(0, len(whole[0]) - 1, _SAMPLES).astype(int))  # type: ignore[arg-type]  # positions are there
     return BallStates(*(None if part is None else part[pick] for part in whole))  # type: ignore[arg-type]  # only a force is None
@@ -146,8 +146,8 @@ def response(
     matrix[3:6, 3:6], matrix[3:6, 6:] = J * np.eye(3), -a * cross_e1 + np.outer(resisting(1.0), e1)
     matrix[6:, :3], matrix[6:, 3:6] = np.eye(3), -a * cross_e1
     right[:3], right[3:6], right[6:] = applied, turning, -a * cross(w, bend)
-    found = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-    return found[:3], found[3:6], found[6:]
+    solution = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+    return solution[:3], solution[3:6], solution[6:]
 
 
 @once
@@ -200,10 +200,10 @@ def _others(body: RollingBall) -> list[Law]:
     """One number each: gravity, mass and inertia, damping and moments."""
     ball = body.ball
     lighter = [replace(ball, mass=0.9 * ball.mass), replace(ball, inertia_ratio=0.9 * ball.inertia_ratio)]
-    found = [Law(replace(body, gravity=body.gravity + axis)) for axis in np.eye(3)]
-    found += [Law(replace(body, ball=other)) for other in lighter]
-    found += [Law(body, force=lambda v: -ball.mass * v), Law(body, moment=lambda _e1, _v, w: -ball.inertia * w)]
-    return [*found, *(Law(body, moment=lambda *_, axis=axis: ball.inertia * axis) for axis in np.eye(3))]
+    laws = [Law(replace(body, gravity=body.gravity + axis)) for axis in np.eye(3)]
+    laws += [Law(replace(body, ball=other)) for other in lighter]
+    laws += [Law(body, force=lambda v: -ball.mass * v), Law(body, moment=lambda _e1, _v, w: -ball.inertia * w)]
+    return [*laws, *(Law(body, moment=lambda *_, axis=axis: ball.inertia * axis) for axis in np.eye(3))]
 
 
 def _contradicted(lines: Sequence[Mapping[str, Any]], body: RollingBall, law: Law, allowed: float) -> bool:

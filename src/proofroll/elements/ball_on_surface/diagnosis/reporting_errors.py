@@ -42,10 +42,10 @@ def attitudes(time: FloatArray, w_WB: FloatArray) -> FloatArray:
     """Rotations of the body from its true angular velocity; the identity at time 0, shape (time, 3, 3)."""
     if len(time) < 2:
         return np.eye(3)[None]
-    found = [np.eye(3)]
+    rotations = [np.eye(3)]
     for rotation in carried(Rotation.identity(len(time) - 1), time, w_WB, _SUBSTEPS).as_matrix():
-        found.append(rotation @ found[-1])
-    return np.array(found)
+        rotations.append(rotation @ rotations[-1])
+    return np.array(rotations)
 
 
 def forces(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
@@ -80,12 +80,12 @@ CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 @hypothesis("said force", "the true force with another sign, unit, frame or time is what the engine says")
 def reported_force(evidence: Evidence) -> Iterator[Cause]:
     """The wall's force, and its friction by itself."""
-    found, body = both(evidence), evidence.element.rolling
-    if found is None or "N" not in found[0] or "N" not in found[1] or CLOCK.proven(evidence):
+    pair, body = both(evidence), evidence.element.rolling
+    if pair is None or "N" not in pair[0] or "N" not in pair[1] or CLOCK.proven(evidence):
         return
     if body.flies:  # a force that is there and gone: an impact a moment later is no force that is told late
         return
-    run, truth = found
+    run, truth = pair
     time, axes = truth["time"].to_numpy(), frames(body, truth)
     said, true = forces(body, run), forces(body, truth)
     known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)

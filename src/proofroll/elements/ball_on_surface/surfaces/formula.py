@@ -187,9 +187,9 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
     """
     program: dict[str, str] = {}
     given = [f"x{i}" for i in range(count)]
-    found = formula(*variables(*(_Symbol(program, name) for name in given)))
+    results = formula(*variables(*(_Symbol(program, name) for name in given)))
     parts = []
-    for result in found if isinstance(found, tuple) else (found,):
+    for result in results if isinstance(results, tuple) else (results,):
         flat = result.parts if isinstance(result, Jet) else [result] + [0.0] * (count + count * (count + 1) // 2)
         parts += [_text(part) for part in flat]
     steps = "".join(f"    {name} = {text}\n" for text, name in program.items())

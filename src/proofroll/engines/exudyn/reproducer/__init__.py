@@ -74,11 +74,11 @@ def _start(model: Any) -> dict[str, Any]:
     A contact starts with the creep that holds the ball.
     """
     data, initial = model.system.systemData, exu.ConfigurationType.Initial
-    found: dict[str, Any] = {"ACCELERATIONS": [], "MULTIPLIERS": []}
+    numbers: dict[str, Any] = {"ACCELERATIONS": [], "MULTIPLIERS": []}
     if not isinstance(model, Generic):
         # Rates of the Euler parameters of the first node, a body that is not turned, are half of it.
-        found["START_SPIN"] = 2 * np.array(data.GetODE2Coordinates_t(initial)[4:7])
+        numbers["START_SPIN"] = 2 * np.array(data.GetODE2Coordinates_t(initial)[4:7])
     if isinstance(model, (Carrier, RollingDisc)):
-        found["ACCELERATIONS"] = data.GetODE2Coordinates_tt(initial)
-        found["MULTIPLIERS"] = data.GetAECoordinates()
-    return found
+        numbers["ACCELERATIONS"] = data.GetODE2Coordinates_tt(initial)
+        numbers["MULTIPLIERS"] = data.GetAECoordinates()
+    return numbers

@@ -89,7 +89,7 @@ def mechanism_source(xml: str, mechanism: Mechanism) -> str:
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
     """Numbers of the model, and shortcuts from them, that its file with six digits does not give back."""
     read = mujoco.MjModel.from_xml_string(xml)
-    found = {}
+    changed = {}
     for name in dir(model):
         value = getattr(model, name) if not name.startswith("_") else None
         if (
@@ -97,5 +97,5 @@ def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
             and value.dtype.kind in "fiu"
             and not np.array_equal(value, getattr(read, name))
         ):
-            found[name] = value.copy()
-    return found
+            changed[name] = value.copy()
+    return changed
