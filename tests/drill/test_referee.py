@@ -100,7 +100,7 @@ def test_no_error_of_the_truth_of_a_ball_lies_beyond_its_bar(seed: int) -> None:
 
 
 def test_random_balls_have_every_wall_and_every_law() -> None:
-    """They roll, are resisted, slip from the start or later, fall, bounce and stay where they land."""
+    """Random balls roll, are resisted, slip from the start or later, fall, bounce and stay where they land."""
     styles = {random_ball(seed)[0] for seed in range(25)}
     assert len(styles) == len(WALLS) * len(STYLES_OF_BALLS)
 

@@ -40,7 +40,7 @@ def run_apart(engine: Any, key: str, name: str) -> None:
 
 
 def _outcome(engine: Any, name: str) -> tuple[str, str]:
-    """How a check came out, with its text, in the process that runs it."""
+    """Outcome of a check with its text, in the process that runs it."""
     from proofroll.conformance.checks import runs, told
 
     run: Callable[[], None] = dict(runs(engine))[name]

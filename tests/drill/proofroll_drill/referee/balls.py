@@ -26,7 +26,7 @@ _Z = long([0, 0, 1])
 
 @dataclass
 class Told:
-    """What happens.
+    """Motion and events of a ball.
 
     Attributes:
         seen: p_WB, v_WB, w_WB, q_WB, force [SI] and the distance from the wall at each time that was reached.
@@ -69,7 +69,7 @@ class BallReferee:
         return np.concatenate([p - long(start.gap) * e1, v, w, long([1, 0, 0, 0])])
 
     def run(self, times: Any) -> Told:
-        """What happens until the last of growing times, s; the first is 0."""
+        """Motion and events until the last of growing times, s; the first is 0."""
         told, y, t, contact = Told(), self.start(), long(0), self.element.contact
         slipping = contact.mu_static < np.inf and self.element.start.tangential_spin is not None
         flying = bool(self.element.start.gap)
@@ -128,7 +128,7 @@ class BallReferee:
         return y, t, ""
 
     def _ends(self, rate: Callable[[Long], Long], y: Long, length: Any, which: int) -> tuple[Long, Any]:
-        """Where a margin is used up within a step: by halving, then by secants."""
+        """Root of a margin within a step, with the state there: by halving, then by secants."""
         low, high = long(0), length
         values = [self._margins(state)[which] for state in (y, one_step(rate, y, length)[0])]
         for number in range(60):
@@ -175,7 +175,7 @@ class BallReferee:
         return u - (u @ e1) * e1
 
     def _left(self, y: Long) -> Any:
-        """How long the slip takes if it goes on as it does [s]."""
+        """Remaining time of the slip at its present rate [s]."""
         u, (_, e1, bend), rate = self._slip(y), self._wall(y[:3]), self._rate(y, True)[0]
         change = rate[3:6] + self.a * (np.cross(rate[6:9], e1) + np.cross(y[6:9], bend @ y[3:6]))
         size = np.sqrt(u @ u)
@@ -183,7 +183,7 @@ class BallReferee:
         return size / falls if falls > 0 else long(np.inf)
 
     def _margins(self, y: Long) -> tuple[Any, Any]:
-        """What is left of friction while the ball rolls, and the normal force, over the mass."""
+        """Reserve of friction while the ball rolls, and the normal force, over the mass."""
         n, friction, _, _ = self._forces(y, False)
         return np.inf if np.isinf(self.mu[0]) else self.mu[0] * n - np.sqrt(friction @ friction), n
 
