@@ -55,16 +55,19 @@ class BallOnSurface:
     sample_type: ClassVar[type[BallSample]] = BallSample
 
     def __post_init__(self) -> None:
-        """Refuses a slip that nothing could ever brake, and what is not known on a wall that moves.
+        """Refuses a start without a normal, a slip that nothing could brake, and what a wall that moves does not allow.
 
         Raises:
-            InputError: the ball starts slipping, and friction without bound would stop it at once; or the wall moves,
-                and the ball does not only roll.
+            InputError: the surface has no normal where the ball starts; or the ball starts slipping, and friction without
+                bound would stop it at once; or the wall moves, and the ball does not only roll.
         """
         for name, only in (("mu_static", math.inf), ("rolling_resistance", 0.0)):
             if any(self.surface.wall_rate) and getattr(self.contact, name) != only:
                 advice = f"on a wall that moves a ball only rolls; leave {name} out, or the wall's turning"
                 raise InputError(name, getattr(self.contact, name), advice)
+        if not np.all(np.isfinite([self.rolling.p0, self.rolling.v0, self.rolling.w0])):
+            advice = "the surface has no normal there, as at an apex; start elsewhere"
+            raise InputError("coordinates", list(self.start.coordinates), advice)
         if math.isinf(self.contact.mu_static) and np.any(self.rolling.slip0):
             advice = "a ball that starts slipping needs a number for mu_static, or leave its tangential_spin out"
             raise InputError("tangential_spin", self.start.tangential_spin, advice)

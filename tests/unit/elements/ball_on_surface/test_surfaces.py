@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces import Bowl, Cone, Cylinder, Generator, Plane, Revolved, Torus
+from proofroll.files.data_folders import data_folder
+from proofroll.files.scene_file import load_scene
 
 STEP = 1e-5  # [m or rad]; a central difference is then off by STEP² and by round-off/STEP, both below 1e-9
 CLOSE = 1e-8
@@ -246,3 +249,11 @@ def test_a_ball_that_does_not_fit_into_the_curve_is_refused() -> None:
     Paraboloid().offset(0.19).checked()
     with pytest.raises(InputError, match=r"must be smaller than wall's curve, 0\.2.* m"):
         Paraboloid().offset(0.21)
+
+
+def test_a_start_without_a_normal_is_refused(tmp_path: Path) -> None:
+    """Where a surface has no normal, as at the apex of a cone, a scene says so in a line; nothing there is a number."""
+    text = (data_folder("models") / "cone" / "scene.toml").read_text(encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(text.replace('coordinates = [0, "$start"]', "coordinates = [0, 0]"))
+    with pytest.raises(InputError, match="no normal there, as at an apex; start elsewhere"):
+        load_scene(str(tmp_path))

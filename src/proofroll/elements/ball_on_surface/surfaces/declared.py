@@ -235,7 +235,8 @@ def _distance_by_nearest(surface: Declared) -> tuple[Callable[..., Any], Callabl
 def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tuple[float, ...]:
     """Components of e1, e2, e3 from the two tangents; NaN where they have no direction."""
     x1, y1, z1 = y2 * z - z2 * y, z2 * x - x2 * z, x2 * y - y2 * x
-    across, along = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1) or math.nan, math.sqrt(x2 * x2 + y2 * y2 + z2 * z2)
+    across = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1) or math.nan
+    along = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
     x1, y1, z1, x2, y2, z2 = x1 / across, y1 / across, z1 / across, x2 / along, y2 / along, z2 / along
     return x1, y1, z1, x2, y2, z2, y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2
 
