@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
     from proofroll.core.scene import Scene
+    from proofroll.elements.mechanism.contacts.dynamics import ContactSolution
 
 # Least size of an observable over its natural one, as for balls: less is stillness to the eye.
 _LEAST = 1e-2
@@ -108,6 +109,16 @@ class MechanismElement:
     @cached_property
     def _solution(self) -> Solution:
         return self._equations.solve(*self.mechanism.start())
+
+    @cached_property
+    def _pressed(self) -> ContactSolution | None:
+        """Accelerations and forces of contact at the start; None: nothing may touch."""
+        if not self.mechanism.contacts:
+            return None
+        from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+
+        dynamics = ContactDynamics(self.mechanism)
+        return dynamics.solve(*self.mechanism.start(), dynamics.begin()[0])
 
     @cached_property
     def noise(self) -> float:
@@ -236,9 +247,9 @@ class MechanismElement:
     @property
     def first_motion(self) -> FirstMotion:
         """See the protocol."""
-        found = self._solution
-        motion = found.motion
-        acceleration = (motion.J @ found.acceleration + motion.bias)[:-1]
+        motion = self._solution.motion
+        rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
+        acceleration = (motion.J @ rates + motion.bias)[:-1]
         scale = max(float(np.max(np.abs(acceleration[:, :3]))), self._speed**2 / self.length)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
 
@@ -248,6 +259,12 @@ class MechanismElement:
         wrench: FloatArray = self._first["wrench"]
         return read_only(wrench)
 
+    @property
+    def first_press(self) -> FloatArray:
+        """Forces of contacts on their first bodies at the start [N], (contacts, 3); NaN where not determinate."""
+        found = self._pressed
+        return np.zeros((0, 3)) if found is None else np.where(found.determinate, found.force, np.nan)
+
     @cached_property
     def first_named(self) -> FloatArray:
         """The named forces at the start, see :mod:`proofroll.elements.mechanism.named_forces`."""
@@ -256,7 +273,13 @@ class MechanismElement:
 
     @cached_property
     def _first(self) -> dict[str, Any]:
-        return self._equations.sample(*self.mechanism.start())
+        start = self.mechanism.start()
+        if not self.mechanism.contacts:
+            return self._equations.sample(*start)
+        from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+
+        dynamics = ContactDynamics(self.mechanism)
+        return dynamics.sample(*start, dynamics.begin()[0])[0]
 
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""

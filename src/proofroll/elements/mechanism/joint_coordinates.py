@@ -270,14 +270,27 @@ class JointCoordinates:
                 q = self.tree.moved(q, -into @ (back @ residual))
         return np.concatenate([q, v])
 
-    def sample(self, q: Array, v: Array, mode: Mode | None = None, time: float = 0.0) -> dict[str, Any]:
-        """Fields of a :class:`~proofroll.elements.mechanism.record.Record` at one time."""
+    def sample(
+        self,
+        q: Array,
+        v: Array,
+        mode: Mode | None = None,
+        time: float = 0.0,
+        load: Array | None = None,
+        applied: Array | None = None,
+    ) -> dict[str, Any]:
+        """Fields of a :class:`~proofroll.elements.mechanism.record.Record` at one time.
+
+        ``load`` are further forces along the velocities, (nv), by what is ``applied`` to the bodies and the world:
+        forces and moments about the world's origin, (bodies + 1, 6).
+        """
         if mode is None and self.switched:
             mode = self.decided(q, v, time)[0]
-        found = self.solve(q, v, mode, time=time)
+        found = self.solve(q, v, mode, load, time)
         motion, rows, mechanism = found.motion, found.rows, self.mechanism
         n = len(mechanism.bodies)
-        wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, self._needed(found)))
+        needed = self._needed(found) - (0.0 if applied is None else applied)
+        wrench = np.concatenate(reactions(self.tree, motion, rows, found.multipliers, needed))
         largest = [np.abs(rows.residual).max(initial=0.0), np.abs(rows.C @ v).max(initial=0.0)]
         return {
             "p_WB": motion.p_WB[:n],

@@ -79,10 +79,15 @@ class NumericEquations:
             return []
         return sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist())
 
-    def solve(self, state: Array, time: float = 0.0) -> Solved:
-        """Accelerations and multipliers at a time [s], the smallest where rows depend on each other."""
+    def solve(self, state: Array, time: float = 0.0, applied: Array | None = None) -> Solved:
+        """Accelerations and multipliers at a time [s], the smallest where rows depend on each other.
+
+        ``applied``: further forces and moments about the centres of mass, world axes, (bodies, 6).
+        """
         found = self.equations.at(state.tolist(), switched=self._switched, time=time)
         C, (half, force) = self._matrix(found.rows), self._driven(found)
+        if applied is not None:
+            force = force + self.equations.projected(found.views, applied)
         free = half.T @ force
         residual = np.array([row.residual for row in found.rows], dtype=float)
         if self._switched is not None and self._switched.held:
@@ -96,6 +101,12 @@ class NumericEquations:
         normal = -back @ np.array([row.bias for row in found.rows], dtype=float) - locked @ free
         into = half @ locked.T
         return Solved(found, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
+
+    def loaded(self, state: Array) -> tuple[ConstrainedEquations, Array, Array, Array, Array]:
+        """Equations at a state: their rows C and biases, H with M⁻¹ = H Hᵀ, and the forces."""
+        found = self.equations.at(state.tolist(), switched=self._switched)
+        bias = np.array([row.bias for row in found.rows], dtype=float)
+        return found, self._matrix(found.rows), bias, *self._driven(found)
 
     def _driven(self, found: ConstrainedEquations) -> tuple[Array, Array]:
         """H with M⁻¹ = H Hᵀ, and the forces, with the armature of joints in both."""
@@ -253,20 +264,32 @@ class MaximalCoordinates:
         """Poses of this route at time 0."""
         return self.recorded(np.zeros(1), self.lean.equations.start()[None])
 
-    def recorded(self, times: Array, states: Array, switched: Sequence[Switched] | None = None) -> Record:
-        """Record of the states, with the modes of switched joints; reactions come from the complete rows."""
+    def recorded(
+        self,
+        times: Array,
+        states: Array,
+        switched: Sequence[Switched] | None = None,
+        applied: Sequence[Array] | None = None,
+    ) -> Record:
+        """Record of the states, with the modes of switched joints; reactions come from the complete rows.
+
+        ``applied``: forces and moments about the centres of mass, world axes, (bodies, 6), besides the mechanism's own.
+        """
         modes = [None] * len(states) if switched is None else switched
-        each = zip(times, states, modes, strict=True)
-        found = gathered(times, [self._sample(float(t), self.lean.normalised(y), mode) for t, y, mode in each])
+        more = [None] * len(states) if applied is None else applied
+        each = zip(times, states, modes, more, strict=True)
+        found = gathered(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in each])
         q, v = found.placed(self.mechanism).of_tree()
         return replace(found, q=q, v=v)
 
-    def _sample(self, time: float, state: Array, switched: Switched | None = None) -> dict[str, Any]:
+    def _sample(
+        self, time: float, state: Array, switched: Switched | None = None, applied: Array | None = None
+    ) -> dict[str, Any]:
         lean = self.lean.equations
         views = lean.at(state.tolist()).views
         whole = self._complete(views, state[lean.nx + lean.nu :])
         equations = self._whole if switched is None else self._whole.switched(whole, switched)
-        found = equations.solve(whole, time)
+        found = equations.solve(whole, time, applied)
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
         n = len(self.mechanism.bodies)
         arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]

@@ -214,6 +214,13 @@ class MaximalEquations:
         ]
         return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, efforts, drives, holders)
 
+    def projected(self, views: Sequence[BodyInScalars], applied: Array) -> Array:
+        """Forces and moments about the centres of mass, world axes, (bodies, 6), as forces along the velocities."""
+        bodies = zip(self.bodies, views, applied.tolist(), strict=False)
+        return np.array(
+            [entry for body, view, one in bodies for entry in body.projected(view, one[:3], one[3:])], float
+        )
+
     def rate_rows(self, state: Sequence[Scalar], joints: Sequence[int]) -> list[ConstraintRow]:
         """Rates of revolute and prismatic joints as rows; of a prismatic one the residual is the coordinate."""
         made = ConstraintRows(

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
-    "energy_change": "energy", "drift": "drift",
+    "energy_change": "energy", "drift": "drift", "gaps": "p_WB", "slips": "v_WB", "normal_forces": "pressed",
+    "contact_forces": "pressed",
 }  # fmt: skip
 _PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
@@ -46,11 +47,25 @@ class MechanismTruth:
         found = truth_of(element.mechanism, times)
         record = found.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-        pressed = np.zeros((len(times), len(element.mechanism.contacts), 3))
+        pressed = np.zeros((len(times), 0, 3)) if found.pressed is None else found.pressed
         dataset = columns(element, record.placed(element.mechanism), wrench, pressed, record.named).dataset()
         points = [point.name for point in element.mechanism.points]
+        of_contacts = {
+            f"{kind}.{contact.name}{axis}": field
+            for contact in element.mechanism.contacts
+            for kind, axes, field in (
+                ("force", (".x", ".y", ".z"), "pressed"),
+                ("gap", ("",), "p_WB"),
+                ("slip", ("",), "v_WB"),
+            )
+            for axis in axes
+        }
         for name, variable in dataset.data_vars.items():
-            field = _BARS.get(str(name)) or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)
+            field = (
+                of_contacts.get(str(name))
+                or _BARS.get(str(name))
+                or next((v for k, v in _PREFIXES.items() if str(name).startswith(k)), None)
+            )
             if field is None and str(name).rpartition(".")[0] in points:
                 field = "points"
             size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))

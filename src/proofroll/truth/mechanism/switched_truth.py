@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.truth.hybrid import HybridPath, Stretch, follow, least_margin, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
+from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.two_routes import (
@@ -48,7 +49,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """
     times = np.asarray(times, dtype=float)
     if mechanism.contacts:
-        raise Refused("no route of the truth follows contact between bodies")
+        return contact_truth(mechanism, times)
     equations = JointCoordinates(mechanism)
     kinks = breaks(mechanism.signals)
     if not (equations.switches or kinks) or mechanism.unmodelled:

@@ -51,6 +51,8 @@ class TwoRouteMotion:
         checked_by: a closed form that knows a part of the motion, and its largest difference from the truth.
         events: what switched on the way.
         reason: why the question is ill-posed from the horizon on.
+        pressed: forces of contacts on their first bodies [N], (times, contacts, 3), NaN where they are not determinate;
+            None: there are no contacts.
     """
 
     record: Record
@@ -63,6 +65,7 @@ class TwoRouteMotion:
     checked_by: tuple[str, float] | None
     events: Sequence[Event] = ()
     reason: str = f"a start moved by {NUDGE:.1g} leads elsewhere: the motion is chaotic"
+    pressed: Array | None = None
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:

@@ -1,0 +1,98 @@
+"""What a contact does between two changes."""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.rotations import Array
+
+Direction = tuple[float, float, float]
+# m/s: a slip in two dimensions that is slower has no direction that is known well; the rest of it is a straight line.
+FAINT = 1e-8
+_LINE = 1e-9  # part of what a force across does of what one along does: the contact can slide along a line only
+_TURNED = 0.5  # cosine by which the line of a slip may turn
+
+
+class Acting(NamedTuple):
+    """What one contact does.
+
+    Attributes:
+        kind: ``open``, ``slip`` or ``stick``.
+        along: direction of the line along which alone it can slide, where there is one; of a slip, its own.
+        heading: direction in which a slip begins, where it begins from rest.
+    """
+
+    kind: Literal["open", "slip", "stick"]
+    along: Direction | None = None
+    heading: Direction | None = None
+
+
+ContactMode = tuple[Acting, ...]
+OPEN = Acting("open")
+
+
+def kinds(mode: ContactMode) -> tuple[str, ...]:
+    """What each contact does, without directions."""
+    return tuple(own.kind for own in mode)
+
+
+def across(found: Touching) -> Array:
+    """Slip of a contact, along its surfaces [m/s]."""
+    return np.asarray(found.slide - found.normal * (found.normal @ found.slide))
+
+
+def heading_of(own: Acting, found: Touching) -> Array:
+    """Direction of a slip; friction is against it.
+
+    Raises:
+        Refused: the line of a slip has turned too far to be known.
+    """
+    slip = across(found)
+    speed = float(np.linalg.norm(slip))
+    if own.along is None and speed > FAINT / 2:
+        return np.asarray(slip / speed)
+    given = np.array(own.heading if own.along is None else own.along)
+    given = given - found.normal * (found.normal @ given)
+    length = float(np.linalg.norm(given))
+    if length < _TURNED:
+        raise Refused("the line along which a contact slides turns by more than half a right angle while it slides")
+    return np.asarray(given / length)
+
+
+def held_directions(own: Acting, found: Touching) -> Array:
+    """Directions that a contact which sticks holds, (3, 3); the normal and its line where it can slide along one."""
+    if own.along is None:
+        return np.eye(3)
+    line = np.array(own.along) - found.normal * (found.normal @ np.array(own.along))
+    return np.array([found.normal, line / np.linalg.norm(line)])
+
+
+def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array, G: Array) -> Acting:
+    """What a contact begins to do.
+
+    Args:
+        kind: see :class:`Acting`.
+        frame: its normal and two directions along the surface, as columns.
+        heading: of its slip, along these two; of any size.
+        G: what forces along the columns do to accelerations along them, (3, 3); it tells whether there is a line.
+    """
+    if kind == "open":
+        return OPEN
+    values, vectors = np.linalg.eigh(G[1:, 1:])
+    line = vectors[:, 1] if values[0] <= _LINE * values[1] else None
+    if line is not None and line @ heading < 0:
+        line = -line
+    along = None if line is None else _direction(frame[:, 1:] @ line)
+    if kind == "stick":
+        return Acting("stick", along)
+    size = float(np.linalg.norm(heading)) or 1.0
+    return Acting("slip", along, _direction(frame[:, 1:] @ (heading / size)))
+
+
+def _direction(vector: Array) -> Direction:
+    x, y, z = vector.tolist()
+    return x, y, z

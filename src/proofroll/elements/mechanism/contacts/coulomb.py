@@ -1,0 +1,111 @@
+"""Coulomb's law at several contacts at once: forces f with w = G f + c, by Gauss-Seidel over the contacts.
+
+Of each contact the components are normal and two along the surface. N ≥ 0, w_n ≥ 0 and N w_n = 0; the friction is at
+most μN, and μN against w_t where w_t is not zero. In accelerations c are those without the forces; in an impact they
+are speeds, with what the law of impact returns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.rotations import Array
+
+Outcome = Literal["open", "stick", "slip"]
+_SWEEPS = 1000
+_SETTLED = 1e-12  # of the largest force: a sweep that changes less is the last
+_RESTS = 1e-10  # of the loads: a contact that moves less does not move
+# Part of the loads and of friction by which an outcome is tried on both sides; if it changes, it hangs on nothing.
+_NUDGE = 1e-6
+# Between two of them the direction of slip is looked for; those of the axes lie in between.
+_DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
+PAINLEVE = (
+    "its normal force would not press but tear: friction at {name} makes what follows not unique or not possible "
+    "(Painlevé)"
+)
+
+
+def solved(
+    G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], names: Sequence[str]
+) -> tuple[Array, list[Outcome]]:
+    """The forces of all contacts, shape (contacts, 3), and what each contact does.
+
+    Args:
+        G: (3 contacts, 3 contacts).
+        c: (3 contacts).
+        friction: coefficient of each.
+        sliding: unit vector along the surface, shape (2,), of a contact that slides already; friction is against it.
+        names: for messages.
+
+    Raises:
+        Refused: a contact's force has no unique answer, or no answer is found.
+    """
+    f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
+    for _ in range(_SWEEPS):
+        before = f.copy()
+        for k, mu in enumerate(friction):
+            own = slice(3 * k, 3 * k + 3)
+            free = c[own] + G[own] @ f - G[own, own] @ f[own]
+            f[own], done[k] = _one(G[own, own], free, mu, sliding[k], names[k])
+        if np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
+            w = (c + G @ f).reshape(-1, 3)
+            least = _RESTS * float(np.abs(c).max())
+            for k, along in enumerate(sliding):
+                if done[k] == "slip" and along is None and friction[k] and np.linalg.norm(w[k, 1:]) <= least:
+                    done[k] = "stick"  # of several that hold together one may reach its bound, and nothing moves
+            return f.reshape(-1, 3), done
+    raise Refused(f"the forces of the contacts {', '.join(names)} are not found in {_SWEEPS} sweeps")
+
+
+def sure(
+    G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], names: Sequence[str]
+) -> tuple[Array, list[Outcome], bool]:
+    """As :func:`solved`, and whether a little more load or less friction would do the same."""
+    force, done = solved(G, c, friction, sliding, names)
+    nudge = _NUDGE * float(np.abs(c).max()) * np.tile([1.0, 0.0, 0.0], len(friction))
+    beside = (solved(G, c + side * nudge, friction * (1 - side * _NUDGE), sliding, names)[1] for side in (1.0, -1.0))
+    return force, done, all(other == done for other in beside)
+
+
+def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tuple[Array, Outcome]:
+    """Force of one contact while the others are as they are."""
+    if c[0] >= 0:
+        return np.zeros(3), "open"
+    if sliding is not None or not mu:
+        return _pressing(G, c, mu, np.zeros(2) if sliding is None else sliding, name), "slip"
+    from scipy.optimize import brentq  # half a second, which most uses of a mechanism do not need
+
+    held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
+    if np.linalg.norm(held[1:]) <= mu * held[0]:
+        return held, "stick"
+
+    def across(angle: float) -> float:
+        """How far the slip is from the direction that friction is against."""
+        t = np.array([np.cos(angle), np.sin(angle)])
+        w = c + G @ _pressing(G, c, mu, t, name)
+        return float(w[2] * t[0] - w[1] * t[1])
+
+    values = [across(angle) for angle in _DIRECTIONS]
+    pairs = zip(_DIRECTIONS[:-1], _DIRECTIONS[1:], values[:-1], values[1:], strict=True)
+    for low, high, at_low, at_high in pairs:
+        if at_low * at_high > 0:
+            continue
+        angle = low if at_low == 0 else brentq(across, low, high, xtol=1e-15, rtol=1e-15)
+        t = np.array([np.cos(angle), np.sin(angle)])
+        f = _pressing(G, c, mu, t, name)
+        if (c + G @ f)[1:] @ t > 0:
+            return f, "slip"
+    raise Refused(f"no direction of slip at {name} is against its friction")
+
+
+def _pressing(G: Array, c: Array, mu: float, t: Array, name: str) -> Array:
+    """Force of a contact that slides along t, which keeps the gap closed."""
+    along = np.array([1.0, *(-mu * t)])
+    response = float(G[0] @ along)
+    if response <= 0:
+        raise Refused(PAINLEVE.format(name=name))
+    return np.asarray(-c[0] / response * along)

@@ -1,0 +1,271 @@
+"""Equations of motion of a mechanism whose bodies touch, in the coordinates of its tree.
+
+Between two changes each contact is ``open``, it ``slip``s (one row, friction against the slip), or it ``stick``s
+(three rows). What comes next follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.analysis import RANK
+from proofroll.elements.mechanism.contacts.acting import OPEN, ContactMode, acting, heading_of, held_directions
+from proofroll.elements.mechanism.contacts.coulomb import sure
+from proofroll.elements.mechanism.contacts.start import TOUCHING, least_speed, touches
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
+from proofroll.elements.mechanism.kinematics import BodyMotion
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, skew
+from proofroll.elements.mechanism.signal import varies
+
+
+@dataclass(frozen=True)
+class ContactsNow:
+    """Everything about the contacts at one state, whatever they do.
+
+    Attributes:
+        solution: of the mechanism without forces of contact.
+        W: what a force along the velocities makes of the accelerations, (nv, nv).
+        touching: of each contact.
+        J: derivative of each slide by the velocities, (contacts, 3, nv).
+        bias: rate of each slide where v̇ = 0, (contacts, 3).
+    """
+
+    solution: Solution
+    W: Array
+    touching: tuple[Touching, ...]
+    J: Array
+    bias: Array
+
+
+@dataclass(frozen=True)
+class ContactSolution:
+    """Accelerations and forces in a mode.
+
+    Attributes:
+        state: what they are of.
+        acceleration: v̇, (nv).
+        force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
+        determinate: whether each component of these is, (contacts, 3).
+        slide_rate: rate of each slide [m/s²], (contacts, 3).
+        response: Painlevé's measure: what normal forces do with friction, over what they would do without; above 0.
+    """
+
+    state: ContactsNow
+    acceleration: Array
+    force: Array
+    determinate: Any
+    slide_rate: Array
+    response: float
+
+
+class ContactDynamics:
+    """A mechanism in the coordinates of its tree, with its contacts."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
+        if self.equations.switches:
+            raise Refused("dry friction or stops of joints beside contacts of bodies; no route follows both")
+        if mechanism.actuators or any(varies(signal) for signal in mechanism.signals):
+            raise Refused("drives that change in time beside contacts of bodies; no route follows both")
+        self.contacts = mechanism.contacts
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        index = mechanism.body_index
+        self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in self.contacts]
+
+    def at(self, q: Array, v: Array) -> ContactsNow:
+        """Kinematics and free accelerations for coordinates (nq) and velocities (nv)."""
+        found = self.equations.solve(q, v, ())
+        W: Array = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
+        if found.split is not None:
+            W = W - found.split[0] @ found.split[0].T
+        touching = touches(self.mechanism, found.motion)
+        parts = [self._row(found.motion, k, each) for k, each in enumerate(touching)]
+        J, bias = (np.array(part) for part in zip(*parts, strict=True))
+        return ContactsNow(found, W, touching, J, bias)
+
+    def _row(self, motion: BodyMotion, k: int, found: Touching) -> tuple[Array, Array]:
+        """Derivative of a contact's slide by the velocities, and its rate without accelerations."""
+        J, bias = np.zeros((3, motion.J.shape[2])), np.zeros(3)
+        for body, sign in zip(self._bodies[k], (1.0, -1.0), strict=True):
+            arm, w = found.place - motion.p_WB[body], motion.w_WB[body]
+            J += sign * (motion.J[body, :3] - skew(arm) @ motion.J[body, 3:])
+            turning = motion.bias[body, :3] + cross(motion.bias[body, 3:], arm)
+            # the place moves over the body, where the velocity is another one
+            bias += sign * (turning + cross(w, found.place_rate - motion.v_WB[body]))
+        return J, bias
+
+    def solve(self, q: Array, v: Array, mode: ContactMode) -> ContactSolution:
+        """Accelerations and forces while each contact does what the mode says.
+
+        Raises:
+            Refused: forces of contact are not determinate while something moves.
+        """
+        return self.solved(self.at(q, v), mode)
+
+    def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
+        """See :meth:`solve`."""
+        rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], [], list[int]()
+        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
+            n = found.normal
+            if own.kind == "slip":
+                rows.append(n[None] @ state.J[k])
+                bias.append(np.array([n @ state.bias[k] + found.normal_rate @ found.slide]))
+                along.append(n - self.friction[k] * heading_of(own, found) if self.friction[k] else n)
+                owner.append(k)
+            elif own.kind == "stick":
+                directions = held_directions(own, found)
+                rows.append(directions @ state.J[k])
+                bias.append(directions @ state.bias[k])
+                along += list(directions)
+                owner += [k] * len(directions)
+        K, free = np.concatenate(rows), state.solution.acceleration
+        if not owner:
+            return self._solution(state, free, np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool), 1.0)
+        D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
+        S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
+        smooth = K @ state.W @ K.T
+        values, vectors = np.linalg.eigh(smooth)
+        weak = values < RANK * values[-1]
+        z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
+        force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
+        for k, direction, size, loose in zip(owner, along, z, vectors[:, weak], strict=True):
+            force[k] += size * direction
+            known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
+        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
+            if own.kind == "stick" and own.along is not None:  # across its line joints hold it as well
+                known[k] &= np.abs(cross(found.normal, np.array(own.along))) <= RANK
+        response = 1.0 if weak.any() else float(np.linalg.det(S) / np.linalg.det(smooth))
+        return self._solution(state, free + state.W @ D.T @ z, force, known, response)
+
+    @staticmethod
+    def _solution(
+        state: ContactsNow, acceleration: Array, force: Array, known: Any, response: float
+    ) -> ContactSolution:
+        slide_rate = state.J @ acceleration + state.bias
+        return ContactSolution(state, acceleration, force, known, slide_rate, response)
+
+    def rate(self, y: Array, mode: ContactMode) -> Array:
+        """Right-hand side for the state (q, v)."""
+        q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
+        return np.concatenate([self.equations.tree.rate(q, v), self.solve(q, v, mode).acceleration])
+
+    def eliminated(self, y: Array, mode: ContactMode) -> Array:
+        """The state with violations of loops, closed contacts and unit quaternions removed."""
+        nq = self.mechanism.nq
+        y = self.equations.eliminated(y)
+        q, v = y[:nq], y[nq:]
+        closed = [k for k, own in enumerate(mode) if own.kind != "open"]
+        if not closed:
+            return y
+        state = self.at(q, v)
+        normals = np.array([state.touching[k].normal @ state.J[k] for k in closed])
+        gaps = np.array([state.touching[k].gap for k in closed])
+        q = self.equations.tree.moved(q, -_held(state.W, normals, gaps))
+        state = self.at(q, v)
+        return np.concatenate([q, v - self._brought(state, v, mode)])
+
+    def _brought(self, state: ContactsNow, v: Array, mode: ContactMode) -> Array:
+        """Velocities that closed contacts do not allow."""
+        rows = [np.zeros((0, len(v)))]
+        for k, own in enumerate(mode):
+            if own.kind == "stick":
+                rows.append(state.J[k])
+            elif own.kind == "slip":
+                rows.append(state.touching[k].normal[None] @ state.J[k])
+        K = np.concatenate(rows)
+        return _held(state.W, K, K @ v)
+
+    def begin(self) -> tuple[ContactMode, float]:
+        """Mode at the start, and how far it is from another one, relative."""
+        q, v = self.mechanism.start()
+        state = self.at(q, v)
+        least = least_speed(state.solution.motion, state.touching)
+        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= least for each in state.touching]
+        still = [bool(np.linalg.norm(each.slide) <= least) for each in state.touching]
+        return self.decided(q, v, closed, still)
+
+    def decided(self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
+        """Mode that follows from the forces, and how far it is from another one, relative.
+
+        Args:
+            q: coordinates.
+            v: velocities.
+            closed: whether a contact's gap is closed and does not open by its speed.
+            still: whether it does not slide either.
+        """
+        state = self.at(q, v)
+        which = [k for k, shut in enumerate(closed) if shut]
+        if not which:
+            return tuple(OPEN for _ in closed), np.inf
+        frames = {k: frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in which}
+        J = np.concatenate([frames[k].T @ state.J[k] for k in which])
+        c = J @ state.solution.acceleration + np.concatenate([frames[k].T @ state.bias[k] for k in which])
+        sliding: list[Array | None] = []
+        for place, k in enumerate(which):
+            found = state.touching[k]
+            c[3 * place] += found.normal_rate @ found.slide
+            across = frames[k][:, 1:].T @ found.slide
+            sliding.append(None if still[k] else across / np.linalg.norm(across))
+        G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
+        force, done, same = sure(G, c, self.friction[which], sliding, names)
+        mode = [OPEN for _ in closed]
+        for place, k in enumerate(which):
+            own = slice(3 * place, 3 * place + 3)
+            slides = sliding[place]
+            mode[k] = acting(done[place], frames[k], -force[place, 1:] if slides is None else slides, G[own, own])
+        return tuple(mode), np.inf if same else 0.0
+
+    def struck(self, q: Array, v: Array, closed: Sequence[int], restitution: Array) -> tuple[Array, Array, float]:
+        """Velocities after an impact, by Newton's law and Coulomb's, with the slip after it.
+
+        Args:
+            q: coordinates.
+            v: velocities before it.
+            closed: contacts whose gaps are closed.
+            restitution: of each of them.
+
+        Returns:
+            The velocities, the impulses (closed, 3), and how far from another outcome it is, relative.
+
+        Raises:
+            Refused: several contacts press each other, so that the outcome hangs on an order.
+        """
+        state = self.at(q, v)
+        frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
+        J = np.concatenate([frame.T @ state.J[k] for frame, k in zip(frames, closed, strict=True)])
+        c = J @ v
+        c[::3] += restitution * np.minimum(c[::3], 0.0)
+        G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
+        impulse, _, same = sure(G, c, self.friction[list(closed)], [None] * len(closed), names)
+        pressed = [k for k in range(len(closed)) if impulse[k, 0] > 0]
+        for a in pressed:
+            for b in pressed:
+                if a < b and np.abs(G[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]).max() > RANK * np.abs(G).max():
+                    raise Refused(
+                        f"an impact presses {names[a]} and {names[b]} at once: its outcome hangs on their order"
+                    )
+        return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
+
+    def sample(self, q: Array, v: Array, mode: ContactMode) -> tuple[dict[str, Any], Array]:
+        """What a record holds at one time, and the forces of contact, (contacts, 3), NaN where not determinate."""
+        found = self.solve(q, v, mode)
+        load = np.einsum("kin,ki->n", found.state.J, found.force)
+        applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
+        for (a, b), each, force in zip(self._bodies, found.state.touching, found.force, strict=True):
+            wrench = np.concatenate([force, cross(each.place, force)])
+            applied[a] += wrench
+            applied[b] -= wrench
+        record = self.equations.sample(q, v, (), load=load, applied=applied)
+        return record, np.where(found.determinate, found.force, np.nan)
+
+
+def _held(W: Array, K: Array, violation: Array) -> Array:
+    """Smallest motion, measured by inertia, that makes these violations of rows K."""
+    return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))

@@ -1,0 +1,378 @@
+"""Route 2 of a mechanism whose bodies touch: each body alone, modes by trial of all that contacts may do."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contacts.acting import (
+    FAINT,
+    OPEN,
+    Acting,
+    ContactMode,
+    Direction,
+    across,
+    acting,
+)
+from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
+from proofroll.elements.mechanism.record import integrated
+from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
+from proofroll.truth.hybrid import Stretch, Transition, walked
+from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
+from proofroll.truth.mechanism.contact_guards import (
+    STOPPED,
+    events,
+    faint_time,
+    guard_value,
+    guards_of,
+    noise_of,
+    striking,
+)
+from proofroll.truth.mechanism.joint_switching import SETTLED
+from proofroll.truth.mechanism.maximal_coordinates import RANK
+
+_MOST = 6  # contacts that are closed at once: each has up to four candidates
+_SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
+_AT_REST, _STANDS = 1e-13, 1e-9  # m/s and m/s², with angles: nothing moves, and nothing will
+_SIDES = 180  # of the pyramid inside a cone of friction, by which balance at rest is tried
+Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
+
+
+class ContactBodies:
+    """The stretches of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+
+    def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
+        self.equations, self.contacts, self._size = equations, equations.contacts, size
+        self._tolerance = np.full(len(equations.equations.equations.start()), tolerance)
+        self._fastest: dict[int, float] = {}
+        self._span: float | None = None
+
+    def begin(self) -> Transition[ContactMode]:
+        """See the protocol."""
+        state = self.equations.equations.equations.start()
+        found = self.equations.at(state)
+        speed = STILL * max([1.0, *(float(np.linalg.norm(each.slide)) for each in found.touching)])
+        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= speed for each in found.touching]
+        still = [
+            shut and bool(np.linalg.norm(each.slide) <= speed)
+            for shut, each in zip(closed, found.touching, strict=True)
+        ]
+        state = self.equations.eliminated(state, _held(closed, still))
+        mode, margin = self._decided(state, closed, still)
+        return Transition(state, mode, (), margin)
+
+    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """See the protocol."""
+        if self._stands(state, mode):
+            return Stretch(time, until, mode, state, state, None)
+        start, begun = self._kicked(time, state, mode)
+        guards = guards_of(self.contacts, mode)
+        end, last, guard = walked(
+            lambda _, y: self.equations.rate(y, mode),
+            begun,
+            start,
+            until,
+            tolerance=self._tolerance,
+            guards=lambda y: self._guards(y, mode),
+            corrected=lambda y: self.equations.eliminated(y, mode),
+            first_step=self._span,
+            noise=noise_of(guards, self._size),
+        )
+        if guard is not None and guards[guard].kind == "still":
+            k = guards[guard].contact
+            at = self.equations.at(last)
+            rest = faint_time(mode[k], at.touching[k], self.equations.accelerated(at, mode).slide[k])
+            last, end = last + rest * self.equations.rate(last, mode), end + rest
+        self._span = end - time if end > time else None
+        return Stretch(time, end, mode, state, last, guard)
+
+    def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
+        """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
+        at = self.equations.at(state)
+        slide = self.equations.accelerated(at, mode).slide
+        wait = 0.0
+        for k, own in enumerate(mode):
+            begins = own.kind == "slip" and own.along is None and self.equations.friction[k]
+            if begins and np.linalg.norm(across(at.touching[k])) < FAINT:
+                wait = max(wait, 2 * FAINT / float(np.linalg.norm(slide[k])))
+        return (state, time) if not wait else (state + wait * self.equations.rate(state, mode), time + wait)
+
+    def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
+        """See the protocol."""
+        if self._stands(leg.first, leg.mode):
+            return np.array([leg.first for _ in times])
+        start, begun = self._kicked(leg.start, leg.first, leg.mode)
+        spans, tolerance = np.maximum(times - begun, 0.0), float(self._tolerance[0])
+        rate, corrected = self.equations.rate, self.equations.eliminated
+        states = integrated(lambda _, y: rate(y, leg.mode), start, spans, tolerance, lambda y: corrected(y, leg.mode))
+        return np.array(list(states))
+
+    def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
+        """See the protocol."""
+        assert leg.guard is not None  # nothing changes at the end of time
+        k, kind = guards_of(self.contacts, leg.mode)[leg.guard]
+        mode, name = list(leg.mode), self.contacts[k].name
+        if kind == "tear":
+            raise Refused(f"friction leaves no unique motion from t = {leg.end:.6g} s on (Painlevé)")
+        if kind == "lift":
+            mode[k] = OPEN
+            return Transition(leg.last, tuple(mode), (("lift_off", name),))
+        if kind == "break":
+            line = leg.mode[k].along
+            if line is None:
+                raise Refused(f"{name} begins to slip where it could go in any direction of its surface")
+            pulls = self.equations.accelerated(self.equations.at(leg.last), leg.mode).force[k]
+            x, y, z = (float(component) * (-1.0 if np.dot(line, pulls) > 0 else 1.0) for component in line)
+            mode[k] = Acting("slip", (x, y, z), (x, y, z))
+            return Transition(leg.last, tuple(mode), (("slip", name),))
+        if kind == "still":
+            return self._after(leg, leg.last, [own.kind != "open" for own in mode], ())
+        return self._impact(leg, k)
+
+    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
+        """What an impact makes of the motion."""
+        state, law = leg.last, self.contacts[hit].restitution
+        found = self.equations.at(state)
+        speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
+        fastest = self._fastest.setdefault(hit, speed)
+        hits = striking(leg.mode, found.touching, hit)
+        closed = [own.kind != "open" or k in hits for k, own in enumerate(leg.mode)]
+        laws = [self.contacts[k].restitution if k in hits else 0.0 for k in range(len(closed))]
+        delay = 0.0
+        after, solution, margin = self._struck(state, found, closed, laws)
+        if law and speed < SETTLED * fastest:
+            free = self.equations.at(after)
+            pull = -float(free.touching[hit].normal @ self.equations.accelerated(free, leg.mode).slide[hit])
+            delay = 2 * speed * law / (pull * (1 - law))
+            after, solution, margin = self._struck(state, found, closed, [0.0] * len(closed))
+        stays = []
+        for k, (shut, each) in enumerate(zip(closed, found.touching, strict=True)):
+            parts = float(each.normal @ solution.slide[k]) > STOPPED
+            stays.append(shut and not parts)
+        first = ("settle" if delay else "impact", self.contacts[hit].name)
+        return self._after(leg, after, stays, (first,), margin, delay)
+
+    def _after(
+        self,
+        leg: Stretch[ContactMode],
+        state: Array,
+        closed: Sequence[bool],
+        happened: tuple[tuple[str, str], ...],
+        margin: float = np.inf,
+        delay: float = 0.0,
+    ) -> Transition[ContactMode]:
+        """The mode that follows from the forces, with what stopped taken to stand."""
+        found = self.equations.at(state).touching
+        still = [
+            shut and float(np.linalg.norm(across(each))) <= STOPPED for shut, each in zip(closed, found, strict=True)
+        ]
+        state = self.equations.eliminated(state, _held(closed, still))
+        mode, sure = self._decided(state, closed, still)
+        struck = {name for _, name in happened}
+        changed = events(self.contacts, leg.mode, mode, self._stands(state, mode))
+        said = (*happened, *(item for item in changed if item[1] not in struck))
+        return Transition(state, mode, said, np.inf if delay else min(margin, sure), delay)
+
+    def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
+        """The candidate that keeps all its inequalities, and how far it is from breaking one, relative."""
+        found = self.equations.at(state)
+
+        def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
+            given = [
+                own if heading is None or own.along is not None else Acting("slip", None, _direction(heading))
+                for own, heading in zip(mode, headings, strict=True)
+            ]
+            return self.equations.accelerated(found, tuple(given))
+
+        if all(still) and self._balanced(found):
+            own = self._own(found, closed)
+            return tuple(Acting("stick", each.along) for each in own), np.inf
+        return self._tried(found, closed, still, trial)[1:]
+
+    def _balanced(self, found: BodiesState) -> bool:
+        """Whether forces within the cones of friction hold everything where it is, when nothing moves."""
+        from scipy.optimize import nnls
+
+        if np.abs(found.u).max() > _AT_REST:
+            return False
+        angles = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False)
+        columns = [found.C.T, -found.C.T]
+        for each, J, mu in zip(found.touching, found.J, self.equations.friction, strict=True):
+            frame = frame_of_axis(each.normal)
+            sides = np.outer(np.cos(angles), frame[:, 0]) + np.outer(np.sin(angles), frame[:, 1])
+            columns.append(J.T @ (each.normal + mu * sides).T)
+        matrix = np.concatenate(columns, axis=1)
+        size = float(np.linalg.norm(found.force))
+        return bool(nnls(matrix, -found.force, maxiter=100 * matrix.shape[1])[1] <= _SLACK * size)
+
+    def _struck(
+        self, state: Array, found: BodiesState, closed: Sequence[bool], laws: Sequence[float]
+    ) -> tuple[Array, BodiesSolution, float]:
+        """The state after an impact, by the restitution of each contact; those that are closed press, slide or open."""
+        speeds = [float(each.normal @ each.slide) for each in found.touching]
+        after = np.array([-law * min(speed, 0.0) for law, speed in zip(laws, speeds, strict=True)])
+
+        def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
+            return self.equations.struck(found, mode, headings, after.tolist())
+
+        solution, _, kept = self._tried(found, closed, [True] * len(closed), trial)
+        e = self.equations.equations.equations
+        state = state.copy()
+        state[e.nx : e.nx + e.nu] = solution.moved
+        return state, solution, kept
+
+    def _own(self, found: BodiesState, closed: Sequence[bool]) -> list[Acting]:
+        """Of each contact that is closed: whether it can slide along a line only."""
+        made = []
+        root = np.linalg.cholesky(found.mass)
+        joints = np.linalg.solve(root, found.C.T)
+        for each, J, shut in zip(found.touching, found.J, closed, strict=True):
+            frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
+            ways = np.linalg.solve(root, J.T @ frame)
+            if joints.size:
+                ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
+            made.append(acting("stick", frame, np.zeros(2), ways.T @ ways) if shut else OPEN)
+        return made
+
+    def _tried(
+        self,
+        found: BodiesState,
+        closed: Sequence[bool],
+        still: Sequence[bool],
+        trial: Trial,
+    ) -> tuple[BodiesSolution, ContactMode, float]:
+        """The best candidate: its solution, its mode, and how far it is from breaking an inequality, relative.
+
+        Raises:
+            Refused: none keeps them all, or there are too many.
+        """
+        count = sum(closed)
+        if count > _MOST:
+            raise Refused(f"{count} contacts are closed at once; at most {_MOST} are tried")
+        choices = [list(self._candidates(k, own, still[k], found)) for k, own in enumerate(self._own(found, closed))]
+        best: tuple[float, int, BodiesSolution | None, ContactMode] = (-np.inf, 0, None, ())
+        for number, mode in enumerate(itertools.product(*choices)):
+            made = self._headed(found, mode, trial)
+            if made is None or made[0].loose:
+                continue
+            solution, headed = made
+            kept = min(
+                (self._kept(k, headed[k], still[k], found, solution) for k in range(len(mode)) if closed[k]),
+                default=np.inf,
+            )
+            best = max(best, (kept, number, solution, headed), key=lambda one: one[:2])
+        if best[2] is None or best[0] < -_SLACK:
+            raise Refused("nothing that the contacts can do keeps all inequalities of contact")
+        return best[2], best[3], max(best[0], 0.0)
+
+    def _candidates(self, k: int, own: Acting, still: bool, found: BodiesState) -> Iterator[Acting]:
+        """All that a contact may do."""
+        yield OPEN
+        if own.kind == "open":
+            return
+        mu = self.equations.friction[k]
+        if not still or not mu:
+            u = across(found.touching[k])
+            x, y, z = (u / (float(np.linalg.norm(u)) or 1.0)).tolist()
+            yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
+            return
+        yield Acting("stick", own.along)
+        if own.along is None:
+            yield Acting("slip")
+        else:
+            x, y, z = own.along
+            yield Acting("slip", (x, y, z), (x, y, z))
+            yield Acting("slip", (-x, -y, -z), (-x, -y, -z))
+
+    def _headed(self, found: BodiesState, mode: ContactMode, trial: Trial) -> tuple[BodiesSolution, ContactMode] | None:
+        """A candidate with directions of slip along which it slips; None: there are none."""
+        from scipy.optimize import root
+
+        frames = [frame_of_axis(each.normal) for each in found.touching]
+        unknown = [k for k, own in enumerate(mode) if own.kind == "slip" and own.heading is None]
+
+        def directions(angles: Array) -> list[Array]:
+            return [
+                np.cos(angle) * frames[k][:, 0] + np.sin(angle) * frames[k][:, 1]
+                for k, angle in zip(unknown, angles, strict=True)
+            ]
+
+        def tried(angles: Array) -> BodiesSolution:
+            known = dict(zip(unknown, directions(angles), strict=True))
+            headings = [
+                known.get(k, None if own.heading is None or not mu else np.array(own.heading))
+                for k, (own, mu) in enumerate(zip(mode, self.equations.friction, strict=True))
+            ]
+            return trial(mode, headings)
+
+        def sideways(angles: Array) -> Array:
+            slides = tried(angles).slide
+            across_slide = zip(unknown, directions(angles), strict=True)
+            return np.array([float(cross(way, slides[k]) @ found.touching[k].normal) for k, way in across_slide])
+
+        still = np.zeros(len(unknown))
+        if not unknown:
+            return tried(still), mode
+        loose = tried(still).slide
+        start = np.array([float(np.arctan2(frames[k][:, 1] @ loose[k], frames[k][:, 0] @ loose[k])) for k in unknown])
+        for turn in (0.0, 1.0, -1.0, 2.0, -2.0):
+            answer = root(sideways, start + turn, tol=1e-15)
+            solution, ways = tried(answer.x), dict(zip(unknown, directions(answer.x), strict=True))
+            size = float(np.abs(solution.slide).max()) or 1.0
+            ahead = all(float(way @ solution.slide[k]) > 0 for k, way in ways.items())
+            if np.abs(answer.fun).max() <= _SLACK * size and ahead:
+                headed = (Acting("slip", None, _direction(ways[k])) if k in ways else own for k, own in enumerate(mode))
+                return solution, tuple(headed)
+        return None
+
+    def _kept(self, k: int, own: Acting, still: bool, found: BodiesState, solution: BodiesSolution) -> float:
+        """How far a contact's inequalities are from being broken, relative; negative: one is."""
+        each, mu = found.touching[k], float(self.equations.friction[k])
+        size_f, size_s = float(np.abs(solution.force).max()), float(np.abs(solution.slide).max()) or 1.0
+        if own.kind == "open":
+            return float(solution.parting[k]) / size_s
+        normal = float(each.normal @ solution.force[k])
+        if not size_f:
+            return np.inf
+        if own.kind == "stick":
+            held = float(np.linalg.norm(solution.force[k] - normal * each.normal))
+            return min(normal, mu * normal - held) / size_f
+        if not still or not mu:
+            return normal / size_f
+        assert own.heading is not None  # it is found by now
+        return min(normal / size_f, float(np.dot(own.heading, solution.slide[k])) / size_s)
+
+    def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
+        """Forces of contact, (contacts, 3), and what they do to the bodies about their centres of mass, (bodies, 6)."""
+        found = self.equations.at(self.equations.equations.normalised(state))
+        return self.equations.applied(found, self.equations.accelerated(found, mode).force)
+
+    def _stands(self, state: Array, mode: ContactMode) -> bool:
+        """Whether nothing moves, and nothing will."""
+        found = self.equations.at(state)
+        if np.abs(found.u).max() > _AT_REST or any(own.kind == "slip" for own in mode):
+            return False
+        return float(np.abs(self.equations.accelerated(found, mode).moved).max()) <= _STANDS
+
+    def _guards(self, state: Array, mode: ContactMode) -> FloatArray:
+        found = self.equations.at(self.equations.equations.normalised(state))
+        made = self.equations.accelerated(found, mode)
+        friction, touching = self.equations.friction, found.touching
+        guards = guards_of(self.contacts, mode)
+        return np.array([guard_value(one, mode, friction, touching, made.force, made.response) for one in guards])
+
+
+def _held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+    """What closed contacts hold: three directions of those that stand, one of others."""
+    return tuple(
+        Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
+    )
+
+
+def _direction(vector: Array) -> Direction:
+    x, y, z = (float(component) for component in vector)
+    return x, y, z

@@ -1,0 +1,228 @@
+"""Equations of route 2 of bodies that touch: each body alone, one linear system of motion, joints and contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.elements.mechanism.contacts.acting import ContactMode, heading_of, held_directions
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
+
+_AXES = np.eye(3)
+
+
+@dataclass(frozen=True)
+class BodiesState:
+    """Bodies at one state: rows of joints and contacts, and what drives them.
+
+    Attributes:
+        touching: of each contact.
+        J: derivative of each slide by the velocities, (contacts, 3, nu).
+        bias: rate of each slide where u̇ = 0, (contacts, 3).
+        C, of_joints: independent rows of joints and loops, (rows, nu), and their biases.
+        mass, force: M u̇ = force + what holds.
+        u: velocities, (nu).
+        centres: of mass of the bodies, and the world's origin, (bodies + 1, 3).
+    """
+
+    touching: tuple[Touching, ...]
+    J: Array
+    bias: Array
+    C: Array
+    of_joints: Array
+    mass: Array
+    force: Array
+    u: Array
+    centres: Array
+
+
+@dataclass(frozen=True)
+class BodiesSolution:
+    """Accelerations u̇ and forces of contact in a mode; or velocities and impulses after an impact.
+
+    Attributes:
+        moved: u̇, or u after an impact.
+        force: on body a of each contact, (contacts, 3).
+        slide: rate of each slide, or each slide after an impact, (contacts, 3).
+        parting: second rate of each gap, or its rate beyond what the law of impact returns, (contacts).
+        response: Painlevé's measure, 1 without friction.
+        loose: whether the forces are not determinate.
+    """
+
+    moved: Array
+    force: Array
+    slide: Array
+    parting: Array
+    response: float
+    loose: bool
+
+
+class ContactEquations:
+    """The equations of a mechanism's bodies with its contacts."""
+
+    def __init__(self, mechanism: Mechanism, equations: NumericEquations) -> None:
+        self.mechanism, self.contacts, self.equations = mechanism, mechanism.contacts, equations
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        index = mechanism.body_index
+        self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in self.contacts]
+        self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
+
+    def at(self, state: Array) -> BodiesState:
+        """Everything at a state as :meth:`NumericEquations.rate` has it."""
+        e = self.equations.equations
+        found, C, bias, half, force = self.equations.loaded(state)
+        bodies = []
+        for view, com in zip(found.views, self._com, strict=True):
+            R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
+            arm = R @ com
+            bodies.append(Moving(np.array(view.r) - arm, R, v - cross(w, arm), w))
+        touching = tuple(touch(c, bodies[a], bodies[b]) for c, (a, b) in zip(self.contacts, self._pairs, strict=True))
+        J, rates = np.zeros((len(touching), 3, e.nu)), np.zeros((len(touching), 3))
+        for k, (pair, each) in enumerate(zip(self._pairs, touching, strict=True)):
+            for body, sign in zip(pair, (1.0, -1.0), strict=True):
+                if body < 0:
+                    continue
+                view = found.views[body]
+                arm = each.place - np.array(view.r)
+                for row, axis in zip(J[k], _AXES, strict=True):
+                    entries = e.bodies[body].projected(view, axis.tolist(), cross(arm, axis).tolist())
+                    row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
+                # ω × (ω × arm) of the material, and ω × its way under the place of contact
+                rates[k] += sign * cross(view.w, each.place_rate - np.array(view.v))
+        mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
+        C, bias = _independent(C, bias)
+        centres = np.array([view.r for view in found.views], dtype=float)
+        return BodiesState(touching, J, rates, C, bias, mass, force, state[e.nx : e.nx + e.nu], centres)
+
+    def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
+        """Accelerations and forces while each contact does what the mode says."""
+        wanted = [
+            -np.array([found.normal @ bias + found.normal_rate @ found.slide])
+            if own.kind == "slip"
+            else -held_directions(own, found) @ bias
+            for own, found, bias in zip(mode, state.touching, state.bias, strict=True)
+        ]
+        headings = [heading_of(own, found) if own.kind == "slip" and mu else None
+                    for own, found, mu in zip(mode, state.touching, self.friction, strict=True)]  # fmt: skip
+        turning = np.array([found.normal_rate @ found.slide for found in state.touching])
+        return self._solved(state, mode, headings, wanted, state.force, -state.of_joints, state.bias, turning)
+
+    def struck(
+        self, state: BodiesState, mode: ContactMode, headings: Sequence[Array | None], after: Sequence[float]
+    ) -> BodiesSolution:
+        """Velocities after an impact in which contacts do so; ``after``: normal speeds of those that do not open."""
+        wanted = [
+            np.array([speed]) if own.kind == "slip" else held_directions(own, found) @ found.normal * speed
+            for own, found, speed in zip(mode, state.touching, after, strict=True)
+        ]
+        still = np.zeros(len(state.of_joints))
+        bias = np.zeros((len(mode), 3))
+        return self._solved(state, mode, headings, wanted, state.mass @ state.u, still, bias, -np.array(after))
+
+    def _solved(
+        self,
+        state: BodiesState,
+        mode: ContactMode,
+        headings: Sequence[Array | None],
+        wanted: Sequence[Array],
+        right: Array,
+        of_joints: Array,
+        bias: Array,
+        beyond: Array,
+    ) -> BodiesSolution:
+        """The linear system M x − Cᵀλ − Dᵀz = right, C x = of_joints, K x = wanted."""
+        rows, along, aims, owner = [state.C], [state.C], [of_joints], list[tuple[int, Array]]()
+        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
+            if own.kind == "open":
+                continue
+            n, heading = found.normal, headings[k]
+            if own.kind == "stick":
+                directions = list(held_directions(own, found))
+                rows_k = np.array(directions) @ state.J[k]
+            else:
+                directions = [n if heading is None else n - self.friction[k] * heading]
+                rows_k = n[None] @ state.J[k]
+            rows.append(rows_k)
+            along.append(np.array(directions) @ state.J[k])
+            aims.append(wanted[k])
+            owner += [(k, direction) for direction in directions]
+        K, D = np.concatenate(rows), np.concatenate(along)
+        nu, count = len(state.u), len(K)
+        none = np.zeros((count, count))
+        system = np.block([[state.mass, -D.T], [K, none]])
+        answer = np.linalg.lstsq(system, np.concatenate([right, *aims]), rcond=1e-13)[0]
+        x, z = answer[:nu], answer[nu + len(state.C) :]
+        plain = np.block([[state.mass, -K.T], [K, none]])
+        loose = bool(np.linalg.matrix_rank(K, RANK) < count)
+        response = 1.0 if loose else float(np.linalg.det(system) / np.linalg.det(plain))
+        force = np.zeros((len(mode), 3))
+        for (k, direction), size in zip(owner, z, strict=True):
+            force[k] += size * direction
+        slide = state.J @ x + bias
+        parting = np.array([found.normal @ one for found, one in zip(state.touching, slide, strict=True)]) + beyond
+        return BodiesSolution(x, force, slide, parting, response, loose)
+
+    def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
+        """Forces of contact, and what they do to the bodies about their centres of mass, (bodies, 6)."""
+        wrenches = np.zeros((len(self.mechanism.bodies) + 1, 6))
+        for pair, each, push in zip(self._pairs, state.touching, force, strict=True):
+            for body, sign in zip(pair, (1.0, -1.0), strict=True):
+                wrenches[body] += sign * np.concatenate([push, cross(each.place - state.centres[body], push)])
+        return force, wrenches[:-1]
+
+    def rate(self, state: Array, mode: ContactMode) -> Array:
+        """Right-hand side."""
+        e, unit = self.equations.equations, self.equations.normalised(state)
+        found = self.accelerated(self.at(unit), mode)
+        x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
+        angles = self.equations.loaded(unit)[0].angle_rate if len(state) > e.nx + e.nu else []
+        return np.array([*self._moving(x, u), *found.moved, *angles], dtype=float)
+
+    def _moving(self, x: Array, u: Array) -> list[float]:
+        """Rates of the coordinates."""
+        e = self.equations.equations
+        bodies = zip(e.bodies, e.x_slices, e.u_slices, strict=True)
+        return [rate for body, at_x, at_u in bodies for rate in body.rate(x[at_x].tolist(), u[at_u].tolist())]
+
+    def eliminated(self, state: Array, mode: ContactMode) -> Array:
+        """The state with violations of rows, closed contacts and unit quaternions removed."""
+        e = self.equations.equations
+        state = self.equations.eliminated(state)
+        closed = [k for k, own in enumerate(mode) if own.kind != "open"]
+        if not closed:
+            return state
+        found = self.at(state)
+        normals = np.array([found.touching[k].normal @ found.J[k] for k in closed])
+        gaps = np.array([found.touching[k].gap for k in closed])
+        back = _least_motion(found, normals, gaps)
+        state[: e.nx] -= np.array(self._moving(state[: e.nx], back), dtype=float)
+        state = self.equations.normalised(state)
+        found = self.at(state)
+        sticking = [found.J[k] for k in closed if mode[k].kind == "stick"]
+        sliding = [found.touching[k].normal[None] @ found.J[k] for k in closed if mode[k].kind == "slip"]
+        K = np.concatenate([*sticking, *sliding])
+        state[e.nx : e.nx + e.nu] -= _least_motion(found, K, K @ found.u)
+        return state
+
+
+def _independent(C: Array, bias: Array) -> tuple[Array, Array]:
+    """Independent rows that say what all of them do."""
+    if not C.size:
+        return C, bias
+    U, values, Vt = np.linalg.svd(C, full_matrices=False)
+    rank = int((values > RANK * values[0]).sum())
+    return Vt[:rank], (U[:, :rank].T @ bias) / values[:rank]
+
+
+def _least_motion(found: BodiesState, K: Array, violation: Array) -> Array:
+    """Smallest motion, measured by inertia, that makes these violations of rows K, and none of joints."""
+    rows = np.concatenate([K, found.C])
+    root = np.linalg.cholesky(found.mass)
+    into = np.linalg.solve(root, rows.T)
+    aims = np.concatenate([violation, np.zeros(len(found.C))])
+    return np.asarray(np.linalg.solve(root.T, np.linalg.lstsq(into.T, aims, rcond=RANK)[0]))

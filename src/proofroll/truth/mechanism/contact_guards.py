@@ -1,0 +1,130 @@
+"""What ends a stretch of contacts, for both routes: values that are negative while what they do lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, across, heading_of
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.start import TOUCHING
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.rotations import Array
+
+STOPPED = 1e-11  # m/s: what is left of a slip that has come to rest, in a straight line from what is faint
+# Part of a normal force's answer without friction below which Painlevé's measure is taken to come to zero.
+_LEAST_RESPONSE = 1e-3
+_DIGITS = 1e-14  # m, times the size of the mechanism: round-off of a gap that has just opened
+
+
+class ContactGuard(NamedTuple):
+    """One way in which a stretch can end.
+
+    Attributes:
+        contact: its number; -1: of all.
+        kind: ``close``: a gap closes; ``lift``: a normal force comes to zero; ``still``: a slip does; ``break``: the
+            friction of a contact that sticks reaches its bound; ``tear``: Painlevé's measure comes to zero.
+    """
+
+    contact: int
+    kind: Literal["close", "lift", "still", "break", "tear"]
+
+
+def guards_of(contacts: Sequence[BodyContact], mode: ContactMode) -> list[ContactGuard]:
+    """The guards of a mode, in an order that both routes keep."""
+    found: list[ContactGuard] = []
+    for k, (contact, own) in enumerate(zip(contacts, mode, strict=True)):
+        if own.kind == "open":
+            found.append(ContactGuard(k, "close"))
+            continue
+        found.append(ContactGuard(k, "lift"))
+        if contact.friction:
+            found.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
+    if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
+        found.append(ContactGuard(-1, "tear"))
+    return found
+
+
+def guard_value(
+    guard: ContactGuard, mode: ContactMode, friction: Array, touching: Sequence[Touching], force: Array, response: float
+) -> float:
+    """The value of a guard; ``force`` on body a of each contact [N], ``response`` as in Painlevé's measure."""
+    if guard.kind == "tear":
+        return _LEAST_RESPONSE - response
+    own, found = mode[guard.contact], touching[guard.contact]
+    normal = float(found.normal @ force[guard.contact])
+    if guard.kind == "close":
+        return -float(found.gap)
+    if guard.kind == "lift":
+        return -normal
+    if guard.kind == "still":
+        return _stopping(own, found)
+    held = float(np.linalg.norm(force[guard.contact] - normal * found.normal))
+    return held - float(friction[guard.contact]) * normal
+
+
+def _stopping(own: Acting, found: Touching) -> float:
+    """Along a line the slip itself, less than nothing; in two dimensions how much it is above what is faint."""
+    if own.along is None:
+        return FAINT - float(np.linalg.norm(across(found)))
+    return -float(heading_of(own, found) @ found.slide)
+
+
+def striking(mode: ContactMode, touching: Sequence[Touching], hit: int) -> list[int]:
+    """Contacts that close at the same time as one does, with it."""
+    return [
+        k
+        for k, (own, found) in enumerate(zip(mode, touching, strict=True))
+        if k == hit or (own.kind == "open" and found.gap <= TOUCHING and float(found.normal @ found.slide) < 0)
+    ]
+
+
+def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:
+    """Round-off of the guards: a gap that has just opened is still at zero, a slip that has just begun too."""
+    return np.array([_DIGITS * size if guard.kind in {"close", "still"} else 0.0 for guard in guards])
+
+
+def faint_time(own: Acting, found: Touching, slide_rate: Array) -> float:
+    """Time after which a slip that is faint is over [s], in a straight line; along a line it is over."""
+    if own.along is not None:
+        return 0.0
+    u = across(found)
+    return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
+
+
+def refuse_turning_onset(contact: BodyContact, own: Acting) -> None:
+    """Refuses a slip that begins from rest in two dimensions, at the bound of friction.
+
+    Raises:
+        Refused: its direction is not known at first, and equations that find it are as stiff as it is slow.
+    """
+    if own.along is None:
+        raise Refused(
+            f"{contact.name} begins to slip where it could go in any direction of its surface; which it takes at first "
+            "hangs on less than the forces tell"
+        )
+
+
+def events(
+    contacts: Sequence[BodyContact], before: ContactMode, after: ContactMode, stands: bool
+) -> tuple[tuple[str, str], ...]:
+    """Events of a change of mode; ``stands``: nothing moves any more."""
+    found: list[tuple[str, str]] = []
+    for contact, was, now in zip(contacts, before, after, strict=True):
+        if now.kind == "stick" and was.kind != "stick":
+            found.append(("rest" if stands else "stick", contact.name))
+        elif was.kind == "stick" and now.kind == "slip":
+            found.append(("slip", contact.name))
+        elif was.kind != "open" and now.kind == "open":
+            found.append(("lift_off", contact.name))
+        elif was.kind == now.kind == "slip" and _opposite(was, now):
+            found.append(("turn", contact.name))
+    return tuple(found)
+
+
+def _opposite(was: Acting, now: Acting) -> bool:
+    return was.along is not None and now.along is not None and float(np.dot(was.along, now.along)) < 0

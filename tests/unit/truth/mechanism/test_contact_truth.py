@@ -1,0 +1,212 @@
+"""Truths of bodies that touch, against the numbers of a laboratory and against the ball's own truth.
+
+The laboratory integrated other equations, in other coordinates, and gave twelve digits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.core.events import events_of
+from proofroll.core.truth import truth
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.mechanism.two_routes import TwoRouteMotion
+
+DIGITS = 1e-10  # s, m: of the laboratory's numbers, which have twelve
+TIGHT = 1e-10  # of what two routes leave of a second or two, where 1e-12 is seen
+
+
+def mechanism_of(scene: str, **parameters: float) -> Mechanism:
+    """The mechanism of a scene."""
+    return load_scene(scene, **parameters).elements[0].mechanism  # type: ignore[attr-defined, no-any-return]
+
+
+def motion(scene: str, times: list[float], **parameters: float) -> TwoRouteMotion:
+    """The truth of a scene of one mechanism at these times, with narrow bars."""
+    found = truth_of(mechanism_of(scene, **parameters), np.array(times))
+    assert np.isinf(found.horizon)
+    assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
+    return found
+
+
+def happened(found: TwoRouteMotion) -> list[tuple[str, str]]:
+    """Kinds and names of the events."""
+    return [(event.kind, event.name) for event in found.events]
+
+
+def times_of(found: TwoRouteMotion, *expected: float) -> None:
+    """Checks the times of the events, each within its own narrow bracket."""
+    assert [event.time for event in found.events] == pytest.approx(list(expected), abs=DIGITS)
+    for event in found.events:
+        assert event.time_low <= event.time <= event.time_high <= event.time_low + TIGHT
+
+
+def test_a_sled_turns_about_a_foot_and_rests() -> None:
+    """The right foot stops and becomes the pivot, then all rest where the laboratory found it; loads are known."""
+    found = motion("sled", [0.0, 0.557674084, 0.65])
+    assert happened(found) == [("stick", "right"), ("rest", "left"), ("rest", "back")]
+    times_of(found, 0.557674084, 0.61801593376, 0.61801593376)
+    assert found.record.p_WB[1, 0, :2] == pytest.approx([0.454957557588, 0.050239714905], abs=1e-9)  # time: 9 digits
+    assert found.record.p_WB[2, 0, :2] == pytest.approx([0.458107051786, 0.04850394988], abs=DIGITS)
+    w, _, _, z = found.record.q_WB[2, 0]
+    assert 2 * np.arctan2(z, w) == pytest.approx(1.665066449554, abs=DIGITS)
+    assert found.pressed is not None
+    assert found.pressed[2, :, 2].sum() == pytest.approx(2 * 9.81, abs=DIGITS)
+    assert np.isnan(found.pressed[2, :, :2]).all()  # the split of friction over feet at rest is anybody's
+    assert not np.isnan(found.pressed[1]).any()
+    assert found.record.v_WB[2] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_sphere_with_its_mass_off_its_centre_slides_and_rolls() -> None:
+    """It rolls from the laboratory's time on, and is where that found it; so is the force."""
+    found = motion("eccentric_sphere", [0.0, 2.0])
+    assert happened(found) == [("stick", "contact")]
+    times_of(found, 0.507392746797)
+    com = np.array(mechanism_of("eccentric_sphere").bodies[0].com)
+    placed = found.record.placed(mechanism_of("eccentric_sphere")).point("sphere", com.tolist())
+    assert placed[1, :2] == pytest.approx([0.609266765872, -0.876992530196], abs=DIGITS)
+    assert found.pressed is not None
+    assert found.pressed[1, 0] == pytest.approx([-0.709884177522, 0.54154801339, 10.182040041162], abs=DIGITS)
+
+
+def test_a_falling_rod_sticks_slips_back_and_forward() -> None:
+    """Its foot sticks, slips against the fall, and turns, at the laboratory's times."""
+    found = motion("falling_rod", [0.0, 0.9])
+    assert happened(found) == [("slip", "contact"), ("turn", "contact")]
+    times_of(found, 0.572316015251, 0.798506009982)
+
+
+def test_a_ladder_leaves_its_wall() -> None:
+    """With friction it leaves at the laboratory's time."""
+    found = motion("ladder", [0.0, 1.0])
+    assert happened(found) == [("lift_off", "top")]
+    times_of(found, 0.916021339175)
+    assert found.pressed is not None
+    assert found.pressed[1, 1].tolist() == [0.0, 0.0, 0.0]
+
+
+def test_a_smooth_ladder_leaves_its_wall_at_two_thirds() -> None:
+    """Without friction the sine of its angle is then two thirds of that at the start."""
+    found = motion("ladder", [0.0, 0.499337468618], floor_friction=0.0, wall_friction=0.0)
+    times_of(found, 0.499337468618)
+    angle = np.pi / 2 + found.record.q[1, 2]
+    assert np.sin(angle) == pytest.approx(2 / 3 * np.sin(1.2), abs=1e-9)
+
+
+def test_a_block_rocks_with_housners_ratio() -> None:
+    """Each impact leaves 1 - 1.5 sin² of the block's angle of its speed, and the pivot lifts off."""
+    found = motion("rocking_block", [0.0, 0.209019729138, 0.20901972914, 0.6])
+    assert happened(found) == [("impact", "left"), ("lift_off", "right"), ("impact", "right"), ("lift_off", "left")]
+    times_of(found, 0.209019729139, 0.209019729139, 0.496197806038, 0.496197806038)
+    before, after = found.record.w_WB[1:3, 0, 1]
+    assert after / before == pytest.approx(0.793103448276, abs=1e-9)
+
+
+def test_a_spinning_ball_bounces() -> None:
+    """Two impacts slide and the third sticks: the closed form of a thrown ball."""
+    found = motion("spinning_bounce", [0.0, 1.5])
+    assert happened(found) == [("impact", "contact")] * 3
+    times_of(found, 0.319275428407, 0.830116113858, 1.238788662219)
+    assert found.record.p_WB[1, 0] == pytest.approx([0.509272146943, 0.126622625715, 0.134211784211], abs=DIGITS)
+    assert found.record.w_WB[1, 0] == pytest.approx([0, -2.857142857143, 15], abs=DIGITS)
+
+
+@pytest.mark.parametrize(
+    ("friction", "v1", "w1"),
+    [
+        (0.1, [0.953280499599, 0.652941904749, 0.335761070770], [3.826906440106, -16.309174821204, 25.276725182747]),
+        (0.5, [0.839862857143, 0.511113142857, 0.253103238095], [1.910857142857, -10.280838095238, 17.562057142857]),
+    ],
+)
+def test_two_spheres_hit(friction: float, v1: list[float], w1: list[float]) -> None:
+    """What sliding and sticking friction make of an impact off the centre."""
+    found = motion("two_spheres", [0.0, 0.15], friction=friction)
+    assert happened(found) == [("impact", "contact")]
+    times_of(found, 0.1)
+    assert found.record.v_WB[1, 0] == pytest.approx(v1, abs=DIGITS)
+    assert found.record.w_WB[1, 0] == pytest.approx(w1, abs=DIGITS)
+
+
+def as_bodies(name: str, friction: float, tilt: float, **parameters: float) -> tuple[Mechanism, float]:
+    """The ball of a scene as a free body, a sphere and a plane, and its height over the plane at the start [m]."""
+    ball = load_scene(name, tilt=tilt, **parameters).elements[0].rolling  # type: ignore[attr-defined]
+    radius, moment = float(ball.ball.radius), float(ball.ball.inertia)
+    normal = (float(np.sin(tilt)), 0.0, float(np.cos(tilt)))
+    gap = float(parameters.get("height", 0.0))
+    under = (np.array(ball.p0) - (radius + gap) * np.array(normal)).tolist()
+    body = Body("ball", float(ball.ball.mass), inertia=(moment, moment, moment))  # type: ignore[arg-type]
+    start = {"q0": (*ball.p0, 1.0, 0.0, 0.0, 0.0), "v0": (*ball.v0, *ball.w0)}
+    joint = Joint("free", "free", "world", "ball", **{key: tuple(map(float, value)) for key, value in start.items()})
+    shapes = (
+        Geometry("sphere", "ball", "sphere", radius=radius),
+        Geometry("floor", "world", "plane", under, normal=normal),
+    )  # type: ignore[arg-type]
+    pair = Pair("contact", ("sphere", "floor"), friction, parameters.get("restitution", 0.0))
+    return Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,)), gap
+
+
+@pytest.mark.parametrize(
+    ("name", "friction", "tilt", "until", "parameters"),
+    [
+        ("slide_to_roll", 0.2, 0.0, 1.0, {"cross_speed": 0.7, "back_spin": 30.0, "mu_static": 0.2}),
+        ("inclined_plane", 10.0, 0.35, 1.0, {}),
+        (
+            "bouncing_ball",
+            0.1,
+            0.2,
+            0.9,
+            {"height": 0.3, "speed": 0.5, "back_spin": 40.0, "restitution": 0.6, "mu_static": 0.1},
+        ),
+    ],
+)  # fmt: skip
+def test_a_ball_moves_as_its_own_truth_says(
+    name: str, friction: float, tilt: float, until: float, parameters: dict[str, float]
+) -> None:
+    """A ball on a plane, written as body, sphere and plane, has the motion and the events of the ball's own routes."""
+    mechanism, _ = as_bodies(name, friction, tilt, **parameters)
+    times = np.linspace(0, until, 4)
+    own = truth(load_scene(name, tilt=tilt, **parameters), times)
+    found = truth_of(mechanism, times)
+    for field in ("p_WB", "v_WB", "w_WB"):
+        apart = np.abs(getattr(found.record, field)[:, 0] - own[field].to_numpy()).max()
+        assert apart <= found.bars[field][-1] + own[field].attrs["error_bar"], field
+    words = {"bounce": "impact"}
+    expected = [(words.get(event.kind, event.kind), event) for event in events_of(own) if event.time > 0]
+    assert [kind for kind, _ in expected] == [event.kind for event in found.events]
+    for (_, theirs), event in zip(expected, found.events, strict=True):
+        assert event.time_low - 1e-12 <= theirs.time_high
+        assert theirs.time_low <= event.time_high + 1e-12
+
+
+def test_friction_that_tears_is_refused() -> None:
+    """A rod that slides with friction beyond 4/3 and leans the wrong way has no unique motion (Painlevé)."""
+    rod = mechanism_of("falling_rod", friction=2.0)
+    leans = -0.55
+    joint = replace(rod.joints[0], q0=(0.5 * np.sin(leans), -(0.02 + 0.5 * np.cos(leans)), leans), v0=(1.0, 0.0, 0.0))
+    with pytest.raises(Refused, match="Painlevé"):
+        truth_of(replace(rod, joints=(joint,)), np.array([0.0, 0.1]))
+
+
+def test_a_plank_that_falls_flat_is_refused() -> None:
+    """Two corners that an impact presses at once share it by their order, which nobody knows."""
+    block = mechanism_of("rocking_block", friction=0.2)
+    flat = replace(block.joints[0], q0=(0.0, -0.3, 0.0), v0=(0.0, 0.0, 0.0))
+    with pytest.raises(Refused, match="presses left and right at once"):
+        truth_of(replace(block, joints=(flat,)), np.array([0.0, 0.3]))
+
+
+def test_friction_of_joints_beside_contact_is_refused() -> None:
+    """No route follows both yet, and says so."""
+    table = mechanism_of("free_turntable")
+    axle = replace(table.joints[0], friction=0.1)
+    with pytest.raises(Refused, match="dry friction or stops of joints beside contacts"):
+        truth_of(replace(table, joints=(axle, *table.joints[1:])), np.array([0.0, 0.1]))
