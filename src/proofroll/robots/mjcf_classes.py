@@ -16,6 +16,12 @@ def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, s
         yield from _below(world, tag, main, classes)
 
 
+def class_of(root: Element, element: Element) -> dict[str, str]:
+    """Attributes of an element that lies in no body, with those that its class gives it."""
+    main = next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
+    return _classes(root, element.tag).get(element.get("class", main), {}) | element.attrib
+
+
 def _below(
     parent: Element, tag: str, inherited: str, classes: dict[str, dict[str, str]]
 ) -> Iterator[tuple[Element, dict[str, str]]]:

@@ -1,7 +1,7 @@
-"""A robot file as a scene: its tree of links, released from a random pose, passive, under gravity.
+"""A robot file as a scene: its tree of links, released from a random pose under gravity.
 
-Links that fixed joints hold together are one body, in the frame of the link that the moving joint carries. What moves
-nothing by itself (actuators, contacts, looks) is left out.
+Links that fixed joints hold together are one body, in the frame of the link that the moving joint carries. Contacts and
+looks are left out, actuators of an MJCF act where they are asked for.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
 from proofroll.robots.judging import meant, opened
-from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
+from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotJoint
+from proofroll.robots.motors import motors
 from proofroll.robots.opening import BASES
 from proofroll.robots.robot_file import RobotFile
 from proofroll.robots.states import RobotStates, random_states
@@ -55,7 +56,11 @@ class RobotScenes:
         for law, words in _FACTORS.items():
             if any(getattr(joint, law) for joint in robot.moving):
                 parameters[law] = (1.0, "1", words, {"at_least": 0})
-        left_out = ["actuators", "contacts"]
+        left_out = ["contacts"]
+        if any(len(part) for part in file.root.findall("actuator")):
+            words = "whether the file's actuators act, with their controls at zero (1), or not (0)"
+            parameters["actuators"] = (0, "1", words, _SWITCH)
+            left_out.append("actuators (unless actuators=1)")
         if any(joint.lower is not None or joint.upper is not None for joint in robot.moving):
             parameters["limits"] = (0, "1", "whether the joints have their stops (1) or turn through them (0)", _SWITCH)
             left_out.append("stops of joints (unless limits=1)")
@@ -66,7 +71,7 @@ class RobotScenes:
         return {
             "title": f"{robot.name}, released from a random pose",
             "source": f"{path.name}, {file.kind.upper()}",
-            "reason": f"How engines move this robot when nothing drives it; without {', '.join(left_out)}",
+            "reason": f"How engines move this robot; without {', '.join(left_out)}",
             "duration": _DURATION,
             "parameters": {
                 name: {"value": value, "unit": unit, "meaning": words, "source": path.name, **bounds}
@@ -76,7 +81,7 @@ class RobotScenes:
 
     @staticmethod
     def tables(path: Path, values: Mapping[str, float]) -> dict[str, Any]:
-        """Gravity, bodies, joints and tracked points.
+        """Gravity, bodies, joints, their couplings, and tracked points.
 
         Raises:
             InputError: nothing in the file moves.
@@ -94,6 +99,7 @@ class RobotScenes:
         gravity = robot.gravity if robot.gravity.any() else np.array([0.0, 0.0, -1.0])
         bodies = [(names[joint.child], robot.groups[joint.name]) for joint in robot.moving]
         carriers = {robot.welded[joint.parent][0] for joint in robot.moving}
+        acting, silent = motors(file.root, robot) if values.get("actuators") else ([], [])
         return {
             "gravity": {"magnitude": values["gravity"], "direction": gravity.tolist()},
             "bodies": [
@@ -106,7 +112,10 @@ class RobotScenes:
                 for joint, (name, body) in zip(robot.moving, bodies, strict=True)
                 if joint.name not in carriers
             ],
+            "actuators": acting,
+            "couplings": list(_coupled(robot)) if values["couplings"] else [],
             "unmodelled": [
+                *(f"{what} (actuators=0 leaves all out)" for what in silent),
                 *(f"{what} (couplings=0 leaves it out)" for what in _couplings(file, robot) if values["couplings"]),
                 *(
                     f"the {law} of the {joint.kind} joint {joint.name} ({law}=0 leaves all out)"
@@ -165,9 +174,23 @@ def _quaternion(R: Array) -> Any:
     return Rotation.from_matrix(R).as_quat(scalar_first=True).tolist()
 
 
+def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:
+    """Joints that follow another one, as tables of a scene."""
+    for mimic in robot.mimics:
+        if _follows(robot, mimic):
+            ends = {"joint_a": mimic.other, "joint_b": mimic.joint}
+            yield {"name": mimic.joint, **ends, "ratio": mimic.multiplier, "offset": mimic.offset}
+
+
+def _follows(robot: Robot, mimic: Mimic) -> bool:
+    """True if a coupling says what a joint does that follows another."""
+    dofs = {joint.name: joint.dofs for joint in robot.moving}
+    return bool(mimic.multiplier) and dofs.get(mimic.joint) == dofs.get(mimic.other) == 1
+
+
 def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
     """Parts of a robot that no scene of bodies and joints has, each as a clause."""
-    for mimic in robot.mimics:
+    for mimic in (mimic for mimic in robot.mimics if not _follows(robot, mimic)):
         yield f"joint {mimic.joint} following {mimic.other} (mimic)"
     if file.kind != "mjcf":
         return

@@ -1,0 +1,109 @@
+"""Actuators of an MJCF as tables of a scene, their controls at zero."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+from xml.etree.ElementTree import Element
+
+from proofroll.robots.mjcf_classes import class_of, with_classes
+from proofroll.robots.model import Robot
+
+_PLAIN = {"motor", "position", "velocity", "general"}
+# Attributes that make something else of an actuator where they are not these values.
+_OTHER = {"dyntype": "none", "gaintype": "fixed", "timeconst": "0", "dampratio": "0", "actlimited": "false"}
+
+
+def motors(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]]:
+    """Tables of the actuators that a scene has, and of the others a clause each."""
+    single = {joint.name for joint in robot.moving if joint.dofs == 1}
+    found: list[dict[str, Any]] = []
+    clauses = []
+    for number, element in enumerate(item for part in root.findall("actuator") for item in part):
+        name = element.get("name") or f"actuator{number}"
+        given = _given(root, element)
+        table = _table(element.tag, given) if given.get("joint") in single else None
+        other = next((one for one in found if one["joint"] == given.get("joint")), None)
+        if table is None or (other is not None and (merged := _merged(other, table)) is None):
+            clauses.append(f"the actuator {element.tag} {name}")
+        elif other is None:
+            found.append({**table, "name": name, "joint": given["joint"]})
+        else:
+            other.update(merged or {})
+    for item, of_joint in with_classes(root, "joint"):
+        ends = _numbers(of_joint.get("actuatorfrcrange", ""))
+        for table in [table for table in found if ends and table["joint"] == item.get("name")]:
+            table["limit"] = min(ends[1], table.get("limit", ends[1]))
+            if ends[0] != -ends[1]:
+                clauses.append(f"the actuator force range of joint {item.get('name')}")
+    return found, clauses
+
+
+def _given(root: Element, element: Element) -> dict[str, str]:
+    """Attributes of an actuator; MJCF has one default for all kinds, which each writes in its own words."""
+    found: dict[str, str] = {}
+    named = {"class": element.get("class", "")} if element.get("class") else {}
+    for tag in sorted(_PLAIN, key=lambda tag: tag == element.tag):  # that of its own kind last
+        of_class = class_of(root, Element(tag, named))
+        if tag != element.tag:
+            kp, kv = of_class.pop("kp", None), of_class.pop("kv", None)
+            if element.tag == "general" and (kp or kv):
+                of_class |= {"biastype": "affine", "biasprm": f"0 {-float(kp or 0)} {-float(kv or 0)}"}
+            if element.tag == "position" and "gainprm" in of_class:
+                of_class["kp"] = of_class["gainprm"].split()[0]
+        found |= of_class
+    return found | element.attrib
+
+
+def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
+    """Kind, gains, gear and limit of an actuator; None: a scene has no such one."""
+    if tag not in _PLAIN or any(given.get(key, plain) != plain for key, plain in _OTHER.items()):
+        return None
+    kp, kd = _gains(tag, given)
+    gear = (_numbers(given.get("gear", "")) or [1.0])[0]
+    low, high = _range(given, "ctrl") or (0.0, 0.0)
+    force = _range(given, "force")
+    if not gear or kp < 0 or kd < 0 or (force and force[0] != -force[1]) or (force and force[1] <= 0):
+        return None
+    found: dict[str, Any] = {"kind": "position" if kp else "velocity" if kd else "torque", "gear": gear}
+    found |= {name: value for name, value in (("kp", kp), ("kd", kd)) if value}
+    target = min(max(0.0, low), high) if (low, high) != (0.0, 0.0) else 0.0
+    if target and tag == "general":
+        return None  # its gain need not be that of its bias
+    return found | {"target": target} | ({"limit": force[1] * abs(gear)} if force else {})
+
+
+def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:
+    """Gains of position and velocity."""
+    if tag == "position":
+        return float(given.get("kp", 1.0)), float(given.get("kv", 0.0))
+    if tag == "velocity":
+        return 0.0, float(given.get("kv", 1.0))
+    bias = [*_numbers(given.get("biasprm", "")), 0.0, 0.0, 0.0]
+    if tag == "motor" or given.get("biastype", "none") == "none":
+        return 0.0, 0.0
+    plain = given["biastype"] == "affine" and not bias[0]
+    return (-bias[1], -bias[2]) if plain else (-1.0, -1.0)
+
+
+def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | None:
+    """An actuator of a position and one of a velocity zero at the same joint as one; None: they are not that."""
+    by_kind = {item["kind"]: item for item in (one, two)}
+    if set(by_kind) != {"position", "velocity"} or one["gear"] != two["gear"] or {"limit"} & (one.keys() | two.keys()):
+        return None
+    if by_kind["velocity"]["target"]:
+        return None
+    kd = by_kind["position"].get("kd", 0.0) + by_kind["velocity"]["kd"]
+    return {**by_kind["position"], "kd": kd, "name": one["name"], "joint": one["joint"]}
+
+
+def _range(given: Mapping[str, str], what: str) -> tuple[float, float] | None:
+    """Range of a control or a force where it holds."""
+    ends = _numbers(given.get(f"{what}range", ""))
+    if given.get(f"{what}limited") == "false" or len(ends) != 2:
+        return None
+    return ends[0], ends[1]
+
+
+def _numbers(text: str) -> list[float]:
+    return [float(number) for number in text.split()]
