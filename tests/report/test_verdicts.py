@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import io
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,19 @@ def test_one_refused_case_of_eleven_shows_the_ten(made: tuple[Outcome, Store]) -
     assert "⊘ refused 1/11 ✓10" in printed(content, 100)
     first = next(iter(overview(content, 0).groups.values()))[0]
     assert (first.verdict_text, first.cells["z"].judgement.verdict) == ("refused 1/11 ✓10", "agrees")
+
+
+def test_the_price_of_compiling_has_a_column(made: tuple[Outcome, Store]) -> None:
+    """Where an engine takes long before its first step the table tells it for each row; else it has no such column."""
+    run = made[0].runs[0]
+    runs = {
+        seconds: [dataclasses.replace(answered(run), result=dataclasses.replace(run.result, build_seconds=seconds))]
+        for seconds in (0.02, 23.5)
+    }
+    quick, slow = (printed(outcome_content(with_runs(made[0], {0: one})), 100) for one in runs.values())
+    assert "s before" in slow
+    assert re.search(r" 24 ", slow)
+    assert "s before" not in quick
 
 
 def test_a_refusal_hides_no_difference_and_no_failure(made: tuple[Outcome, Store]) -> None:

@@ -58,8 +58,8 @@ class BallOnSurface:
         """Refuses a start without a normal, a slip that nothing could brake, and what a wall that moves does not allow.
 
         Raises:
-            InputError: the surface has no normal where the ball starts; or the ball starts slipping, and friction without
-                bound would stop it at once; or the wall moves, and the ball does not only roll.
+            InputError: the surface has no normal where the ball starts; or the ball starts slipping, and friction
+                without bound would stop it at once; or the wall moves, and the ball does not only roll.
         """
         for name, only in (("mu_static", math.inf), ("rolling_resistance", 0.0)):
             if any(self.surface.wall_rate) and getattr(self.contact, name) != only:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
+_COMPILES = 1.0  # s before the first step that a reader wants to know of
 STYLES = {
     "agrees": "green",
     "unconfirmed": "yellow",
@@ -57,17 +58,18 @@ def console() -> Screen:
 def verdict_table(content: ReportedComparison) -> Table:
     """One line per engine with settings: the worst over all points of the parameters."""
     names = columns(content)
+    before = _before(content)
     table = plain_table(
         # Where the window is narrow those with a least width break between words, and nothing is cut.
         Column("engine formulation setting", min_width=_WORD, overflow="fold"),
         *unbroken("step"),
         Column("verdict", min_width=_WORD),
         *(Column(Text(f"{name} [{unit}]"), justify="right", min_width=_NUMBER) for name, unit in names),
-        *numeric("order", "s/s"),
+        *numeric("order", *(["s before"] if before else []), "s/s"),
         *unbroken(""),
         title=content.title,
     )
-    for row in content.rows:
+    for place, row in enumerate(content.rows):
         verdict, judged = row.verdict, row.observables
         shown = [judged[name] for name, _ in names if name in judged]
         worst = max(shown, key=_beyond, default=None)
@@ -77,10 +79,19 @@ def verdict_table(content: ReportedComparison) -> Table:
             Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=STYLES[verdict]),
             *(number(judged[name].error if name in judged else None) for name, _ in names),
             number(worst.order if worst else None),
+            *([number(before.get(place))] if before else []),
             number(row.seconds_per_second),
             Text("") if row.as_expected else Text("!!", style="bold red"),
         )
     return table
+
+
+def _before(content: ReportedComparison) -> dict[int, float]:
+    """Row -> longest time before the first step [s]; empty unless some engine compiles, as told by the time it takes."""
+    found: dict[int, float] = {}
+    for run in content.runs:
+        found[run.row] = max(found.get(run.row, 0.0), run.build_seconds or 0.0)
+    return found if max(found.values(), default=0.0) > _COMPILES else {}
 
 
 def _beyond(item: WorstJudgement) -> float:
