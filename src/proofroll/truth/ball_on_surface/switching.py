@@ -81,12 +81,12 @@ class SwitchedBall:
         body, route, state = self.body, self.route, self.route.start()
         if body.gap0:
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ())
-        p, v, _ = route.world(state)
-        if stands(body, v):
-            if stays(body, p):
+        # A state does not tell the slip with which a ball starts, by which routes know its velocity.
+        if stands(body, body.v0) and not np.any(body.slip0):
+            if stays(body, body.p0):
                 return Transition(state, RESTS, ())
-            state = route.nudged(state, setting_off(body, p))
-        if pressed(body, *route.world(state)[:2]) < -_OFF_WALL * natural_acceleration(body):
+            state = route.nudged(state, setting_off(body, body.p0))
+        if pressed(body, body.p0, body.v0) < -_OFF_WALL * natural_acceleration(body):
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), (("lift_off", ""),))
         return self._touching(state, body.slip0 if np.any(body.slip0) else None)
 

@@ -322,3 +322,13 @@ def test_a_long_leg_is_handed_to_a_compiled_series(monkeypatch: pytest.MonkeyPat
     whole, handed = (path.motion(times, "") for path in paths)
     for name in ("p_WB", "v_WB", "w_WB", "force"):
         np.testing.assert_allclose(getattr(handed, name), getattr(whole, name), rtol=1e-10, atol=1e-10)
+
+
+def test_a_ball_that_spins_on_the_spot_sets_off_against_resistance() -> None:
+    """Friction and resistance end its slip after aω / (7/2 μ g + f g / (k a)); it was taken to rest, and ill-posed."""
+    scene = load_scene("slide_to_roll", speed=0.0, back_spin=10.0, rolling_resistance=1e-4)
+    found = truth(scene, np.linspace(0, 0.1, 3))
+    sticks = 0.25 / (3.5 * 0.2 * 9.81 + 1e-4 * 9.81 / (0.4 * 0.025))
+    assert "ill_posed" not in found.attrs
+    assert [event.kind for event in events_of(found)] == ["slip", "stick"]
+    assert events_of(found)[1].time == pytest.approx(sticks, rel=1e-10)
