@@ -90,8 +90,8 @@ def test_a_ball_starts_where_the_coordinates_of_its_wall_say(seed: int) -> None:
     assert abs(referee.run(np.zeros(1, np.longdouble)).seen[0]["gap"]) < 1e-17
 
 
-# A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces, two tori on which
-# it slips at first (it was taken to leave them), a plane whose gap has the round-off of the place.
+# A bowl on which the ball slips until it sticks, a torus with resistance, a plane on which it bounces, two tori on
+# which it slips at first (it was taken to leave them), a plane whose gap has the round-off of the place.
 @pytest.mark.parametrize("seed", [17, 9, 45, 119, 144, 60])
 def test_no_error_of_the_truth_of_a_ball_lies_beyond_its_bar(seed: int) -> None:
     """States, forces and events of short motions; `drill referee --balls` has any number."""
