@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
+from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
 from proofroll.elements.mechanism.named_forces import named_forces
@@ -39,6 +40,8 @@ _SHAPES = {
     **dict.fromkeys(("com", "acceleration", "angular_acceleration", "joint_position", "joint_axis"), ((-1, 3), (3,))),
     "inertia": ((-1, 3, 3), (3, 3)),
     "gravity": ((3,), (1, 3)),
+    **dict.fromkeys(("contact_gap", "contact_friction", "contact_restitution"), ((-1,), ())),
+    **dict.fromkeys(("contact_normal", "contact_place"), ((-1, 3), (3,))),
     **dict.fromkeys(("rows", "rank", "mobility", "mass_matrix_error"), ((), (1,))),
 }
 
@@ -83,6 +86,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     if len(mechanism.joints):
         compare("joint positions", "m", places, built.joint_position, size)
         compare("joint axes", "1", axes, built.joint_axis, 1.0)
+    _compare_contacts(element, built, compare)
     compare("mobility", "1", element.analysis.mobility, built.mobility, 1.0)
     compare("error of the mass matrix", "1", 0.0, built.mass_matrix_error, 1.0)
     compare("position", "m", start.p_WB[0], sample.p_WB, size)
@@ -98,6 +102,23 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     compare("angular acceleration", "rad/s^2", found.angular_acceleration, built.angular_acceleration, turning)
     _compare_reactions(element, sample, compare)
     return lines
+
+
+def _compare_contacts(
+    element: MechanismElement, built: MechanismBuilt, compare: Callable[[str, str, Any, Any, float], None]
+) -> None:
+    """Where and how contacts touch, and by which law."""
+    contacts = element.mechanism.contacts
+    if not contacts:
+        return
+    found = touches(element.mechanism, element._solution.motion)
+    compare("gaps", "m", [each.gap for each in found], built.contact_gap, element.length)
+    compare("normals of contact", "1", [each.normal for each in found], built.contact_normal, 1.0)
+    compare("places of contact", "m", [each.place for each in found], built.contact_place, element.length)
+    friction = [contact.friction for contact in contacts]
+    compare("friction of contacts", "1", friction, built.contact_friction, max(friction) or 1.0)
+    restitution = [contact.restitution for contact in contacts]
+    compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
 
 
 def _compare_reactions(

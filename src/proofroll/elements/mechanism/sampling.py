@@ -56,6 +56,10 @@ class MechanismBuilt:
         joint_position: of each joint in the world [m], shape (joints, 3).
         joint_axis: its axis in the world, unit vectors, NaN for a joint without one, shape (joints, 3).
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
+        contact_gap: of each contact [m], shape (contacts,).
+        contact_normal: unit vectors from b to a in the world, shape (contacts, 3).
+        contact_place: in the world, on the shape that is no plane, on a of two spheres [m], shape (contacts, 3).
+        contact_friction, contact_restitution: coefficients that the engine made of the pair's, shape (contacts,).
         rows: number of the engine's constraint rows.
         rank: number of independent ones among them.
         mobility: velocities of the engine's model less ``rank``.
@@ -73,6 +77,11 @@ class MechanismBuilt:
     joint_position: Array | None = None
     joint_axis: Array | None = None
     gravity: Array | None = None
+    contact_gap: Array | None = None
+    contact_normal: Array | None = None
+    contact_place: Array | None = None
+    contact_friction: Array | None = None
+    contact_restitution: Array | None = None
     rows: int | None = None
     rank: int | None = None
     mobility: int | None = None

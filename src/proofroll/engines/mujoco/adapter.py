@@ -17,13 +17,14 @@ from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.mujoco import mechanism
+from proofroll.engines.mujoco import mechanism, mechanism_geoms
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.contact import contact_coefficient, contact_force
 from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.free import Facets, Free
 from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficients
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
+from proofroll.engines.mujoco.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
 from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, check_restitution, lowered
@@ -32,6 +33,7 @@ from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
 from proofroll.engines.mujoco.terms import TERMS
 
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
+_MECHANISMS: Mapping[str, type[MujocoMechanism]] = {"joints": MujocoMechanism, "geoms": MujocoGeoms}
 # Joints whose coordinates hold an orientation.
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
@@ -52,6 +54,7 @@ class Mujoco(SteppedModel):
         "free": frozenset(BallCapability),
         "facets": ALL_OF_A_BALL - {BallCapability.BOUNDED_FRICTION, BallCapability.SLIPPING_START},
         "joints": mechanism.PROVIDES,
+        "geoms": mechanism_geoms.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "facets": {
@@ -65,6 +68,7 @@ class Mujoco(SteppedModel):
             BallCapability.MOVING_WALL: _STANDS,
         },
         "joints": mechanism.LACKING,
+        "geoms": mechanism_geoms.LACKING,
     }
     settings: ClassVar[type[Any]] = MujocoSettings
     lowered = staticmethod(lowered)
@@ -74,6 +78,7 @@ class Mujoco(SteppedModel):
         "free": Level.CONTACT,
         "facets": Level.FACETS,
         "joints": Level.CONSTRAINT,
+        "geoms": Level.CONTACT,
     }
     terms: ClassVar[Sequence[Term]] = TERMS
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
@@ -99,6 +104,13 @@ class Mujoco(SteppedModel):
         start(self._model, self._data, self._body, self._settings, self._formulation, slips=slips)
 
     @staticmethod
+    def caveat(settings: MujocoSettings) -> str:
+        """See :class:`proofroll.core.engine_abilities.TellsCaveats`."""
+        if settings.formulation != "geoms" or not settings.cone_correction:
+            return ""
+        return "the normal row of each contact is corrected between mj_step1 and mj_step2"
+
+    @staticmethod
     def version() -> str:
         """Version of MuJoCo."""
         return str(mujoco.__version__)
@@ -116,9 +128,9 @@ class Mujoco(SteppedModel):
 
     @classmethod
     def build(cls, scene: Scene, settings: MujocoSettings) -> Self | MujocoMechanism:
-        """See :class:`proofroll.core.engine.Engine`; what ``joints`` builds is a run of a mechanism."""
-        if settings.formulation == "joints":
-            return MujocoMechanism(scene, settings)
+        """See :class:`proofroll.core.engine.Engine`; ``joints`` and ``geoms`` build a run of a mechanism."""
+        if settings.formulation in _MECHANISMS:
+            return _MECHANISMS[settings.formulation](scene, settings)
         return cls._build_ball(scene, settings)
 
     @classmethod
@@ -137,8 +149,8 @@ class Mujoco(SteppedModel):
     @classmethod
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
-        if settings.formulation == "joints":
-            return MujocoMechanism(scene, settings).model_file()
+        if settings.formulation in _MECHANISMS:
+            return _MECHANISMS[settings.formulation](scene, settings).model_file()
         engine, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         for key in list(spec.keys):
             spec.delete(key)
@@ -153,8 +165,9 @@ class Mujoco(SteppedModel):
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.mujoco.reproducer import mechanism_source, source
 
-        if settings.formulation == "joints":
-            return mechanism_source(MujocoMechanism(scene, settings).model_file(), mechanism_of(scene))
+        if settings.formulation in _MECHANISMS:
+            xml = _MECHANISMS[settings.formulation](scene, settings).model_file()
+            return mechanism_source(xml, mechanism_of(scene))
         built, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         compiled(spec)
         return source(spec.to_xml(), built._model, built._data, built._body, settings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import mujoco
 import numpy as np
@@ -51,12 +51,19 @@ LACKING: Mapping[str, str] = {
 
 
 class MujocoMechanism(SteppedModel):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """See :class:`proofroll.core.engine.Engine` for the methods.
+
+    Attributes:
+        provides, lacking: of its formulation.
+    """
+
+    provides: ClassVar[frozenset[str]] = PROVIDES
+    lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def __init__(self, scene: Any, settings: MujocoSettings) -> None:
         check(settings, bounded=False)
         mechanism = mechanism_of(scene)
-        require(mechanism, PROVIDES, LACKING)
+        require(mechanism, self.provides, self.lacking)
         forget_callbacks()
         super().__init__(compiled(mechanism_model.write(mechanism, settings)), settings)
         self._mechanism = mechanism
@@ -277,8 +284,11 @@ class MujocoMechanism(SteppedModel):
     def _evaluate(self, data: Any) -> None:
         self._drive(self._model, data)
         self._model.opt.disableflags &= ~_NO_SENSORS
-        super()._evaluate(data)
+        self._forward(data)
         self._model.opt.disableflags |= _NO_SENSORS
+
+    def _forward(self, data: Any) -> None:
+        super()._evaluate(data)
 
 
 def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:

@@ -19,6 +19,7 @@ from proofroll.elements.mechanism import WORLD, Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import to_quaternion
+from proofroll.engines.mujoco.mechanism_contacts import write_contacts
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 _HINGE, _SLIDE = mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE
@@ -52,7 +53,9 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
     option.timestep, option.gravity = settings.dt, mechanism.gravity
     option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{settings.integrator.upper()}")
     # Without autoreset, a state that is not finite stays as it is instead of starting anew at time 0.
-    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
+    if not mechanism.contacts:
+        option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
     bodies = {WORLD: spec.worldbody}
     data = {body.name: body for body in mechanism.bodies}
     for number, joint in enumerate(mechanism.joints):
@@ -76,6 +79,8 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
         added.name1, added.name2 = (f"{mechanism.joint_index[name]}.0" for name in ends)
         added.data[:2] = coupling.offset, coupling.ratio
         _set_softness(added, settings)
+    if mechanism.contacts:
+        write_contacts(spec, bodies, mechanism, settings)
     return spec
 
 

@@ -39,6 +39,8 @@ UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
 # Settings of a contact, of which a mechanism of joints has none.
 _OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim")
+# Formulations of mechanisms, and those of the settings above that each has.
+OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {"joints": (), "geoms": ("cone", "cone_correction")}
 # Part of the normal force by which a corrected contact is pressed deeper, so that the next slip does not end it.
 PRELOAD = 0.01
 
@@ -56,7 +58,8 @@ class MujocoSettings:
         formulation: ``free``: a free ball and a plane that is re-posed tangent to the wall before each step;
             ``chart``: the ball on joints that follow the surface's coordinates, with the same plane re-posed at each
             evaluation of the forces; ``facets``: a free ball in a ring of boxes; ``joints``: a mechanism of MuJoCo's
-            joints, tendons and equality constraints, which has no contact and none of its options.
+            joints, tendons and equality constraints, which has no contact and none of its options; ``geoms``: the same
+            with contacts between bodies.
         preset: where the other values come from.
         dt: step [s].
         integrator: MuJoCo's name of it.
@@ -81,7 +84,7 @@ class MujocoSettings:
             with MuJoCo's documented coefficients. No scene asks for either; they are there to be compared.
     """
 
-    formulation: Literal["free", "chart", "facets", "joints"] = "chart"
+    formulation: Literal["free", "chart", "facets", "joints", "geoms"] = "chart"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-3
     integrator: Literal["Euler", "RK4", "implicitfast"] = "RK4"
@@ -107,7 +110,7 @@ class MujocoSettings:
         A time constant that does not shrink has another limit: such a contact is a smooth spring, which RK4 follows at
         its own order. The chart's other contacts and J̇v are of order 2.
         """
-        if self.formulation == "joints":
+        if self.formulation in OF_MECHANISMS:
             return 4 if self.integrator == "RK4" else 1
         if self.time_constant is None and self.formulation == "chart":
             return ORDER_OF_TURNING if self.integrator == "RK4" else 1
@@ -156,7 +159,9 @@ class MujocoSettings:
         return mu, turning, DEFAULT_ROLLING if self.condim >= ROLLS else 0.0
 
 
-_FIRST_ORDER = tuple(MechanismCapability[name] for name in ("JOINT_FRICTION", "STOPS", "COUPLINGS", "SATURATION"))
+_FIRST_ORDER = tuple(
+    MechanismCapability[name] for name in ("JOINT_FRICTION", "STOPS", "COUPLINGS", "SATURATION", "CONTACT")
+)
 
 
 def lowered(settings: MujocoSettings) -> Mapping[str, int]:
@@ -166,7 +171,7 @@ def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     sticking and slipping, which may come anywhere in a step. The torque of rolling resistance uses a normal force
     that is extrapolated linearly in time.
     """
-    if settings.formulation != "joints":
+    if settings.formulation not in OF_MECHANISMS:
         return {BallCapability.ROLLING_RESISTANCE: 2, BallCapability.BOUNDED_FRICTION: 1}
     turning: dict[str, int] = dict.fromkeys((MechanismCapability.SPHERICAL, MechanismCapability.FREE), ORDER_OF_TURNING)
     return turning | dict.fromkeys((*ALL_LOOPS, *_FIRST_ORDER), 1)
@@ -182,7 +187,8 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
     Raises:
         InputError: the first such combination.
     """
-    rules = _rules_of_joints(settings) if settings.formulation == "joints" else _rules_of_contact(settings, bounded)
+    of_mechanism = settings.formulation in OF_MECHANISMS
+    rules = _rules_of_mechanism(settings) if of_mechanism else _rules_of_contact(settings, bounded)
     refuse_first("mujoco", settings, rules)
     if settings.own_share >= 1:
         # MuJoCo's damping would supply all of J̇v or more of it: nothing is left to add.
@@ -190,10 +196,16 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
         raise InputError("mujoco: impedance", settings.impedances[1], advice)
 
 
-def _rules_of_joints(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
-    plain = MujocoSettings(settings.formulation)
+def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
+    plain, formulation = MujocoSettings(settings.formulation), settings.formulation
     for name in _OF_CONTACT:
-        yield getattr(settings, name) != getattr(plain, name), name, "joints has no contact; leave it out"
+        if name not in OF_MECHANISMS[formulation]:
+            said = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
+            yield getattr(settings, name) != getattr(plain, name), name, f"{said}; leave it out"
+    if settings.cone_correction:
+        # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
+        yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
+        yield settings.cone == "pyramidal", "cone", "cone_correction=true of a mechanism needs cone=elliptic"
 
 
 def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple[bool, str, str]]:
@@ -286,5 +298,20 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         # Best in positions. With the shortest that MuJoCo allows the slider-crank, whose error is the largest, is off
         # by a fifth more and its forces by two thirds; Bricard, four-bar and squeezer gain 5 to 26 % of 3e-8 m or less.
         "tuned": MujocoSettings("joints", "tuned", time_constant=POSITIONS_TIME_CONSTANT),
+    },
+    "geoms": {
+        "default": MujocoSettings(
+            "geoms",
+            "default",
+            dt=DEFAULT_STEP,
+            integrator="Euler",
+            cone="pyramidal",
+            time_constant=None,
+            impedance=None,
+        ),
+        # The exact cone, and the hardest contact that MuJoCo allows. What slips still hops, at every step.
+        "matched": MujocoSettings("geoms", "matched", integrator="Euler"),
+        # The lift of what slips is taken away: an edit of mjData.efc_aref that its manual does not describe.
+        "tuned": MujocoSettings("geoms", "tuned", integrator="Euler", cone_correction=True),
     },
 }

@@ -1,0 +1,240 @@
+"""Contacts of a mechanism as geoms and pairs of an MjSpec, and what is read back of them.
+
+A vertex is a sphere of almost no radius, a circle a cylinder of almost no height, and a plane on a moving body, which
+MuJoCo refuses, the top of a wide box.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.shapes import (
+    CircleShape,
+    ConvexShape,
+    EllipsoidShape,
+    HalfSpace,
+    SphereShape,
+)
+from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.contacts.touching import Moving
+from proofroll.elements.mechanism.kinematics import Tree
+from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, to_quaternion
+from proofroll.engines.mujoco.friction import NEAR_CONE, SMALLEST_FRICTION
+from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, MujocoSettings
+
+# m; MuJoCo has no sphere of radius 0.
+_VERTEX = 1e-12
+# Part of its radius that a circle's cylinder is high, either way.
+_FLAT = 1e-9
+# m: half the width and half the depth of the box whose top stands for a plane on a moving body. A sphere that goes
+# deeper than it is wide would be pushed out at its side.
+_WIDE, _DEEP = 1e3, 1.0
+# m: from where on MuJoCo has a contact in its equations. At 0, round-off decides at the start what touches.
+_MARGIN = 1e-9
+# m: so far away contacts are looked for, to be read back.
+_FAR = 1e6
+# A row of slip is corrected above the slip that friction takes in so many steps.
+_STEPS = 3.5
+
+
+def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
+    """Rejects what MuJoCo would silently change or cannot hold.
+
+    Raises:
+        Refused: the first such contact.
+    """
+    moving = _moving(mechanism)
+    for contact in mechanism.contacts:
+        mu = contact.friction
+        if 0 < mu < SMALLEST_FRICTION:
+            raise Refused(f"MuJoCo raises a coefficient of friction of {mu:g} to {SMALLEST_FRICTION:g}; 0 is exact")
+        if settings.cone == "pyramidal" and mu > LARGEST_PYRAMIDAL_FRICTION:
+            limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
+            raise Refused(f"cone=pyramidal with friction above {limit} makes a contact soft; set cone=elliptic")
+        sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
+        for (body, shape), (_, other) in (sides, sides[::-1]):
+            if isinstance(shape, HalfSpace) and body in moving and not isinstance(other, SphereShape):
+                raise Refused(
+                    f"the plane of {contact.name} moves with {body}; MuJoCo's planes stand, and a box in its place "
+                    "meets spheres alone exactly"
+                )
+
+
+def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, settings: MujocoSettings) -> None:
+    """Adds geoms ``contact<k>a`` and ``contact<k>b`` and a pair for each contact k; no other geoms meet."""
+    spec.option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
+    moving = _moving(mechanism)
+    for number, contact in enumerate(mechanism.contacts):
+        names = [f"contact{number}{end}" for end in "ab"]
+        ends = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
+        for name, (body, shape) in zip(names, ends, strict=True):
+            geom = bodies[body].add_geom(name=name, mass=0.0, contype=0, conaffinity=0)
+            _set_shape(geom, shape, body in moving)
+        pair = spec.add_pair(name=f"contact{number}", geomname1=names[0], geomname2=names[1], margin=_MARGIN)
+        _set_pair_law(pair, contact, settings)
+
+
+def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> None:
+    """Sets friction, softness and restitution.
+
+    Restitution is one step of damping in solref's direct format: (1 + e)/dt takes 1 + e times the normal velocity.
+    Friction has a format of its own, or it would throw the slip back too.
+    """
+    pair.condim = 3 if contact.friction else 1
+    pair.friction = (contact.friction, contact.friction, 0.0, 0.0, 0.0)
+    if settings.time_constant is not None:
+        pair.solref = (settings.contact_time, 1.0)
+    if settings.impedance is not None:
+        pair.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)
+    if contact.restitution:
+        pair.solref = (-1.0, -(1 + contact.restitution) / settings.dt)
+        pair.solreffriction = (-1e-9, -1 / settings.dt)
+
+
+def _set_shape(geom: Any, shape: ConvexShape | HalfSpace, moves: bool) -> None:
+    if isinstance(shape, HalfSpace):
+        frame = frame_of_axis(shape.normal)
+        geom.quat = to_quaternion(frame)
+        if moves:
+            geom.type, geom.size = mujoco.mjtGeom.mjGEOM_BOX, (_WIDE, _WIDE, _DEEP)
+            geom.pos = shape.point - _DEEP * frame[:, 2]
+        else:
+            geom.type, geom.size, geom.pos = mujoco.mjtGeom.mjGEOM_PLANE, (0.0, 0.0, 1.0), shape.point
+        return
+    geom.pos = shape.centre
+    if isinstance(shape, SphereShape):
+        geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, (max(shape.radius, _VERTEX), 0.0, 0.0)
+    elif isinstance(shape, EllipsoidShape):
+        geom.type, geom.size, geom.quat = mujoco.mjtGeom.mjGEOM_ELLIPSOID, shape.axes, to_quaternion(shape.frame)
+    else:
+        assert isinstance(shape, CircleShape)
+        geom.type, geom.size = mujoco.mjtGeom.mjGEOM_CYLINDER, (shape.radius, _FLAT * shape.radius, 0.0)
+        geom.quat = to_quaternion(frame_of_axis(shape.normal))
+
+
+def _moving(mechanism: Mechanism) -> frozenset[str]:
+    """Bodies that some joint lets move."""
+    still = {WORLD}
+    for joint in mechanism.joints:  # sorted: the parent comes first
+        if not joint.nv and joint.parent in still:
+            still.add(joint.child)
+    return frozenset({body.name for body in mechanism.bodies} - still)
+
+
+class ContactsRead(NamedTuple):
+    """Contacts as MuJoCo finds them: gaps [m], normals from b to a, places [m]; coefficients of pairs."""
+
+    gap: Array
+    normal: Array
+    place: Array
+    friction: Array
+    restitution: Array
+
+
+class Contacts:
+    """The contacts of a compiled model."""
+
+    def __init__(self, model: Any, mechanism: Mechanism) -> None:
+        self._model, self._mechanism = model, mechanism
+        self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in range(len(mechanism.contacts))]
+        # Of each geom: its contact, and the sign of MuJoCo's force on its second geom where that is this one.
+        self._of_geom = {a: (k, 1.0) for k, (a, _) in enumerate(self._geoms)}
+        self._of_geom |= {b: (k, -1.0) for k, (_, b) in enumerate(self._geoms)}
+        self._weight = float(np.linalg.norm(mechanism.gravity))
+
+    def forces(self, data: Any) -> Array:
+        """Forces on body a of each contact in the world [N], shape (contacts, 3)."""
+        total, wrench = np.zeros((len(self._geoms), 3)), np.zeros(6)
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            mujoco.mj_contactForce(self._model, data, index, wrench)
+            number, sign = self._of_geom[int(contact.geom[1])]
+            # The frame's first axis points from geom[0] to geom[1], and the force is the one on geom[1].
+            total[number] += sign * (contact.frame.reshape(3, 3).T @ wrench[:3])
+        return total
+
+    def correct(self, data: Any) -> None:
+        """Takes the lift that MuJoCo's convex cone gives to slip out of the normal rows; the cone is elliptic.
+
+        MuJoCo's friction is the dual of a convex cone: a row of slip that asks for the deceleration b s makes the
+        normal row ask for mu b s more, and the contact hops. That much less is asked for. To be called after the
+        reference accelerations and before the forces.
+        """
+        dt = self._model.opt.timestep
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            row, mu = int(contact.efc_address), float(contact.friction[0])
+            if row < 0 or contact.dim == 1:
+                continue
+            slip = float(np.hypot(*data.efc_vel[row + 1 : row + 3]))
+            if slip > _STEPS * mu * self._weight * dt:
+                data.efc_aref[row] -= mu * data.efc_KBIP[row + 1, 1] * slip
+
+    def add_turning(self, data: Any) -> None:
+        """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations at the start."""
+        mechanism = self._mechanism
+        motion = Tree(mechanism).at(*mechanism.start())
+        found, rate = touches(mechanism, motion), np.zeros((3, self._model.nv))
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            row = int(contact.efc_address)
+            number, sign = self._of_geom[int(contact.geom[1])]
+            own, each = mechanism.contacts[number], found[number]
+            missing = np.zeros(3)
+            for body, side in ((own.body_a, 1.0), (own.body_b, -1.0)):
+                k = mechanism.body_index[body]
+                mujoco.mj_jacDot(self._model, data, rate, None, each.place, self._model.body(body).id)
+                moving = Moving(motion.p_WB[k], motion.R_WB[k], motion.v_WB[k], motion.w_WB[k])
+                along_body = each.place_rate - moving.velocity(each.place)
+                missing += side * (rate @ data.qvel + cross(moving.w, along_body))
+            along = sign * contact.frame.reshape(3, 3) @ missing
+            along[0] += float(each.normal_rate @ each.slide)
+            if row >= 0:
+                data.efc_aref[row : row + contact.dim] -= along[: contact.dim]
+
+    def take_lift(self, data: Any, rates: Array) -> None:
+        """As :meth:`correct`, but all of the lift where a force is on the cone, by the ``rates`` of all rows."""
+        missed = rates - data.efc_aref
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            row, mu = int(contact.efc_address), float(contact.friction[0])
+            if row < 0 or contact.dim == 1:
+                continue
+            N, T1, T2 = data.efc_force[row : row + 3].tolist()
+            if np.hypot(T1, T2) >= NEAR_CONE * mu * N:
+                data.efc_aref[row] -= mu * np.hypot(*missed[row + 1 : row + 3])
+
+    def read(self, data: Any) -> ContactsRead:
+        """All of them, by MuJoCo's own search with a margin so wide that it finds every one; ``data`` is spoiled."""
+        model, count = self._model, len(self._geoms)
+        gap, normal, place = np.full(count, np.nan), np.full((count, 3), np.nan), np.full((count, 3), np.nan)
+        margin = model.pair_margin.copy()
+        model.pair_margin[:] = _FAR
+        try:
+            mujoco.mj_fwdPosition(model, data)
+        finally:
+            model.pair_margin[:] = margin
+        for index in range(data.ncon):
+            contact = data.contact[index]
+            number, sign = self._of_geom[int(contact.geom[1])]
+            if not contact.dist >= gap[number]:  # of a cylinder's several the nearest
+                gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
+                place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]
+        return ContactsRead(gap, normal, place, *self._laws())
+
+    def _to_surface(self, number: int) -> float:
+        """Part of the gap from its middle, where MuJoCo has the place, to a shape that is no plane."""
+        return -0.5 if isinstance(self._mechanism.contacts[number].shape_a, HalfSpace) else 0.5
+
+    def _laws(self) -> tuple[Array, Array]:
+        """Coefficients of friction and restitution that the pairs have."""
+        model, dt = self._model, self._model.opt.timestep
+        friction = np.where(model.pair_dim > 1, model.pair_friction[:, 0], 0.0)
+        direct = model.pair_solref[:, 1] < 0
+        return friction, np.where(direct, -model.pair_solref[:, 1] * dt - 1.0, 0.0)

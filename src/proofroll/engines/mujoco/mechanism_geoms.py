@@ -1,0 +1,122 @@
+"""Formulation ``geoms``: a mechanism of :mod:`~proofroll.engines.mujoco.mechanism` whose bodies may touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+import mujoco
+import numpy as np
+
+from proofroll.core.engine import Regularised
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.certificate import CAPS
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.engines.mujoco import mechanism
+from proofroll.engines.mujoco.mechanism import MujocoMechanism
+from proofroll.engines.mujoco.mechanism_contacts import Contacts, check_contacts
+from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
+
+_CAPABILITY = MechanismCapability
+# An error of the lift of slip falls by half or more in each.
+_ROUNDS = 40
+_MARGIN = 1.1
+# What impedance leaves of the load acts on the bodies by levers.
+_OF_LOAD = 10.0
+_SOFT = (
+    "contacts are soft, start without load, lift what slips and lack the turning of their normals (J̇v); hard ones "
+    "would change that much"
+)
+PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+LACKING: Mapping[str, str] = mechanism.LACKING
+
+
+class MujocoGeoms(MujocoMechanism):
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    provides: ClassVar[frozenset[str]] = PROVIDES
+
+    def __init__(self, scene: Any, settings: MujocoSettings) -> None:
+        own = mechanism_of(scene)
+        check_contacts(own, settings)
+        if any(pair.restitution for pair in own.pairs):
+            check_restitution(settings)
+        super().__init__(own, settings)
+        self._contacts = Contacts(self._model, own)
+
+    def model_file(self) -> str:
+        """MJCF, whose keyframe ``start`` is time 0.
+
+        Raises:
+            Refused: each step edits the contacts.
+        """
+        if self._settings.cone_correction:
+            raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
+        return super().model_file()
+
+    def _run(self, steps: int) -> None:
+        if not self._settings.cone_correction:
+            super()._run(steps)
+            return
+        for _ in range(steps):
+            self._drive(self._model, self._data)
+            mujoco.mj_step1(self._model, self._data)
+            self._contacts.correct(self._data)
+            mujoco.mj_step2(self._model, self._data)
+
+    def _forward(self, data: Any) -> None:
+        if not self._settings.cone_correction:
+            super()._forward(data)
+            return
+        mujoco.mj_fwdPosition(self._model, data)
+        mujoco.mj_fwdVelocity(self._model, data)
+        self._contacts.correct(data)
+        mujoco.mj_fwdActuation(self._model, data)
+        mujoco.mj_fwdAcceleration(self._model, data)
+        mujoco.mj_fwdConstraint(self._model, data)
+        mujoco.mj_sensorAcc(self._model, data)
+
+    def sample(self) -> MechanismSample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        found = super().sample()
+        return replace(found, contact_force=self._contacts.forces(self._scratch))
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        found = super().built()
+        read = self._contacts.read(self._evaluated())
+        told = {f"contact_{name}": value for name, value in read._asdict().items()}
+        if not self._evaluated().ncon:
+            return replace(found, **told)
+        softened, unsaid = dict(found.regularised), dict[str, None]()
+        hard = self._hard(self._evaluated())
+        load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
+        for name, wanted in hard.items():
+            size = float(np.abs(wanted).max()) or np.finfo(float).tiny
+            rest = load / float(np.abs(hard["acceleration"]).max() or np.finfo(float).tiny)
+            difference = float(np.abs(wanted - getattr(found, name)).max()) / size
+            softened[name] = Regularised(_MARGIN * difference + rest, _SOFT)
+            if softened[name].tolerance > CAPS["acceleration"].tolerance:
+                unsaid[name] = None  # the first step of a hop tells nothing of the model
+        return replace(found, **told, **unsaid, regularised=softened)
+
+    def _hard(self, data: Any) -> dict[str, Array]:
+        """Accelerations by MuJoCo's own terms with the hardest contacts, with J̇v and without the cone's lift."""
+        model = self._model
+        kept = int(model.opt.cone), model.pair_solimp.copy()
+        model.opt.cone, model.pair_solimp[:, :2] = mujoco.mjtCone.mjCONE_ELLIPTIC, LARGEST_IMPEDANCE
+        try:
+            mujoco.mj_forward(model, data)
+            self._contacts.add_turning(data)
+            reference = data.efc_aref.copy()
+            for _ in range(_ROUNDS):
+                rates = self._rows(data, data.nefc) @ data.qacc
+                data.efc_aref[:] = reference
+                self._contacts.take_lift(data, rates)
+                mujoco.mj_fwdConstraint(model, data)
+            return self._accelerations(data)
+        finally:
+            model.opt.cone, model.pair_solimp[:] = kept

@@ -1,0 +1,219 @@
+"""Bodies that touch in MuJoCo: shapes, the law of each pair, forces, and what is read back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll.core.engine import EPSILON
+from proofroll.core.errors import InputError, Refused
+from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.kinematics import Tree
+
+MUJOCO = load_engine("mujoco")
+FLOOR = Geometry("floor", "world", "plane", (0, 0, 0.2), normal=(0.1, 0.0, 1.0))
+TILTED = (0.1, 0.2, 0.9, 0.9, 0.3, 0.2, 0.1)
+G = 9.81
+
+
+def preset(name="matched", **options):
+    """Settings of the formulation geoms."""
+    return replace(MUJOCO.presets["geoms"][name], **options)
+
+
+def free(*geometries, pairs, q0=TILTED, v0=(0,) * 6, gravity=(0, 0, -G), bodies=1):
+    """Free bodies b0, b1 … of 2 kg, the second 3 m further, with these geometries and pairs."""
+    solid = {"mass": 2.0, "inertia": (0.02, 0.03, 0.04)}
+    joints = (
+        Joint(f"j{k}", "free", "world", f"b{k}", q0=(q0[0] + 3 * k, *q0[1:]), v0=v0 if not k else (0,) * 6)
+        for k in range(bodies)
+    )
+    names = tuple(Body(f"b{k}", **solid) for k in range(bodies))
+    return Mechanism(names, tuple(joints), geometries=geometries, pairs=pairs, gravity=gravity)
+
+
+def on_floor(*feet, mu=0.3, restitution=0.0, v0=(0,) * 6, height=0.1):
+    """A body on spheres of 2 cm at these places under it, ``height`` above a floor at 0."""
+    floor = Geometry("floor", "world", "plane")
+    spheres = tuple(Geometry(f"f{k}", "b0", "sphere", place, radius=0.02) for k, place in enumerate(feet))
+    pairs = tuple(Pair(f"p{k}", (f"f{k}", "floor"), mu, restitution) for k in range(len(feet)))
+    return free(floor, *spheres, pairs=pairs, q0=(0, 0, height, 1, 0, 0, 0), v0=v0)
+
+
+SLED = ((0.15, 0.10, -0.08), (0.15, -0.10, -0.08), (-0.20, 0.03, -0.08))
+SHAPES = {
+    "sphere": Geometry("shape", "b0", "sphere", (0.1, 0, 0), radius=0.2),
+    "vertex": Geometry("shape", "b0", "sphere", (0.1, 0, 0), radius=0.0),
+    "ellipsoid": Geometry("shape", "b0", "ellipsoid", (0.1, 0, 0), (0.2, 0.3, 0.4), axes=(0.3, 0.2, 0.1)),
+    "circle": Geometry("shape", "b0", "circle", (0.1, 0, 0), radius=0.2, normal=(1, 2, 2)),
+    "box": Geometry("shape", "b0", "box", (0.1, 0, 0), (0.2, 0.3, 0.4), size=(0.3, 0.2, 0.1)),
+}
+
+
+def read_back(mechanism, **options):
+    """Lines of contact of the certificate: largest relative difference of each."""
+    run = MUJOCO.build(mechanism, preset(**options))
+    lines = MechanismElement(mechanism).certify(run.built(), run.sample())
+    return {line.quantity: line.difference for line in lines if "contact" in line.quantity or line.quantity == "gaps"}
+
+
+@pytest.mark.parametrize("kind", SHAPES)
+@pytest.mark.parametrize("order", [("shape", "floor"), ("floor", "shape")])
+def test_shapes_over_a_plane_are_read_back(kind, order):
+    """Gap, normal, place and friction of every shape over a tilted plane are the scene's, either way round."""
+    found = read_back(free(FLOOR, SHAPES[kind], pairs=(Pair("p", order, 0.3),)))
+    assert len(found) == 5
+    assert max(found.values()) < 1e-9
+
+
+def test_spheres_and_moving_planes_are_read_back():
+    """Two spheres, and a sphere over a plane of a moving body, lie in MuJoCo as in the scene."""
+    ball, other = (Geometry(f"s{k}", f"b{k}", "sphere", (0.1, 0, 0), radius=0.2 + 0.1 * k) for k in range(2))
+    plane = Geometry("top", "b1", "plane", (-0.5, 0, 0), normal=(-1, 0.2, 0.1))
+    pairs = (Pair("two", ("s0", "s1"), 0.2, 0.5), Pair("moving", ("top", "s0"), 0.4))
+    found = read_back(free(ball, other, plane, pairs=pairs, bodies=2))
+    assert max(found.values()) < 1e-9
+
+
+def test_wrong_geometry_and_friction_are_told():
+    """A foot moved by a millimetre, a normal turned, and friction off by 1 % contradict the certificate."""
+    pair = Pair("p", ("shape", "floor"), 0.3)
+    mechanism = free(FLOOR, SHAPES["sphere"], pairs=(pair,))
+    wrong = {
+        "places of contact": free(FLOOR, replace(SHAPES["sphere"], position=(0.1, 0.001, 0)), pairs=(pair,)),
+        "normals of contact": free(replace(FLOOR, normal=(0.11, 0, 1.0)), SHAPES["sphere"], pairs=(pair,)),
+        "friction of contacts": free(FLOOR, SHAPES["sphere"], pairs=(replace(pair, friction=0.303),)),
+        "restitution of contacts": free(FLOOR, SHAPES["sphere"], pairs=(replace(pair, restitution=0.1),)),
+    }
+    for quantity, other in wrong.items():
+        run = MUJOCO.build(other, preset())
+        lines = MechanismElement(mechanism).certify(run.built(), run.sample())
+        assert quantity in [line.quantity for line in lines if not line.holds], quantity
+
+
+def test_geoms_have_no_mass():
+    """Mass, centre and inertia stay those of the bodies, whatever is fixed to them."""
+    mechanism = free(FLOOR, SHAPES["box"], pairs=(Pair("p", ("shape", "floor"), 0.3),))
+    built = MUJOCO.build(mechanism, preset()).built()
+    assert built.mass == pytest.approx([2.0], abs=EPSILON["double"])
+    np.testing.assert_allclose(built.com, [[0, 0, 0]], atol=1e-15)
+    np.testing.assert_allclose(built.inertia, [np.diag((0.02, 0.03, 0.04))], atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["default", "matched", "tuned"])
+def test_forces_at_rest_bear_the_weight(name):
+    """Forces on the first geometry's body hold it; turned round, the pair tells those on the floor's side."""
+    mechanism = on_floor(*SLED)
+    run = MUJOCO.build(mechanism, preset(name))
+    run.advance(0.5)
+    force = run.sample().contact_force
+    np.testing.assert_allclose(force.sum(axis=0), (0, 0, 2 * G), atol=1e-4)
+    x, y, _ = np.transpose(SLED)
+    np.testing.assert_allclose(force[:, 2], np.linalg.solve([np.ones(3), x, y], (2 * G, 0, 0)), atol=1e-2)
+    turned = replace(mechanism, pairs=tuple(replace(p, geometries=p.geometries[::-1]) for p in mechanism.pairs))
+    run = MUJOCO.build(turned, preset(name))
+    run.advance(0.5)
+    np.testing.assert_allclose(run.sample().contact_force, -force, atol=1e-9)
+
+
+def test_only_listed_pairs_touch():
+    """A geometry in no pair passes through the floor."""
+    mechanism = on_floor(*SLED)
+    alone = replace(mechanism, pairs=mechanism.pairs[:1])
+    run = MUJOCO.build(alone, preset())
+    run.advance(0.3)
+    foot = touches(mechanism, Tree(mechanism).at(*mechanism.start()))[1].place
+    assert run.sample().p_WB[0, 2] < 0.09
+    assert foot[2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.1, 0.3])
+def test_each_pair_has_its_own_friction(mu):
+    """What slips straight on loses mu g of its speed each second, with the correction of the cone."""
+    run = MUJOCO.build(on_floor(*SLED, mu=mu, v0=(2, 0, 0, 0, 0, 0)), preset("tuned"))
+    run.advance(0.3)
+    assert run.sample().v_WB[0, 0] == pytest.approx(2 - mu * G * 0.3, abs=5e-3)
+
+
+# At rest after 0.7 s, by two routes of 1e-12 m: place of the centre of mass and angle.
+REST = (0.458107051786, 0.048503949880)
+
+
+@pytest.mark.parametrize(
+    ("name", "coarse", "fine"),
+    [
+        ("default", (5e-2, 8e-2), (5e-2, 8e-2)),
+        ("matched", (5e-3, 3e-2), (5e-3, 3e-2)),
+        ("tuned", (4e-4, 2e-3), (4e-5, 2e-4)),
+    ],
+)
+def test_a_convex_cone_and_a_pyramid_have_another_limit(name, coarse, fine):
+    """A sled's place of rest: the pyramid and the convex cone stay off at all steps, the corrected cone converges."""
+    mechanism = on_floor(*SLED, v0=(1.5, 0.3, 0, 0, 0, 6))
+    for dt, (low, high) in ((1e-3, coarse), (1e-4, fine)):
+        run = MUJOCO.build(mechanism, preset(name, dt=dt))
+        run.advance(0.7)
+        assert low < np.hypot(*(run.sample().p_WB[0, :2] - REST)) < high
+
+
+def test_restitution_returns_its_part_of_the_speed():
+    """A ball that falls on the floor leaves it with e times its speed, and its friction throws no slip back."""
+    run = MUJOCO.build(on_floor((0, 0, -0.08), mu=0.0, restitution=0.5, height=0.2), preset(dt=1e-4))
+    run.advance(0.15)  # it touches after 0.143 s
+    fall = np.sqrt(2 * G * 0.1)
+    assert run.sample().v_WB[0, 2] == pytest.approx(0.5 * fall - G * (0.15 - fall / G), abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("pair", "options", "said"),
+    [
+        ({"friction": 1e-6}, {}, "raises a coefficient of friction of 1e-06 to 1e-05"),
+        ({"friction": 2.0}, {"name": "default"}, "cone=pyramidal with friction above 1"),
+        ({"friction": 0.3, "restitution": 0.5}, {"name": "tuned"}, "cone_correction=false"),
+    ],
+)
+def test_what_mujoco_would_change_silently_is_refused(pair, options, said):
+    """Coefficients that MuJoCo cannot hold are refused, each with its reason."""
+    with pytest.raises(Refused, match=said):
+        MUJOCO.build(free(FLOOR, SHAPES["sphere"], pairs=(Pair("p", ("shape", "floor"), **pair),)), preset(**options))
+
+
+def test_planes_that_move_meet_spheres_alone():
+    """A plane of a moving body is a box in MuJoCo, whose contact with an ellipsoid is not exact: it is refused."""
+    plane = Geometry("top", "b1", "plane", (-0.5, 0, 0), normal=(-1, 0, 0))
+    mechanism = free(SHAPES["ellipsoid"], plane, pairs=(Pair("p", ("shape", "top"), 0.3),), bodies=2)
+    with pytest.raises(Refused, match="the plane of p moves with b1"):
+        MUJOCO.build(mechanism, preset())
+
+
+def test_joints_have_no_contact():
+    """The formulation joints refuses bodies that touch."""
+    with pytest.raises(Refused, match="contact between bodies"):
+        MUJOCO.build(on_floor(*SLED), MUJOCO.presets["joints"]["matched"])
+
+
+@pytest.mark.parametrize(
+    ("options", "field"),
+    [
+        ({"cone_correction": True, "integrator": "RK4"}, "integrator"),
+        ({"cone_correction": True, "cone": "pyramidal"}, "cone"),
+        ({"curvature": True}, "curvature"),
+        ({"condim": 6}, "condim"),
+    ],
+)
+def test_settings_without_effect_are_told(options, field):
+    """Options that geoms does not have, or that the correction cannot use, are one line."""
+    with pytest.raises(InputError, match=f"mujoco: {field}"):
+        MUJOCO.build(on_floor(*SLED), preset(**options))
+
+
+def test_a_model_file_holds_geoms_but_no_correction():
+    """MJCF has geoms and pairs; the correction of the cone, made in every step, is refused."""
+    xml = MUJOCO.model_file(on_floor(*SLED), preset())
+    assert xml.count("<pair ") == 3
+    with pytest.raises(Refused, match="cone_correction=false"):
+        MUJOCO.model_file(on_floor(*SLED), preset("tuned"))
