@@ -20,7 +20,7 @@ from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
 from proofroll.engines.mujoco import Mujoco
-from proofroll.engines.mujoco.settings import ORDER_OF_TURNING, PRESETS
+from proofroll.engines.mujoco.settings import OF_MECHANISMS, ORDER_OF_TURNING, PRESETS
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
@@ -28,7 +28,10 @@ from proofroll.running.simulation import build, simulate
 SCENES = scenes()
 CYLINDER, PLANE = "sphere_in_cylinder", "inclined_plane"
 MODELS = [
-    (formulation, preset) for formulation, presets in PRESETS.items() if formulation != "joints" for preset in presets
+    (formulation, preset)
+    for formulation, presets in PRESETS.items()
+    if formulation not in OF_MECHANISMS
+    for preset in presets
 ]
 ON_BOTH = [(formulation, preset) for formulation, preset in MODELS if formulation != "facets"]
 
