@@ -1,1 +1,1 @@
-"""What people and programs read: tables on the terminal, JSON, and one self-contained HTML file."""
+"""Reports for people and programs: tables on the terminal, JSON, and one self-contained HTML file."""

@@ -63,7 +63,7 @@ class Against:
 
     @property
     def sentence(self) -> str:
-        """How much changed, in one sentence."""
+        """Counts of the changes, in one sentence."""
         kinds = [item.kind for item in self.changes]
         words = {
             "verdict": "verdicts",
@@ -79,7 +79,7 @@ class Against:
 
 @dataclass(frozen=True)
 class EarlierReport:
-    """What is read of an earlier report."""
+    """Content of an earlier report."""
 
     path: Path
     date: str
@@ -89,7 +89,7 @@ class EarlierReport:
 
     @classmethod
     def read(cls, path: Path) -> EarlierReport:
-        """From its ``report.json``.
+        """Earlier report from its ``report.json``.
 
         Raises:
             InputError: it cannot be read, or has no long table.
@@ -140,7 +140,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
 
 
 def _runs(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
-    """Lines by quantity of each run; runs of equal settings are told apart by their order."""
+    """Lines by quantity of each run; runs of equal settings are kept apart by their order."""
     rows: dict[tuple[str, str, str], dict[int, dict[str, TableLine]]] = defaultdict(dict)
     for line in lines:
         size = f"{line.resolution} {number(line.step, 6)}" if line.step is not None else ""

@@ -1,4 +1,4 @@
-"""What a kind of element adds to the report of a comparison. Each kind brings it as a plug-in, as it brings itself."""
+"""Additions of a kind of element to the report of a comparison. Each kind brings them as a plug-in."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ OTHER = "other scenes"
 
 
 class ReportKind(Protocol):
-    """What a report shows of scenes of one kind of element besides verdicts and curves.
+    """Additions to the report for scenes of one kind of element, besides verdicts and curves.
 
     Attributes:
         template: in the folder ``templates`` beside the class's module, with the macro
-            ``truth(comparison, number, index, truth)``: what is told of a truth besides its route; empty: nothing.
+            ``truth(comparison, number, index, truth)``: facts of a truth besides its route; empty: none.
         names: further names that the template uses; no other kind has them.
         caption: text below the drawings.
         replay_script: beside the template, what draws its cases of the replay in a browser; empty: it has none. See
@@ -45,7 +45,7 @@ class ReportKind(Protocol):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """Whether it knows the scene's elements."""
+        """True if the kind covers the scene's elements."""
 
     @staticmethod
     def group(scene: Scene) -> str:  # noqa: ARG004 -- for those who tell several apart
@@ -58,12 +58,12 @@ class ReportKind(Protocol):
 
     @staticmethod
     def truth_facts(scene: Scene, dataset: xr.Dataset) -> Any:  # noqa: ARG004 -- for those who have any
-        """What is told of a truth besides its route and error bars: a record, or None."""
+        """Facts of a truth besides its route and error bars: a record, or None."""
         return None
 
     @staticmethod
     def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> Sequence[Any]:  # noqa: ARG004 -- as above
-        """What is told of each run of a comparison besides its verdicts: a record, or None.
+        """Facts of each run of a comparison besides its verdicts: a record, or None.
 
         Args:
             truths: at each point, with their :meth:`truth_facts`.
@@ -74,12 +74,12 @@ class ReportKind(Protocol):
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:  # noqa: ARG004 -- as above
-        """What is drawn over time besides the scene's own observables, and judged within one of them."""
+        """Curves over time besides the scene's own observables, each judged within one of them."""
         return ()
 
     @staticmethod
     def sentences(truths: Sequence[ReportedTruth]) -> Sequence[str]:  # noqa: ARG004 -- as above
-        """What the truths of a comparison say of it."""
+        """Sentences on the truths of a comparison."""
         return ()
 
     @staticmethod
@@ -89,12 +89,12 @@ class ReportKind(Protocol):
 
     @staticmethod
     def replay() -> ReplayKind:
-        """How the replay draws its scenes."""
+        """Drawing of its scenes in the replay."""
 
 
 @cache
 def report_kinds() -> Mapping[str, type[ReportKind]]:
-    """All that some installed package announces, by name."""
+    """All report kinds that installed packages announce, by name."""
     return {point.name: kind for point, kind in loaded(GROUP)}
 
 

@@ -1,4 +1,4 @@
-"""How the report names things: rows, symbols of quantities, steps."""
+"""Names in the report: rows, symbols of quantities, steps."""
 
 from __future__ import annotations
 
@@ -41,12 +41,12 @@ MEANINGS = {
 
 
 def precision_words(precision: str) -> tuple[str, ...]:
-    """How a precision is told beside an engine's settings: double is what nobody asks about."""
+    """Text of a precision beside an engine's settings; empty for double."""
     return ("f32",) if precision == "single" else ()
 
 
 def unjudged(content: ReportedComparison) -> int:
-    """How many runs could not be judged, though their rows expect a verdict."""
+    """Count of runs that could not be judged, though their rows expect a verdict."""
     from proofroll.studies.comparison.expectations import NOBODY
 
     return sum(run.verdict in NOBODY and run.verdict not in content.rows[run.row].expected for run in content.runs)
@@ -66,7 +66,7 @@ def verdict_text(row: ReportedRow) -> str:
 
 
 def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
-    """What a verdict leaves open, in few words; of a row, a run or a judgement."""
+    """Short text on what a verdict leaves open; of a row, a run or a judgement."""
     match entry.verdict:
         case "differs":
             return {"no ladder": "one step only"}.get(entry.limit, str(entry.limit))
@@ -138,7 +138,7 @@ def with_caveat(name: str, caveat: str) -> str:
 
 
 def caveat_lines(rows: Sequence[Setting]) -> list[str]:
-    """What of some settings is not the engine's own: one sentence for each caveat, with the settings that have it."""
+    """Caveats of settings: one sentence for each, with the settings that have it."""
     found: dict[str, list[str]] = {}
     for row in rows:
         if row.caveat:

@@ -28,11 +28,11 @@ class TableLine:
         status, message: how the run ended.
         verdict: of the quantity, of a run without quantities that of the run; empty: none was given.
         limit: what a ladder of steps says of the quantity.
-        quantity, unit, role: what was measured, of which role (:class:`proofroll.core.observable.Role`).
+        quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
         headline: summaries show it.
         error: largest distance from the truth; None: not finite, or there is none.
         truth_error_bar: of the truth, in the same unit.
-        tolerance: largest error that counts as agreement; None: nobody said.
+        tolerance: largest error that counts as agreement; None: not given.
         scale: size of the quantity.
         order: observed order of the time step.
         cost: wall seconds per simulated second.
@@ -91,7 +91,7 @@ class LongTable:
     lines: Sequence[TableLine]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: names of columns once, then the values of each line; ``pandas.DataFrame(**table)`` reads it."""
+        """Names of columns once, then the values of each line, for JSON; ``pandas.DataFrame(**table)`` reads it."""
         return {"columns": COLUMNS, "data": [[getattr(line, name) for name in COLUMNS] for line in self.lines]}
 
     @property

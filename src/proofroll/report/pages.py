@@ -1,4 +1,4 @@
-"""What every page is made with: templates that escape, pictures as elements, and large contents compressed."""
+"""Parts of every page: templates that escape, pictures as elements, and large contents compressed."""
 
 from __future__ import annotations
 

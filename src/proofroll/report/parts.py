@@ -25,7 +25,7 @@ Tell = Callable[[str, int], None]
 
 @dataclass(frozen=True, kw_only=True)
 class PartEntry:
-    """What a report lists of a part.
+    """Entry of a part in a report.
 
     Attributes:
         name, title, question, scene, command: as its ``head`` has them.
@@ -86,11 +86,11 @@ class Part(Protocol):
 
     @staticmethod
     def line(entry: Any) -> str:
-        """What came of it, without its name and a full stop, for the terminal."""
+        """Result in one line, without its name and a full stop, for the terminal."""
 
     @property
     def on_request(self) -> bool:
-        """Whether a report without names leaves it out unless it is kept; as its file says."""
+        """True if a report without names leaves it out unless it is kept; as its file says."""
         return getattr(self.asked, "on_request", False)
 
     @property
@@ -108,7 +108,7 @@ class Part(Protocol):
         """Makes it, with the least effort that says something."""
 
     def entry(self) -> PartEntry:
-        """What is known, with whatever its template needs besides; only after it was made or taken."""
+        """Entry of the part, with the further names of its template; only after it was made or taken."""
 
     def lines(self) -> Sequence[TableLine]:
         """Its runs in the long table; only after it was made or taken."""
@@ -121,7 +121,7 @@ class Part(Protocol):
 
 @cache
 def part_kinds() -> tuple[type[Part], ...]:
-    """All that some installed package announces, in the order of a report."""
+    """All kinds of parts that installed packages announce, in the order of a report."""
     return tuple(sorted((kind for _, kind in loaded(GROUP)), key=lambda kind: kind.order))
 
 
@@ -175,13 +175,13 @@ def attempt(part: Part, action: Callable[[], bool | None]) -> PartEntry | None:
 
 
 def absent(part: Part, reason: str) -> PartEntry:
-    """What the content lists of a part that there is not; one sentence says why, and how to get it."""
+    """Entry of a missing part; one sentence gives the reason, and the command that makes it."""
     missing = f"{' '.join(reason.split()).rstrip('.')}; {part.head['command']} makes it."
     return PartEntry(**part.head, missing=missing)
 
 
 def held(claims: Sequence[Any]) -> str:
-    """How many claims hold, of those that are decided, and how many are not; nothing where nothing is claimed."""
+    """Count of the decided claims that hold, and of the undecided ones; empty without claims."""
     if not claims:
         return ""
     verdicts = [claim.holds for claim in claims]

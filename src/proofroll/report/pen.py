@@ -41,7 +41,7 @@ class View:
         return np.stack([self.scale * p @ right, -self.scale * p @ upright], axis=-1)
 
     def towards(self, direction: npt.ArrayLike) -> FloatArray:
-        """How far a direction points to the viewer, shape (...)."""
+        """Component of a direction towards the viewer, shape (...)."""
         return np.asarray(np.asarray(direction, dtype=np.float64) @ _unit(self.viewer))
 
 
@@ -92,7 +92,7 @@ class Picture:
 
 @dataclass
 class Drawing:
-    """What a picture is made of.
+    """Marks of a picture.
 
     ``look`` of a mark names how it looks: ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``, ``ghost``,
     ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for the filled heads of arrows, and ``letter``,

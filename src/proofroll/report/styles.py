@@ -1,4 +1,4 @@
-"""How a row looks in every figure of a comparison: colour, dashes, width and symbol; never colour alone."""
+"""Look of a row in every figure of a comparison: colour, dashes, width and symbol; never colour alone."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Style:
 
 
 def styles(rows: Sequence[ReportedRow]) -> list[Style]:
-    """For each row: colour by engine, dashes by formulation, width by preset, symbol by its place in the engine."""
+    """Style of each row: colour by engine, dashes by formulation, width by preset, symbol by place."""
     engines = list(dict.fromkeys(row.name for row in rows))
     formulations = {name: list(dict.fromkeys(r.formulation for r in rows if r.name == name)) for name in engines}
     widths = {"default": 1.1, "tuned": 2.4}

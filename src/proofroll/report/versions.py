@@ -19,13 +19,13 @@ _MOST = 12  # sentences of a kind on the terminal; the JSON document has all
 
 
 def heading(content: VersionsStudy) -> str:
-    """What is compared, in one line."""
+    """Subject of the comparison, in one line."""
     old, new = content.old.version, content.new.version
     return f"{content.engine} {old} → {new}: {', '.join(content.comparisons)}"
 
 
 def answer(content: VersionsStudy) -> str:
-    """What changed, in one sentence."""
+    """Summary of the changes, in one sentence."""
     if content.robot is not None:
         said = f"{counted(len(content.changed), 'changes')} in how they hold {content.robot.file}"
         return said if content.changed else f"Both hold {content.robot.file} alike."
@@ -98,7 +98,7 @@ def short(setting: str) -> str:
 
 
 def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
-    """What changed, in sentences; ``!!`` before those that decide the exit code."""
+    """Changes, in sentences; ``!!`` before those that decide the exit code."""
     yield from _some([f"!! {sentence}" for sentence in _changes(content)], most)
     orders = [
         f"{row.comparison}: {short(row.setting)}: observed order of {order.quantity} {order.old:.2f} → {order.new:.2f}"
@@ -117,7 +117,7 @@ def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
 
 
 def _changes(content: VersionsStudy) -> list[str]:
-    """What changed of verdicts, each said once with the points at which it did."""
+    """Changes of verdicts, each once with its points."""
     if content.robot is not None:
         return list(content.changed)
     points: dict[tuple[str, str, str], list[str]] = {}

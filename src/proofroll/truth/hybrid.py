@@ -79,7 +79,7 @@ class Stretch(Generic[ModeT]):
 
 @dataclass(frozen=True)
 class Transition(Generic[ModeT]):
-    """What a route makes of the end of a leg.
+    """Transition of a route at the end of a leg.
 
     Attributes:
         state, mode: of the next leg; no mode: what follows is not known, and the path ends.

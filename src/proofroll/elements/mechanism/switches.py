@@ -49,7 +49,7 @@ class SwitchedJoint:
     restitution: float
 
     def bounds(self, mode: str) -> tuple[float, float]:
-        """Least and greatest force on the coordinate by which this mode can hold it, N or N m."""
+        """Bounds of the force on the coordinate that can hold it in this mode, N or N m."""
         low = -math.inf if mode == "high" else -self.friction
         return low, math.inf if mode == "low" else self.friction
 
@@ -115,9 +115,9 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
 
 
 def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:
-    """How far a solution of :func:`complementary` is from another one, relative to the forces in play.
+    """Distance of a solution of :func:`complementary` from another one, relative to the forces in play.
 
-    Of a force between its bounds the distance from the nearer one, of one at a bound the force that would stop it.
+    For a force between its bounds the distance from the nearer one, for one at a bound the force that would stop it.
     """
     least = math.inf
     for k in range(len(free)):

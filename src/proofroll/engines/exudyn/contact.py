@@ -160,7 +160,7 @@ class PenaltyContact(ExudynModel):
         return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
 
     def numbers(self) -> dict[str, Any]:
-        """What the program of :mod:`reproducer` assigns: the contact as Exudyn holds it."""
+        """Numbers for the program of :mod:`reproducer`: the contact as Exudyn holds it."""
         contact = self.system.GetObject(self.contact)
         return {
             "RADII": [float(radius) for radius in contact["spheresRadii"]],
@@ -193,7 +193,7 @@ class PenaltyContact(ExudynModel):
 
 
 def _impacts(restitution: float | None) -> dict[str, float]:
-    """Arguments of the contact that damp its impacts; none where nothing is said of them."""
+    """Arguments of the contact that damp its impacts; none without a restitution."""
     return {} if restitution is None else {"restitutionCoefficient": max(restitution, DEAD), "impactModel": 2}
 
 
@@ -224,7 +224,7 @@ def _hollow_radius(body: RollingBall) -> float:
 def _softened(
     body: RollingBall, settings: ExudynSettings, creep: FloatArray, press: float, mu: float, hollow: float
 ) -> dict[str, Regularised]:
-    """What differs at time 0: creep, depth, the bound of friction, and forces in which the contact magnifies round-off.
+    """Softened quantities at time 0: creep, depth, the bound of friction, and forces that magnify round-off.
 
     At time 0 the ball slips with ``creep`` [m/s] under the normal force ``press`` [N]; ``mu`` [1] and the radius
     ``hollow`` [m] of the sphere are those that are built.
@@ -266,5 +266,5 @@ def _centre(body: RollingBall, distance: float) -> FloatArray:
 
 
 def _back(gap: float, distance: float) -> float:
-    """Where the centre of the hollow sphere is along e1 from the ball's [m]; of a ball far off, not beyond it."""
+    """Place of the hollow sphere's centre along e1 from the ball's [m]; of a ball far off, not beyond it."""
     return min(gap, 0.5 * distance) - distance

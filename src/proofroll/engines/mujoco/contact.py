@@ -74,14 +74,14 @@ class Resistance:
 
     @classmethod
     def of(cls, body: RollingBall, dt: float) -> Resistance:
-        """That of the scene at the step ``dt`` [s]."""
+        """Resistance of the scene at the step ``dt`` [s]."""
         rolls = 1 + body.ball.inertia_ratio
         x, y, z = (dt / rolls * body.gravity).tolist()
         stopping = rolls * body.ball.mass * body.ball.radius / dt
         return cls(body.contact.rolling_resistance, stopping, (x, y, z))
 
     def stops(self, N: float, speed: float) -> bool:
-        """Whether the whole torque at ``N`` [N] would stop a ball with this speed [m/s] within the step."""
+        """True if the whole torque at ``N`` [N] would stop a ball with this speed [m/s] within the step."""
         return self.stopping * speed <= self.f * N
 
     def apply(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
@@ -103,7 +103,7 @@ class Resistance:
         torque[2] = scale * (v0 * e1_ - v1 * e0)
 
     def stop(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
-        """As :meth:`apply`, of a ball that stops within the step that begins with the velocity ``v`` [m/s].
+        """Torque as :meth:`apply`, of a ball that stops within the step that begins with the velocity ``v`` [m/s].
 
         The moment is no more than ends the motion with the step, or the ball would go back and forth for ever.
         """

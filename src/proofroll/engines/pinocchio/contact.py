@@ -35,7 +35,7 @@ _REPEATS, _SETTLED = 10, 1e-13
 
 
 class Kick(NamedTuple):
-    """What the contact does to the ball around the present time.
+    """Impulse of the contact on the ball around the present time.
 
     Attributes:
         v: joint velocity after it, shape (6,).
@@ -71,7 +71,7 @@ class ContactSteps:
     """
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
-        """At time 0.
+        """Starts at time 0.
 
         Raises:
             Refused: Pinocchio's solver does not find the first impulse.
@@ -114,7 +114,7 @@ class ContactSteps:
         return self.dt if self.started or not self.leapfrog else 0.5 * self.dt
 
     def advance(self, end: float) -> None:
-        """To ``end`` [s].
+        """Advances to ``end`` [s].
 
         Raises:
             Diverged: Pinocchio's solver did not find the impulse.

@@ -1,4 +1,4 @@
-"""What is read back from the formulation ``contact``: state, reactions, what was built, and how far it is softened."""
+"""Results of the formulation ``contact``: state, reactions, the model read back, and its softening."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ class ContactRun(ContactSteps):
 
 
 def _softened(body: RollingBall, steps: ContactSteps) -> dict[str, Regularised]:
-    """What :attr:`proofroll.elements.ball_on_surface.sampling.BallBuilt.regularised` holds."""
+    """Entries of :attr:`proofroll.elements.ball_on_surface.sampling.BallBuilt.regularised`."""
     dt = steps.dt
     impulse = 0.0 if steps.solver == "pgs" else steps.tolerance  # what the solver leaves of a velocity, but round-off
     natural = natural_acceleration(body)

@@ -1,4 +1,4 @@
-"""How cost grows with the one number that a comparison varies."""
+"""Growth of cost with the one number that a comparison varies."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def lines_of(outcome: Outcome) -> list[TableLine]:
 
 
 def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
-    """What is the same in all lines of a run."""
+    """Fields shared by all lines of a run."""
     comparison, said = outcome.comparison, settings_of(run)
     point = outcome.points.get(point_name(run.parameters))
     return TableLine(
@@ -53,7 +53,7 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
 
 
 def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
-    """How a run ended and what it cost; without clean runs as the sampled one tells, beside which others ran."""
+    """End and cost of a run; without clean runs the cost of the sampled one, beside which others ran."""
     cost, done = Cost.of(result.timings), result.status == Status.DONE
     rough = result.wall_seconds / outcome.comparison.until if done and not result.host and result.wall_seconds else None
     return {
@@ -86,7 +86,7 @@ def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> Ta
 
 
 def _of_rung(outcome: Outcome, run: Run, plain: TableLine, rung: LadderRun) -> Iterator[TableLine]:
-    """Lines of a rung; where the question is ill-posed its errors are nobody's, too."""
+    """Lines of a rung; where the question is ill-posed its errors are not judged either."""
     ended = replace(plain, step=rung.value, verdict="", **_ended(outcome, rung.result))
     judged = [item for item in run.judgements if item.observable in rung.errors]
     for item in judged:

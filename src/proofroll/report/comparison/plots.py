@@ -142,7 +142,7 @@ def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray
 
 
 def _curve(truth: xr.Dataset, name: str) -> bool:
-    """Whether a variable is one curve over time; those of several, such as all reactions, are judged and not drawn."""
+    """True if a variable is one curve over time; those of several, as all reactions, are judged and not drawn."""
     return name in truth and truth[name].dims == ("time",)
 
 

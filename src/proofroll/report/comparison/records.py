@@ -1,4 +1,4 @@
-"""What a report says of a comparison, as records; the HTML page and the terminal show nothing that is not in them."""
+"""Records of a comparison in a report; the HTML page and the terminal show nothing else."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Claims:
-    """What is expected of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
+    """Expectations of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
 
     bound: dict[str, str]
     order: dict[str, tuple[float, float]]
@@ -52,7 +52,7 @@ class Claims:
 
     @classmethod
     def of(cls, row: Row) -> Claims:
-        """Those of a row of a comparison file."""
+        """Claims of a row of a comparison file."""
         bound, limit = ({name: in_words(item) for name, item in found.items()} for found in (row.bound, row.limit))
         return cls(bound, row.order, limit, row.except_at, row.only)
 
@@ -124,7 +124,7 @@ class ReportedRow(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class ReportedRun(Setting):
-    """Everything about one run; ``row`` is the number of its row, ``own`` what its kind of scene tells of it."""
+    """Record of one run; ``row`` is the number of its row, ``own`` the record of its kind of scene."""
 
     row: int
     settings: dict[str, Any]
@@ -201,7 +201,7 @@ class ReportedComparison:
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
 
     def runs_of(self, row: int) -> list[ReportedRun]:
-        """Those of one row."""
+        """Runs of one row."""
         return [run for run in self.runs if run.row == row]
 
     def lines(self) -> Iterator[tuple[str, ReportedRow, list[ReportedRun]]]:

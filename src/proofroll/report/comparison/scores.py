@@ -1,4 +1,4 @@
-"""How far each row of a comparison is from the truth over all cases, and which one to use at each accuracy."""
+"""Scores of a comparison's rows: distance from the truth over all cases, and the row to use at each accuracy."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class CheapestRow:
 
 @dataclass(frozen=True)
 class RowAdvice:
-    """What to use for motion, and for motion and forces, from the loosest bound ``within`` to the tightest one."""
+    """Advice for motion, and for motion and forces, from the loosest bound ``within`` to the tightest one."""
 
     within: float
     down_to: float
@@ -75,7 +75,7 @@ class RowAdvice:
 
 
 def recommendation(found: list[Score]) -> list[RowAdvice]:
-    """For each decade of relative error the cheapest row that stays within it at every point.
+    """Cheapest row for each decade of relative error that stays within it at every point.
 
     Decades with the same answer are one entry.
     """

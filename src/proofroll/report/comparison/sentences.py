@@ -1,4 +1,4 @@
-"""What the numbers of a comparison say, in sentences. Written from the data alone."""
+"""Findings of a comparison, as sentences written from the data alone."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Findings:
 
 
 def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Findings:
-    """What a comparison says; its kind of scene adds a sentence about its truths."""
+    """Findings of a comparison; its kind of scene adds a sentence about its truths."""
     found = scores(content)
     return Findings(
         _answer(content, found),
@@ -49,7 +49,7 @@ def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[Repo
 
 
 def _answer(content: ReportedComparison, found: list[Score]) -> str:
-    """What agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
+    """Sentence: what agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
     rows = content.rows
     said = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
@@ -86,7 +86,7 @@ def _joined(parts: list[str]) -> str:
 
 
 def _closest(content: ReportedComparison) -> str:
-    """What agrees best."""
+    """Sentence on the setting that agrees best."""
     best = closest(content)
     if best is None:
         return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
@@ -99,7 +99,7 @@ def _closest(content: ReportedComparison) -> str:
 
 
 def _obvious(content: ReportedComparison, found: list[Score]) -> str:
-    """What a user pays for the obvious model: the default preset against the best of the same engine."""
+    """Price of the obvious model: the default preset against the best of the same engine."""
     rows = content.rows
     worst: tuple[float, Score, Score] | None = None
     lost: list[str] = []
@@ -132,7 +132,7 @@ def _obvious(content: ReportedComparison, found: list[Score]) -> str:
 
 
 def _order(content: ReportedComparison) -> list[str]:
-    """Who has other events than the truth, or in another order; nothing where no order was judged."""
+    """Rows with other events than the truth, or in another order; empty where no order was judged."""
     judged = [
         (run, judgement)
         for run in content.runs
@@ -154,7 +154,7 @@ def _order(content: ReportedComparison) -> list[str]:
 
 
 def _surprises(content: ReportedComparison) -> str:
-    """What contradicts the comparison's expectation."""
+    """Sentence on results that contradict the comparison's expectation."""
     found = content.contradictions
     if found:
         more = f" (and {len(found) - 1} more, listed below)" if len(found) > 1 else ""

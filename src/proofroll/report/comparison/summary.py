@@ -115,7 +115,7 @@ def _row(runs: list[Run]) -> ReportedRow:
 
 
 def _why(runs: list[Run]) -> tuple[str, str]:
-    """Why the worst verdict: ``reason``, empty where everything agrees, and what the ladder says, ``limit``."""
+    """Reason of the worst verdict, empty where everything agrees; and the finding of its ladder, ``limit``."""
     worst = max((run.verdict for run in runs), key=SEVERITY.index)
     guilty: list[tuple[Run, Judgement | None]] = []
     for run in runs:
@@ -136,7 +136,7 @@ def _why(runs: list[Run]) -> tuple[str, str]:
 
 
 def _remarks(runs: list[Run]) -> list[str]:
-    """What was remarked of the runs, and of the observable whose wrong limit is the largest part of its tolerance."""
+    """Remarks on the runs, and on the observable whose wrong limit is the largest part of its tolerance."""
     found = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
@@ -147,7 +147,7 @@ def _remarks(runs: list[Run]) -> list[str]:
 
 
 def _diagnosis(runs: list[Run]) -> list[CauseAt]:
-    """The causes that were proven at some point of the parameters, each told once, with the points."""
+    """Causes that were proven at some point of the parameters, each once, with the points."""
     found: dict[str, CauseAt] = {}
     for run in runs:
         for item in run.diagnosis:

@@ -25,7 +25,7 @@ def observables(content: ReportedComparison) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Expectation:
-    """Settings of which the same is expected; ``further``: claims besides the verdict."""
+    """Settings with one expectation; ``further``: claims besides the verdict."""
 
     names: list[str]
     tolerance: str
@@ -35,7 +35,7 @@ class Expectation:
 
 
 def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
-    """What is expected, settings with the same expectation together."""
+    """Expectations, each with all settings that share it."""
     groups: dict[tuple[str, str, str, tuple[str, ...]], list[str]] = {}
     for name, row in zip(names(rows), rows, strict=True):
         text = " or ".join(row.expected)
@@ -60,7 +60,7 @@ def _where(values: Mapping[str, Sequence[float]]) -> str:
 
 
 def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedRun]]:
-    """For each timed row its name, its slowest and its fastest case."""
+    """Slowest and fastest case of each timed row, with its name."""
     lines = []
     for name, _, runs in content.lines():
         timed = sorted((run.cost.median, at, run) for at, run in enumerate(runs) if run.cost)
@@ -75,7 +75,7 @@ def cost_interval(cost: Cost | None) -> str:
 
 
 def cost_title(cost: Cost | None) -> str:
-    """What a cost is, in a sentence."""
+    """Description of a cost, in a sentence."""
     if not cost:
         return "not timed"
     if cost.confidence is None:
@@ -85,7 +85,7 @@ def cost_title(cost: Cost | None) -> str:
 
 
 def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
-    """Why some quantities of a certificate may differ by more than round-off: reason -> quantities."""
+    """Reasons for quantities of a certificate to differ by more than round-off: reason -> quantities."""
     found: dict[str, list[str]] = {}
     for line in certificate:
         if line["because"]:
@@ -95,7 +95,7 @@ def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Belief:
-    """Of the certificates of a row: how many lines hold, of how many, and the largest difference of round-off.
+    """Evidence from the certificates of a row: lines that hold, all lines, and the largest difference of round-off.
 
     ``soft`` and ``silent`` are quantities that may differ, with a reason, and that are not reported.
     """
@@ -110,7 +110,7 @@ class Belief:
 
 
 def belief(content: ReportedComparison) -> list[Belief]:
-    """Why to believe it: for each row its certificates and its audit of reactions, the worst over all points."""
+    """Evidence for each row: its certificates and its audit of reactions, the worst over all points."""
     lines = []
     audits = [name for name, item in content.observables.items() if item.audit]
     for name, row, runs in content.lines():
@@ -138,5 +138,5 @@ def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
 
 
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
-    """What was remarked of each row, with its name."""
+    """Remarks on each row, with its name."""
     return [(name, text) for name, row, _ in content.lines() for text in row.remarks]

@@ -78,7 +78,7 @@ def overview(content: ReportedComparison, comparison: int) -> Matrix:
 
 
 def counted(content: ReportedComparison) -> str:
-    """How many settings have which verdict, in one line."""
+    """Counts of settings by verdict, in one line."""
     verdicts = [row.verdict.value for row in content.rows]
     said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
     found = "nothing is contradicted" if unjudged(content) else "as expected"

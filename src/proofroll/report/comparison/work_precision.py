@@ -90,7 +90,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
 
 
 def _front(panel: Any, study: TradeoffStudy, quantity: str) -> None:
-    """The Pareto fronts as staircases: what is left of one and below it nobody has."""
+    """Draws Pareto fronts as steps."""
     floor = max(study.quantities[quantity].truth_error_bar or 0.0, _SMALLEST)
     right = max((p.seconds_per_second for p in study.points if p.seconds_per_second), default=1.0)
     for key, colour, words in (

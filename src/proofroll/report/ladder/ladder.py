@@ -1,4 +1,4 @@
-"""What ``proofroll ladder`` says: as records and in sentences."""
+"""Content of ``proofroll ladder``: as records and in sentences."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class TermFound:
 
 @dataclass(frozen=True)
 class KnownTruth:
-    """Where the truth comes from, and its error bar."""
+    """Route of the truth, and its error bar."""
 
     route: str | None
     error_bar: float
@@ -78,7 +78,7 @@ class KnownTruth:
 
 @dataclass(frozen=True)
 class Absence:
-    """How an engine is not there, and why."""
+    """Status of an absent engine, with the reason."""
 
     status: str
     message: str
@@ -192,7 +192,7 @@ def label(row: RungFound | TermFound) -> str:
 
 
 def _findings(content: LadderContent) -> Iterator[str]:
-    """What to take home, in sentences."""
+    """Conclusions of the ladder, in sentences."""
     name, unit = content.quantity, content.unit
     empty = [rung.level for rung in content.rungs if rung.ran.status == "empty"]
     if empty:

@@ -18,7 +18,7 @@ class Candidate:
 
     Attributes:
         name: engine, formulation, setting and step, for a person.
-        motion, forces: largest error of a coordinate, and of a reaction, in parts of its size; None: not told.
+        motion, forces: largest error of a coordinate, and of a reaction, in parts of its size; None: not reported.
         cost: wall seconds per simulated second at the slowest place; None: not measured.
         clean: the cost is that of clean runs.
         blame: verdict of a place without a result; None: every place has one.
@@ -38,7 +38,7 @@ class Candidate:
     message: str
 
     def error(self, forces: bool) -> float | None:
-        """The error that a tolerance bounds; None: something is not told."""
+        """The error that a tolerance bounds; None: something is not reported."""
         if not forces:
             return self.motion
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)

@@ -26,7 +26,7 @@ _SEVERITY = list(Verdict)
 
 
 class ChoiceCell(NamedTuple):
-    """What is shown of an engine in a group of scenes at a tolerance.
+    """Cell of an engine in a group of scenes at a tolerance.
 
     Attributes:
         state: verdict, for colour and glyph; ``none``: nothing was run.
@@ -92,7 +92,7 @@ class ChoiceMatrix:
         return list(dict.fromkeys(row.engine for row in self.rows))
 
     def cell(self, row: ChoiceRow, column: ChoiceColumn, decade: int, forces: bool) -> ChoiceCell:
-        """What is shown at a tolerance of ``10**-decade``."""
+        """Cell at a tolerance of ``10**-decade``."""
         own = [name for name in column.studies if name in row.found]
         cells = [(self.titles[name], _cell(row.found[name], 10.0**-decade, forces)) for name in own]
         return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")

@@ -26,7 +26,7 @@ from proofroll.studies.comparison.outcome import Outcome
 
 @dataclass
 class Report:
-    """What the files are written from.
+    """Content of the report's files.
 
     Attributes:
         compared: what it says of the comparisons.
@@ -48,7 +48,7 @@ class Report:
 
     @property
     def content(self) -> ReportContent:
-        """What it says, with the further studies that there are so far."""
+        """Content of the report, with the further studies that there are so far."""
         said = [(part.key, self._said[id(part)]) for part in self.parts if id(part) in self._said]
         entries = {key: [entry for other, entry in said if other == key] for key in self.compared.entries}
         environment = self.compared.environment

@@ -141,7 +141,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
 
 
 def _unbroken(text: str) -> markupsafe.Markup:
-    """A sentence in which no line ends within a number such as ``1e-3``, where browsers see a hyphen."""
+    """Sentence without line breaks inside numbers as ``1e-3``, where browsers see a hyphen."""
     import markupsafe
 
     return markupsafe.Markup(_EXPONENT.sub(r'<span class="whole">\g<0></span>', str(markupsafe.escape(text))))

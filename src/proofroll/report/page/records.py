@@ -1,4 +1,4 @@
-"""All that the report says, as records."""
+"""Records of the report."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from proofroll.studies.findings import load_findings
 
 @dataclass(frozen=True)
 class ErrorBar:
-    """How well the truth knows a quantity."""
+    """Error bar of a quantity of the truth."""
 
     value: float
     unit: str
@@ -38,7 +38,7 @@ class ErrorBar:
 
 @dataclass(frozen=True)
 class ReportedTruth:
-    """Where the truth at a point comes from and how well it is known; ``own``: what its kind of scene tells of it.
+    """Routes and error bars of the truth at a point; ``own``: the facts of its kind of scene.
 
     Without a trajectory there are no routes and no error bars.
     """
@@ -55,7 +55,7 @@ class ReportedTruth:
 
 @dataclass(frozen=True)
 class ComparisonEvidence:
-    """What a report has of a comparison besides its verdicts."""
+    """Evidence of a comparison in a report besides its verdicts."""
 
     truths: list[ReportedTruth]
     sheet: SceneSheet
@@ -65,7 +65,7 @@ class ComparisonEvidence:
 
 @dataclass(frozen=True)
 class MadeWith:
-    """Where and with what a report was made."""
+    """Command, machine and versions that made a report."""
 
     command: str
     machine: str
@@ -74,7 +74,7 @@ class MadeWith:
 
 @dataclass(frozen=True)
 class KnownFinding:
-    """What is known of an engine."""
+    """Known finding about an engine."""
 
     name: str
     engine: str
@@ -92,7 +92,7 @@ class Sentences:
 
 @dataclass(frozen=True)
 class ReportContent:
-    """All that the report says.
+    """Content of a report.
 
     Attributes:
         date: when it was written.
@@ -126,7 +126,7 @@ class ReportContent:
 
 
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> ReportContent:
-    """All that a report of comparisons says; paths of files are relative to its folder."""
+    """Content of a report of comparisons; paths of files are relative to its folder."""
     comparisons = [_comparison(outcome, store) for outcome in outcomes]
     facts = machine()
     versions = {"proofroll": proofroll.__version__, "python": platform.python_version()}
@@ -163,7 +163,7 @@ def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
 
 
 def _truths(outcome: Outcome, store: Store) -> list[ReportedTruth]:
-    """For each point where the truth comes from and how well it is known."""
+    """Routes and error bars of the truth at each point."""
     found = []
     for name, point in outcome.points.items():
         trajectory = f"{store.folder.name}/{point.file.name}"

@@ -1,4 +1,4 @@
-"""What a comparison's scene is: its drawing, and every parameter with symbol, values, unit, meaning and source."""
+"""Sheet of a comparison's scene: its drawing, and every parameter with symbol, values, unit, meaning and source."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class SceneSheet:
 
 
 def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> SceneSheet:
-    """The sheet of a scene that nobody has loaded; ``points`` are as for :func:`sheet_of`."""
+    """The sheet of a scene that is not loaded yet; ``points`` are as for :func:`sheet_of`."""
     return sheet_of(
         read_scene_file(scene), points, [load_scene(scene, **point) for point in points] or [load_scene(scene)]
     )

@@ -18,11 +18,11 @@ from proofroll.studies.tradeoff.records import TradeoffStudy
 
 
 def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
-    """What agrees best, what does not and says nothing of it, and what to use.
+    """Three sentences: the best agreement, silent disagreement, and advice.
 
     Args:
         comparisons: of the report.
-        entries: of its further studies by the key of their kind, of which ``tradeoffs`` and ``stability`` count.
+        entries: of its further studies by the key of their kind; ``tradeoffs`` and ``stability`` count.
     """
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
     return [_agrees(comparisons), _silent(comparisons, maps), _use(comparisons, entries.get("tradeoffs", ()))]
@@ -57,7 +57,7 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
 
 
 def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityStudy]) -> str:
-    """What is wrong at every step and says nothing, and how many boundaries of stability are passed in silence."""
+    """Sentence on settings that are silently wrong, and on boundaries of stability passed in silence."""
     found = [item for comparison in comparisons for item in _wrong(comparison)]
     silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
@@ -73,7 +73,7 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
 
 
 def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
-    """For each row that differs though each of its runs ended as done: relative error, name, and what is off."""
+    """Rows that differ though each of their runs ended as done: relative error, name, and text of the error."""
     found = []
     for name, row, runs in comparison.lines():
         if row.verdict != "differs" or any(run.status != "done" for run in runs):
@@ -116,6 +116,6 @@ def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) ->
 
 
 def _from_everyday(answer: Answer, study: TradeoffStudy) -> tuple[bool, float]:
-    """How far a tolerance is from the usual one: of the study's own quantity first, and then by its logarithm."""
+    """Distance of a tolerance from the usual one: the study's own quantity first, then by its logarithm."""
     scale = study.quantities[answer.quantity].scale or 1.0
     return answer.quantity != study.quantity, abs(log(answer.tolerance / scale / EVERYDAY))

@@ -1,4 +1,4 @@
-"""What the replay needs in the page besides its own program: three.js, and numbers packed small."""
+"""Parts of the page for the replay besides its own program: three.js, and numbers packed small."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a replay is made of: cases, the runs in them, and their numbers as the page unpacks them."""
+"""Records of a replay: cases, the runs in them, and their numbers as the page unpacks them."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ class Ghost:
 
     @property
     def default(self) -> bool:
-        """Whether it is what a user gets by writing the obvious model."""
+        """True for the settings of the obvious model."""
         return self.settings.get("preset") == "default"
 
     def ending(self, reached: float) -> str:
-        """Why it is not there until the end, where its last frame is at ``reached`` [s]."""
+        """Reason that it is not there until the end, where its last frame is at ``reached`` [s]."""
         return f"until {reached:.3g} s: {self.message or 'it leaves the picture'}"
 
 
@@ -81,7 +81,7 @@ class Replayed:
 
 @dataclass
 class PackedNumbers:
-    """What the page unpacks: names and shapes of arrays, and their numbers one after the other.
+    """Arrays for the page: their names and shapes, and their numbers one after the other.
 
     Attributes:
         arrays: name, number of the run (0: the truth) or -1, width, length, step of each.
@@ -111,7 +111,7 @@ Drawer = Callable[[Replayed], tuple[dict[str, Any], list[int], PackedNumbers]]
 
 
 class ReplayKind(NamedTuple):
-    """How a kind of scene is replayed.
+    """Drawing of a kind of scene in the replay.
 
     Attributes:
         name: under which the page's program knows how to draw it.
@@ -157,7 +157,7 @@ class ReplayCase:
 
 @dataclass(frozen=True)
 class Replay:
-    """Everything that the replay draws.
+    """Content of a replay.
 
     Attributes:
         library: that draws it, from :func:`proofroll.report.replay.library.three`.

@@ -31,9 +31,9 @@ SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 
 
 def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> Replay:
-    """Everything that the replay draws of comparisons, all of scenes of one kind.
+    """Replay of comparisons, all of scenes of one kind.
 
-    There is one case for each truth of the comparisons. Its ghosts are what the engines make of it with ``default``
+    There is one case for each truth of the comparisons. Its ghosts are the engines' runs with ``default``
     settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
     first, of each engine the ``default`` one is shown that is furthest off.
     """
@@ -114,7 +114,7 @@ def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], s
 
 
 def in_sight(off: npt.NDArray[np.bool_]) -> int | None:
-    """How many frames to draw of something that is ``off`` the picture in some: until it leaves it for good, or all."""
+    """Number of frames to draw of a thing that is ``off`` the picture in some: until it leaves for good; None: all."""
     return 1 + int(np.flatnonzero(~off).max(initial=0)) if off[-1] else None
 
 
@@ -141,7 +141,7 @@ def _ghosts(runs: list[tuple[int, Run, Path]], looks: list[tuple[str, int]], tru
 
 
 def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
-    """By engine in the order of the comparisons, the furthest from the truth first; each run once.
+    """Ghosts by engine in the order of the comparisons, the furthest from the truth first; each run once.
 
     All that are ``default``, and of the others the furthest, if it is off by more than ``seen`` [m] or there is none.
     """

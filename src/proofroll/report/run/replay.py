@@ -78,7 +78,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
 
 
 def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Dataset) -> ReplayKind:
-    """What draws an element of the run of a scene; ``alone`` holds no other.
+    """Replay kind that draws an element of the run of a scene; ``alone`` holds no other.
 
     Raises:
         InputError: nothing does, or the run has no poses of it.

@@ -1,4 +1,4 @@
-"""What ``proofroll run`` says."""
+"""Content of ``proofroll run``."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _EVENTS = 8  # of so many the terminal tells; the JSON document has all
 
 @dataclass(frozen=True)
 class RunContent:
-    """A run.
+    """Content of a run.
 
     Attributes:
-        parameters: every parameter of the scene with its value, also those that nobody set.
+        parameters: every parameter of the scene with its value, defaults among them.
         asks: what was wanted besides the motion.
         precision: in which the engine computes, single or double.
         build_seconds: before the first step, with what is compiled [s]; None: nothing was built.
@@ -65,7 +65,7 @@ class RunContent:
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
-    """What came of a case."""
+    """Content of the result of a case."""
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     causes = diagnosed(scene, result.certificate) if result.trajectory is None and result.certificate else []
     content = RunContent(

@@ -59,7 +59,7 @@ def letters(study: StabilityStudy) -> dict[str, str]:
 
 
 def legend(study: StabilityStudy) -> list[str]:
-    """What the cells say, as sentences."""
+    """Legend of the cells, as sentences."""
     kinds = ", ".join(f"{letter} {kind}" for kind, letter in letters(study).items())
     sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
     return [
@@ -167,14 +167,14 @@ def heat_map(study: StabilityStudy) -> HeatMap:
 
 
 def told(point: BoundaryPoint) -> str:
-    """Who was told of a failure: nobody, or before the run, or the engine said so."""
+    """Manner in which a failure was reported: before the run, by the engine, or not at all."""
     if point.failure in NOT_RUN:
         return "before the run"
     return "silent" if point.silent else "says so"
 
 
 def in_words(point: BoundaryPoint) -> str:
-    """All that a cell stands for."""
+    """Full meaning of a cell."""
     words = [f"{name_of(point)} at {point.axis} = {point.value:g}"]
     if point.problem:
         words.append("there is no truth")

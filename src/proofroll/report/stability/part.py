@@ -1,4 +1,4 @@
-"""Where engines stop being right in one scene as a part of a report."""
+"""Stability map of one scene as a part of a report."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class StabilityEntry(PartEntry):
 
 @dataclass
 class StabilityPart(Part):
-    """Where engines stop being right in one scene."""
+    """Stability map of one scene."""
 
     kind: ClassVar[str] = STUDY
     key: ClassVar[str] = "stability"
@@ -63,7 +63,7 @@ class StabilityPart(Part):
 
     @staticmethod
     def line(entry: StabilityEntry) -> str:
-        """How many boundaries are silent, and what holds of what was claimed."""
+        """Count of silent boundaries, and of the claims that hold."""
         study = entry.study
         return f"{study.silent} of {study.boundaries} boundaries are silent{held(entry.claims)}"
 
@@ -86,7 +86,7 @@ class StabilityPart(Part):
 
     @property
     def _quick_axes(self) -> list[Axis]:
-        """Those on which something should happen."""
+        """Axes on which something should happen."""
         return [axis for axis in self.asked.axes if not axis.scale_free]
 
     def entry(self) -> StabilityEntry:

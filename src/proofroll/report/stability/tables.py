@@ -31,7 +31,7 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
 
 
 def headline(study: StabilityStudy) -> str:
-    """How many points, boundaries, and silent ones among them."""
+    """Counts of points, boundaries, and silent ones among them."""
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
     sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
     said = f"{sizes}, {study.silent} of them silent ({counted(study.runs, 'runs')})."

@@ -1,4 +1,4 @@
-"""What goes to a terminal: text of engines and files must not command it."""
+"""Filter for a terminal: text of engines and files must not command it."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def fitted(table: Table, console: Console) -> list[Table]:
 
 
 def _telling(table: Table) -> int:
-    """How many columns from the first on tell all lines apart; 1 where not even all do."""
+    """Number of leading columns that make all lines distinct; 1 where not even all do."""
     lines = list(zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True))
     counts = range(1, len(table.columns))
     return next((count for count in counts if len({line[:count] for line in lines}) == len(lines)), 1)

@@ -95,7 +95,7 @@ def _before(content: ReportedComparison) -> dict[int, float]:
 
 
 def _beyond(item: WorstJudgement) -> float:
-    """How often an error holds its tolerance; what is not finite is shown as such, and not the first to be read."""
+    """Error in units of its tolerance; 0 if it is not finite, which is shown as such and sorted last."""
     return item.error / item.tolerance if math.isfinite(item.error) else 0.0
 
 
@@ -115,7 +115,7 @@ def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
 
 
 def closing_lines(content: ReportedComparison) -> list[str]:
-    """What to look at first, in words."""
+    """Closing lines of a comparison: what to look at first."""
     rows = content.rows
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
@@ -140,7 +140,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
 
 
 def budget_lines(content: ReportedComparison) -> list[str]:
-    """What the processor time did not suffice for, and how to get it."""
+    """Cases that the processor time did not suffice for, and the way to get them."""
     left = content.beyond_budget
     if not left or content.budget is None:
         return []
@@ -157,7 +157,7 @@ def part_lines(content: ReportContent) -> list[str]:
 
 
 def change_lines(found: Against | None) -> list[str]:
-    """What changed since an earlier report, a line for each run; none where there is no earlier one."""
+    """Changes since an earlier report, a line for each run; none without an earlier one."""
     if found is None:
         return []
     head = f"Against {found.old} of {found.date[:10]}. {found.sentence}"
@@ -170,7 +170,7 @@ def change_lines(found: Against | None) -> list[str]:
 
 
 def first_lines(content: ReportContent) -> list[str]:
-    """What to look at first, in at most three sentences; the terminal wraps them."""
+    """Opening sentences, three at most, on what to look at first; the terminal wraps them."""
     entries = content.further
     unexpected = [line for comparison in content.comparisons for line in comparison.contradictions]
     unexpected += [line for entry in entries for line in entry.contradictions]

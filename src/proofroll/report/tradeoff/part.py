@@ -76,7 +76,7 @@ class TradeoffPart(Part):
 
     @staticmethod
     def line(entry: TradeoffEntry) -> str:
-        """How much was measured, and what holds of what was claimed."""
+        """Count of points, and of the claims that hold."""
         return f"{counted(len(entry.study.points), 'points')}{held(entry.claims)}"
 
     def keeps(self, out: Path) -> bool:
@@ -106,7 +106,7 @@ class TradeoffPart(Part):
         )
 
     def lines(self) -> list[TableLine]:
-        """Each error of each point; nobody judges them, for a choice of a tolerance does."""
+        """Lines of each error of each point, without verdicts: the choice of a tolerance judges them."""
         study = self.study
         assert study is not None  # it was made
         scene = self.asked.swept.loaded()
@@ -146,7 +146,7 @@ class TradeoffPart(Part):
 
 
 def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
-    """What to use, of the study's own quantity for the tolerances of its claims, if there are any, else for parts."""
+    """Advice for the study's own quantity at the tolerances of its claims, or else at parts of the scale."""
     own = list({claim.tolerance.value: claim.tolerance for claim in claims.cheapest}.values())
     parts = [Tolerance(part, True) for part in PARTS]
     return [

@@ -26,7 +26,7 @@ _MOST_COLUMNS = 4  # of quantities, where nobody names them
 
 
 def default_quantities(study: TradeoffStudy) -> list[str]:
-    """What decides, and what the elements of the scene say is shown beside it; no more than a terminal has room for."""
+    """Deciding quantity, and the columns that the scene's elements declare; no more than a terminal has room for."""
     decides = [study.quantity] if study.quantity in study.quantities else []  # of the order of events no curve is kept
     beside = (name for name, item in study.quantities.items() if item.column)
     return list(dict.fromkeys([*decides, *beside]))[:_MOST_COLUMNS]
@@ -48,7 +48,7 @@ def cost_of(point: MeasuredPoint) -> str:
 
 
 def effort(study: TradeoffStudy) -> str:
-    """How well speeds are known and where the choices hold, in a sentence or two."""
+    """Sentence or two on the accuracy of speeds and the range in which the choices hold."""
     said = ""
     if study.brief:
         said = (
@@ -62,7 +62,7 @@ def effort(study: TradeoffStudy) -> str:
 
 
 def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
-    """Of each quantity what is named for its tolerances, in a few words, and the advice for each."""
+    """Advice for each quantity, with the named settings in a few words."""
     groups: dict[str, list[Advice]] = {}
     for item in advice:
         groups.setdefault(item.answer.quantity, []).append(item)
@@ -85,13 +85,13 @@ def _ranges(study: TradeoffStudy) -> str:
 def tradeoff_parts(
     study: TradeoffStudy, shown: Sequence[str], path: Path, *, every_point: bool
 ) -> Iterator[Table | str]:
-    """A trade-off: its fronts or all its points, what errors consist of, and what was found.
+    """Parts of a trade-off's text: its fronts or all its points, the makeup of errors, and the findings.
 
     Args:
         study: stored in ``path``, its diagram beside it.
         shown: quantities with a column; the last tables are about the first of them.
         path: see there.
-        every_point: all points are listed, and errors told in sentences too.
+        every_point: all points are listed, and errors described in sentences too.
     """
     if every_point:
         yield point_table(study, study.points, shown, "Every point")
@@ -116,9 +116,9 @@ def point_table(
     title: str,
     ties: Collection[int] = (),
 ) -> Table:
-    """One line per point: what it costs, and its error in each quantity.
+    """Table of points, one line each: its cost, and its error in each quantity.
 
-    ``ties`` are the numbers of points on a front whose cost cannot be told from that of the next.
+    ``ties`` are the numbers of points on a front whose cost is not distinguishable from that of the next.
     """
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
@@ -152,7 +152,7 @@ def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Se
 
 
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
-    """For every point that was run over the range: its error here, and the worst at the corners and where."""
+    """Table of the points that were run over the range: error here, and the worst at the corners with its place."""
     title = f"Over {_ranges(study)}: error of {quantity} [{study.quantities[quantity].unit}]"
     columns = [*unbroken("engine formulation setting", "step"), *numeric("here", "worst"), Column("where")]
     table = plain_table(*columns, title=title)
@@ -175,7 +175,7 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
 
 
 def budget_table(study: TradeoffStudy, quantity: str) -> Table:
-    """For every curve, what its error consists of and what dominates at either end."""
+    """Table of every curve: the makeup of its error, and the dominating part at either end."""
     unit = study.quantities[quantity].unit
     title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
     table = plain_table(

@@ -281,6 +281,6 @@ def _lost(run: Planned, results: dict[str, Result]) -> str:
 
 
 def _has_ladder(run: Planned, curve: FloatArray) -> bool:
-    """Whether small steps could confirm the curve: several were asked for, and there is something to converge."""
+    """True if small steps could confirm the curve: several were asked for, and there is something to converge."""
     resolved = isinstance(run.facts, EngineFacts) and run.facts.resolution is not None
     return resolved and len(run.row.ladder) > 1 and curve.size > 0

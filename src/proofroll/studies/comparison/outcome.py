@@ -1,4 +1,4 @@
-"""What a comparison found: runs with their judgements."""
+"""Outcome of a comparison: runs with their judgements."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All that a comparison found.
+    """Outcome of a comparison.
 
     Attributes:
         comparison: what was asked.
@@ -135,7 +135,7 @@ class Outcome:
 
     @property
     def contradictions(self) -> list[str]:
-        """What the comparison did not expect, as sentences."""
+        """Unexpected results of the comparison, as sentences."""
         return [sentence for run in self.runs for sentence in run.contradictions]
 
     @property

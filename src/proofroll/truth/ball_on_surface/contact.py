@@ -67,7 +67,7 @@ class ContactRates:
         return np.asarray(-friction[0] / size) if size > 0 else np.zeros(3)
 
     def system(self, sticking: bool) -> System:
-        """What the integrator needs."""
+        """System for the integrator."""
         return System(lambda y: self.rates(y, sticking), lambda y: self._jacobian(y, sticking), self.scale)
 
     def rates(self, y: FloatArray, sticking: bool) -> FloatArray:

@@ -124,7 +124,7 @@ class SwitchedBodies:
         return Transition(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
 
     def switched(self, mode: Mode) -> Switched:
-        """What a mode does to the equations."""
+        """Changes of the equations by a mode."""
         pairs = list(zip(self.joints, mode, strict=False))
         held = tuple(joint.number for joint, own in pairs if own in HOLDING)
         stopped = tuple(joint.number for joint, own in pairs if own in STOPPED)
@@ -199,7 +199,7 @@ class SwitchedBodies:
         return best[1], max(best[0], 0.0)
 
     def _kept(self, which: int, mode: str, force: float, acceleration: float, state: Array) -> float:
-        """How far a joint's inequality is from being broken, relative to the forces in play; negative: it is."""
+        """Margin of a joint's inequality, relative to the forces in play; negative: it is broken."""
         joint = self.joints[which]
         if mode in HOLDING:
             low, high = joint.bounds(mode)

@@ -32,7 +32,7 @@ _TURNS = 0.4
 def other_law(
     name: str, says: str, law: Callable[[RollingBall], Law], remedy: str, applies: Callable[[RollingBall], bool]
 ) -> Hypothesis:
-    """That the contact has another law than the scene's, without a number to fit, if the scene has what it is about."""
+    """Hypothesis: the contact has another law than the scene's, with no number fitted, where the law applies."""
 
     @hypothesis(name, "the other law gives the accelerations and forces at every sample, with no number fitted")
     def test(evidence: Evidence) -> Iterator[Cause]:
@@ -48,7 +48,7 @@ def other_law(
     "static friction", "up to the first slip the path is the true one, so the friction that it needs then is the bound"
 )
 def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
-    """The bound of sticking is another than the scene's."""
+    """Hypothesis: the bound of sticking is not the scene's."""
     run, truth, contact = evidence.run, evidence.truth, evidence.element.contact
     if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
         return

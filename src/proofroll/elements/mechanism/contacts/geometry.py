@@ -95,7 +95,7 @@ class Geometry:
 
     @cached_property
     def shapes(self) -> tuple[ConvexShape | HalfSpace, ...]:
-        """What touches, in the body's frame: one shape, or the vertices of a box."""
+        """Touching shapes in the body's frame: one, or the vertices of a box."""
         centre = np.array(self.position)
         if self.kind == "plane":
             return (HalfSpace(centre, np.array(self.normal)),)

@@ -1,4 +1,4 @@
-"""What is told of contacts: gaps, slip, forces; as variables of a run, and as observables."""
+"""Results of contacts: gaps, slip, forces; as variables of a run, and as observables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where and how two bodies touch: gap, normal, the place of contact, and the rates of these."""
+"""Contact of two bodies: gap, normal, the place of contact, and the rates of these."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Moving(NamedTuple):
     w: Array
 
     def velocity(self, place: Array) -> Array:
-        """Of its material at a place in the world [m/s]."""
+        """Velocity of its material at a place in the world [m/s]."""
         return self.v + cross(self.w, place - self.p)
 
 
@@ -45,7 +45,7 @@ class Touching(NamedTuple):
 
 
 def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
-    """How the shapes of a contact lie and move, wherever the bodies are."""
+    """Gap, normal and place of a contact, with their rates, wherever the bodies are."""
     if isinstance(contact.shape_b, HalfSpace):
         assert not isinstance(contact.shape_a, HalfSpace)  # two planes are no contact
         gap, n, n_rate, place, rate = _on_plane(contact.shape_a, a, contact.shape_b, b)
