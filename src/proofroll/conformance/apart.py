@@ -17,8 +17,17 @@ _PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
 _processes: dict[str, ProcessPoolExecutor] = {}
 
 
-def run_apart(engine: Any, key: str, name: str) -> None:
+def run_apart(
+    run: Callable[[Any, str], None], failure_text: Callable[[Exception], str], engine: Any, key: str, name: str
+) -> None:
     """Runs the check of this name in the process for ``key``, which stays for the next one.
+
+    Args:
+        run: runs a check by the engine and the check's name; a function of a module.
+        failure_text: text of a failed check; a function of a module.
+        engine: the engine's class.
+        key: names the process among those of the engine.
+        name: of the check.
 
     Raises:
         AssertionError: it failed there, or the process ended.
@@ -29,7 +38,7 @@ def run_apart(engine: Any, key: str, name: str) -> None:
         _processes[place] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
         atexit.register(_processes[place].shutdown, wait=False, cancel_futures=True)
     try:
-        how, text = _processes[place].submit(_outcome, engine, name).result()
+        how, text = _processes[place].submit(_outcome, run, failure_text, engine, name).result()
     except BrokenProcessPool:
         del _processes[place]
         raise AssertionError("its process ended without a word, as an engine's own crash ends it") from None
@@ -39,15 +48,14 @@ def run_apart(engine: Any, key: str, name: str) -> None:
         raise AssertionError(text)
 
 
-def _outcome(engine: Any, name: str) -> tuple[str, str]:
+def _outcome(
+    run: Callable[[Any, str], None], failure_text: Callable[[Exception], str], engine: Any, name: str
+) -> tuple[str, str]:
     """Outcome of a check with its text, in the process that runs it."""
-    from proofroll.conformance.checks import runs, told
-
-    run: Callable[[], None] = dict(runs(engine))[name]
     try:
-        run()
+        run(engine, name)
     except SkipTest as why:
         return _SKIPPED, str(why)
     except Exception as error:
-        return _FAILED, told(error)
+        return _FAILED, failure_text(error)
     return _PASSED, ""

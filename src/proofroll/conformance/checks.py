@@ -88,7 +88,7 @@ class Check:
         except Exception as error:
             if self.known:
                 raise SkipTest(f"known: {self.known}") from error
-            raise AssertionError(f"{told(error)}\n\nTo reproduce:\n{self.reproducer}") from error
+            raise AssertionError(f"{failure_text(error)}\n\nTo reproduce:\n{self.reproducer}") from error
         if self.known:
             raise AssertionError(f"{self.name} passes, though it is said to fail ({self.known}); take it off the list")
 
@@ -100,7 +100,7 @@ class Check:
         return f"python -c \"{imports}; run_check({name}, '{self.name}')\""
 
 
-def told(error: Exception) -> str:
+def failure_text(error: Exception) -> str:
     """Text of a failed check for a person."""
     if isinstance(error, UnlikeSceneError):
         return explained(error)
@@ -120,7 +120,10 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
     patterns = dict(known or {})
     all_runs = runs(engine)
     if apart:
-        all_runs = ((name, partial(run_apart, engine, _of_one_process(engine, name), name)) for name, _ in all_runs)
+        all_runs = (
+            (name, partial(run_apart, _run, failure_text, engine, _of_one_process(engine, name), name))
+            for name, _ in all_runs
+        )
     selected = [
         Check(engine, name, next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""), run)
         for name, run in all_runs
@@ -129,6 +132,10 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
         if not any(_fits(check.name, pattern) for check in selected):
             raise ValueError(f"no check of {engine.__name__} fits {pattern!r}")
     return selected
+
+
+def _run(engine: Any, name: str) -> None:
+    dict(runs(engine))[name]()
 
 
 def _fits(name: str, pattern: str) -> bool:

@@ -134,7 +134,7 @@ class ContactBodies:
         return self._impact(leg, k)
 
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        """What an impact makes of the motion."""
+        """Transition of the motion by an impact."""
         state, law = leg.last, self.contacts[hit].restitution
         found = self.equations.at(state)
         speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
@@ -194,7 +194,7 @@ class ContactBodies:
         return self._tried(found, closed, still, trial)[1:]
 
     def _balanced(self, found: BodiesState) -> bool:
-        """Whether forces within the cones of friction hold everything where it is, when nothing moves."""
+        """True if nothing moves and forces within the cones of friction hold everything in place."""
         from scipy.optimize import nnls
 
         if np.abs(found.u).max() > _AT_REST:
@@ -226,7 +226,7 @@ class ContactBodies:
         return state, solution, kept
 
     def _own(self, found: BodiesState, closed: Sequence[bool]) -> list[Acting]:
-        """Of each contact that is closed: whether it can slide along a line only."""
+        """Mode of each contact, closed ones with their line if they can slide along a line only."""
         made = []
         root = np.linalg.cholesky(found.mass)
         joints = np.linalg.solve(root, found.C.T)
@@ -270,7 +270,7 @@ class ContactBodies:
         return best[2], best[3], max(best[0], 0.0)
 
     def _candidates(self, k: int, own: Acting, still: bool, found: BodiesState) -> Iterator[Acting]:
-        """All that a contact may do."""
+        """Modes that a contact may have next."""
         yield OPEN
         if own.kind == "open":
             return
@@ -330,7 +330,7 @@ class ContactBodies:
         return None
 
     def _kept(self, k: int, own: Acting, still: bool, found: BodiesState, solution: BodiesSolution) -> float:
-        """How far a contact's inequalities are from being broken, relative; negative: one is."""
+        """Relative margin of a contact's inequalities; negative: one is broken."""
         each, mu = found.touching[k], float(self.equations.friction[k])
         size_f, size_s = float(np.abs(solution.force).max()), float(np.abs(solution.slide).max()) or 1.0
         if own.kind == "open":
@@ -352,7 +352,7 @@ class ContactBodies:
         return self.equations.applied(found, self.equations.accelerated(found, mode).force)
 
     def _stands(self, state: Array, mode: ContactMode) -> bool:
-        """Whether nothing moves, and nothing will."""
+        """True if nothing moves, and nothing will."""
         found = self.equations.at(state)
         if np.abs(found.u).max() > _AT_REST or any(own.kind == "slip" for own in mode):
             return False
@@ -367,7 +367,7 @@ class ContactBodies:
 
 
 def _held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
-    """What closed contacts hold: three directions of those that stand, one of others."""
+    """Modes of closed contacts: stick for those that stand, slip for the others."""
     return tuple(
         Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
     )

@@ -73,7 +73,7 @@ class ContactEquations:
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
 
     def at(self, state: Array) -> BodiesState:
-        """Everything at a state as :meth:`NumericEquations.rate` has it."""
+        """Bodies at a state, as :meth:`NumericEquations.rate` has them."""
         e = self.equations.equations
         found, C, bias, half, force = self.equations.loaded(state)
         bodies = []

@@ -1,4 +1,4 @@
-"""What ends a stretch of contacts, for both routes: values that are negative while what they do lasts."""
+"""Guards that end a stretch of contacts, for both routes: values that are negative while a mode lasts."""
 
 from __future__ import annotations
 

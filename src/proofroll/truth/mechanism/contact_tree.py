@@ -125,7 +125,7 @@ class ContactTree:
         return Acting("slip", (x, y, z), (x, y, z))
 
     def _struck(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        """What an impact makes of the motion."""
+        """Transition of the motion by an impact."""
         contacts, dynamics = self.contacts, self.dynamics
         q, v = self._parts(leg.last)
         found = dynamics.at(q, v).touching
@@ -176,7 +176,7 @@ class ContactTree:
         return Transition(state, mode, said, np.inf if delay else min(margin, sure), delay)
 
     def _stands(self, state: Array, mode: ContactMode) -> bool:
-        """Whether nothing moves, and nothing will."""
+        """True if nothing moves, and nothing will."""
         q, v = self._parts(state)
         if np.abs(v).max() > _AT_REST or any(own.kind == "slip" for own in mode):
             return False

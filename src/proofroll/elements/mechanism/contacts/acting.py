@@ -1,4 +1,4 @@
-"""What a contact does between two changes."""
+"""Mode of a contact between two changes: open, slip or stick."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TURNED = 0.5  # cosine by which the line of a slip may turn
 
 
 class Acting(NamedTuple):
-    """What one contact does.
+    """Mode of one contact.
 
     Attributes:
         kind: ``open``, ``slip`` or ``stick``.
@@ -36,7 +36,7 @@ OPEN = Acting("open")
 
 
 def kinds(mode: ContactMode) -> tuple[str, ...]:
-    """What each contact does, without directions."""
+    """Kind of each contact's mode, without directions."""
     return tuple(own.kind for own in mode)
 
 
@@ -72,7 +72,7 @@ def held_directions(own: Acting, found: Touching) -> Array:
 
 
 def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array, G: Array) -> Acting:
-    """What a contact begins to do.
+    """Mode in which a contact begins.
 
     Args:
         kind: see :class:`Acting`.

@@ -64,7 +64,7 @@ def solved(
 def sure(
     G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], names: Sequence[str]
 ) -> tuple[Array, list[Outcome], bool]:
-    """As :func:`solved`, and whether a little more load or less friction would do the same."""
+    """Solution as :func:`solved`, and True if a little more load or less friction gives the same outcome."""
     force, done = solved(G, c, friction, sliding, names)
     nudge = _NUDGE * float(np.abs(c).max()) * np.tile([1.0, 0.0, 0.0], len(friction))
     beside = (solved(G, c + side * nudge, friction * (1 - side * _NUDGE), sliding, names)[1] for side in (1.0, -1.0))
@@ -84,7 +84,7 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tup
         return held, "stick"
 
     def across(angle: float) -> float:
-        """How far the slip is from the direction that friction is against."""
+        """Component of the slip across the direction that friction is against."""
         t = np.array([np.cos(angle), np.sin(angle)])
         w = c + G @ _pressing(G, c, mu, t, name)
         return float(w[2] * t[0] - w[1] * t[1])

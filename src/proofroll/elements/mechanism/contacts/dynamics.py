@@ -27,7 +27,7 @@ from proofroll.elements.mechanism.signal import varies
 
 @dataclass(frozen=True)
 class ContactsNow:
-    """Everything about the contacts at one state, whatever they do.
+    """Facts of the contacts at one state, in any mode.
 
     Attributes:
         solution: of the mechanism without forces of contact.
@@ -254,7 +254,7 @@ class ContactDynamics:
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
     def sample(self, q: Array, v: Array, mode: ContactMode) -> tuple[dict[str, Any], Array]:
-        """What a record holds at one time, and the forces of contact, (contacts, 3), NaN where not determinate."""
+        """Fields of a record at one time, and the forces of contact, (contacts, 3), NaN where not determinate."""
         found = self.solve(q, v, mode)
         load = np.einsum("kin,ki->n", found.state.J, found.force)
         applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
