@@ -204,12 +204,12 @@ def _follower(
 
     So what Exudyn is asked is looked up once.
     """
-    output, move = system.GetNodeOutput, system.SetMarkerParameter
+    output, move, farthest = system.GetNodeOutput, system.SetMarkerParameter, 0.5 * distance
 
     def follow(system: Any, t: float, newton_iteration: int, discontinuous_iteration: int) -> None:  # noqa: ARG001 -- Exudyn's signature
         x, y, z = output(node, POSITION).tolist()
         gap, e1x, e1y, e1z = nearby(x, y, z)
-        back = _back(gap, distance)
+        back = (gap if gap < farthest else farthest) - distance
         move(marker, "localPosition", [x + back * e1x, y + back * e1y, z + back * e1z])
 
     return follow
