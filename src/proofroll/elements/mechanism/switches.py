@@ -137,6 +137,24 @@ def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
     return load
 
 
+def left_by(mode: str) -> str:
+    """The event of a joint that leaves what held it."""
+    return "slip" if mode == "stick" else "lift_off"
+
+
+def changes(joints: Sequence[SwitchedJoint], before: Mode, after: Mode) -> tuple[tuple[str, str], ...]:
+    """Events of joints that come to be held, turn, or are set free by a change of mode."""
+    found = []
+    for joint, was, now in zip(joints, before, after, strict=False):
+        if now in HOLDING and was not in HOLDING:
+            found.append(("stick" if now == "stick" else "rest", joint.name))
+        elif was in HOLDING and now not in HOLDING:
+            found.append((left_by(was), joint.name))
+        elif was != now and was not in HOLDING:
+            found.append(("turn", joint.name))
+    return tuple(found)
+
+
 def held_by(mode: Mode) -> list[int]:
     """Numbers, among the switched joints, of those that are held."""
     return [number for number, own in enumerate(mode) if own in HOLDING]

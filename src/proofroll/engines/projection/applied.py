@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.connections import SKEW, Bodies, Ends
 
 _TURN = 2 * math.pi
@@ -45,6 +46,15 @@ class Applied:
             if joint.kind == "spherical" and joint.damping
         ]
         self.laws = bool(self._laws or self._balls)
+        # dry friction and stops: coordinates to look at, without a law of their own here
+        self._watched = [
+            _Law(
+                joint.number, "slide" if mechanism.joints[joint.number].kind == "prismatic" else "z", 0.0, 0.0, 0.0, 0.0
+            )
+            for joint in switched_joints(mechanism)
+        ]
+        turning = [law for law in self._watched if law.axis != "slide"]
+        self._angles |= {law: mechanism.joints[law.connection].q0[0] for law in turning}
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
         self._springs = [
             (spring, (a, np.append(spring.position_a - com[a], 1.0)), (b, np.append(spring.position_b - com[b], 1.0)))
@@ -84,6 +94,18 @@ class Applied:
         for c, damping in self._balls:
             torque[c] -= damping * w[c]
         return force, torque
+
+    def watched(self, ends: Ends) -> list[tuple[float, float]]:
+        """Coordinate and velocity of each joint with dry friction or stops."""
+        return [(self._coordinate(law, ends), self._rate(law, ends)) for law in self._watched]
+
+    @staticmethod
+    def _rate(law: _Law, ends: Ends) -> float:
+        c = law.connection
+        direction = ends.B[c, :, 0] if law.axis == "x" else ends.A[c, :, 2]
+        w = 0.5 * ends.relative[c, :3, :3].ravel() @ SKEW.T
+        rate: float = direction @ (ends.e[c] if law.axis == "slide" else w)
+        return rate
 
     def _coordinate(self, law: _Law, ends: Ends) -> float:
         """Angle [rad], on the branch nearest to the last accepted one, or distance [m]."""

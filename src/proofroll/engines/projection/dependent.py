@@ -15,6 +15,7 @@ Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.projection.applied import Applied
 from proofroll.engines.projection.connections import SKEW, Bodies, ConnectionRows, ProjectedConnections
-from proofroll.engines.projection.elimination import Elimination, Loads, LoopSplit, Space
+from proofroll.engines.projection.elimination import Closing, Elimination, Loads, LoopSplit, Space, solved
 
 
 class SolvedState(NamedTuple):
@@ -54,6 +55,7 @@ class DependentCoordinates:
         mass, inertia: of the bodies, about their centres of mass and along their axes.
         com: in their frames.
         rank: number of independent rows.
+        nq, nv: numbers of coordinates and of velocities of the tree.
         gravity: acceleration of it.
         start: the state at time 0.
         regularity: of the rows of loops where the equations were solved last: the least singular value that counts
@@ -65,6 +67,7 @@ class DependentCoordinates:
         self.inertia = np.array([body.inertia for body in mechanism.bodies])
         self.com = np.array([body.com for body in mechanism.bodies])
         self._count, self._joints = len(self.mass), len(mechanism.joints)
+        self.nq, self.nv = mechanism.nq, mechanism.nv
         self.connections = connections = ProjectedConnections(mechanism)
         self.tree = elimination(mechanism, connections)
         self.applied = Applied(mechanism)
@@ -117,8 +120,14 @@ class DependentCoordinates:
         own[:n, :3, 3:] = back @ v[:, :, None]
         return Bodies(pose, inverse, own, pose @ own @ inverse, origin)
 
-    def solve(self, x: Array) -> SolvedState:
-        """Projections of the equations of motion at a state."""
+    def solve(self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None) -> SolvedState:
+        """Projections of the equations of motion at a state.
+
+        Args:
+            x: the state.
+            drives: further forces along the velocities ν, (nv,).
+            closing: of a tree what its velocities are, if not those of free joints.
+        """
         bodies, joints = self.bodies(x), self._joints
         pose, inverse, own = bodies.pose[:-1], bodies.inverse[:-1], bodies.own[:-1]
         bent = own @ own
@@ -126,14 +135,14 @@ class DependentCoordinates:
         of_a, of_b = bodies.twist[self.connections.a], bodies.twist[self.connections.b]
         # rates of relative twists that stand still in body a
         still = (of_a @ of_b - of_b @ of_a).reshape(-1, 16)
-        relative, loads, closing = still[:joints], Loads(bent), None
+        relative, loads = still[:joints], Loads(bent, drives=drives)
         if self._bent or self.applied.laws:
             ends = self.connections.ends(bodies, slice(0, joints))
             if self._bent:
                 rows = self._joint_rows.at(ends)
                 relative = relative - self._joint_rows.twists(rows, self._joint_rows.bending(ends, rows))
             if self.applied.laws:
-                loads = loads._replace(drives=self.tree.of_joints(bodies, *self.applied.of_joints(ends)))
+                loads = loads._replace(drives=drives + self.tree.of_joints(bodies, *self.applied.of_joints(ends)))
         if self.applied.springs:
             loads = loads._replace(pulls=self.applied.pulls(bodies))
         if self._locked:
@@ -157,10 +166,35 @@ class DependentCoordinates:
         velocities, multipliers = split(push.T, (wanted - of_given).T)
         return velocities.T, multipliers.T
 
-    def rates(self, x: Array) -> Array:
-        """ẋ."""
+    def responses(self, x: Array, drives: Array, at: Sequence[int]) -> tuple[Array, Array]:
+        """ν̇ of a tree at a state, (nv,), and what unit forces along some of the velocities add, (nv, forces)."""
+        found = np.zeros((len(drives), 1 + len(at)))
+
+        def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+            found[:] = solved(space.H, np.column_stack([push, np.eye(len(push))[:, at]]))
+            return found[:, 0], np.zeros(0)
+
+        self.solve(x, drives, closing)
+        return found[:, 0], found[:, 1:]
+
+    def pushed(self, x: Array, change: Array) -> Array:
+        """The state after a change of the velocities ν, (nv,)."""
+        bodies, x = self.bodies(x), x.copy()
+        motion = self.tree.twists(bodies, change)[:-1]
+        pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
+        _, _, v, w = self.parts(x)
+        v += (motion @ pose[:, :, 3:])[:, :3, 0]
+        w += 0.5 * (inverse @ motion @ pose)[:, :3, :3].reshape(-1, 9) @ SKEW.T
+        return x
+
+    def watched(self, x: Array) -> list[tuple[float, float]]:
+        """Coordinate and velocity of each joint with dry friction or stops."""
+        return self.applied.watched(self.connections.ends(self.bodies(x), slice(0, self._joints)))
+
+    def rates(self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None) -> Array:
+        """ẋ; for the arguments see :meth:`solve`."""
         _, q, v, w = self.parts(x)
-        found = self.solve(x)
+        found = self.solve(x, drives, closing)
         return _joined(v, quaternion_rates(q, w), found.linear, found.angular)
 
     def eliminated(self, x: Array) -> Array:

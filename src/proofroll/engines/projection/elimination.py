@@ -9,7 +9,7 @@ on differences of two twists, and are few: their singular vectors in the metric 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -155,6 +155,10 @@ class Elimination:
         velocities, multipliers = (closing or _without_loops)(space, given, push)
         return given + _matrices(self.moves @ (space.S * velocities[..., None])), multipliers
 
+    def twists(self, bodies: Bodies, velocities: Array) -> Array:
+        """Twists of the bodies for velocities (nv,), (bodies + 1, 4, 4)."""
+        return _matrices(self.moves @ (_flat(self.directions(bodies)) * velocities[:, None]))
+
     def of_joints(self, bodies: Bodies, force: Array, torque: Array) -> Array:
         """Forces and moments of joints on their children (joints, 3), along the velocities, (nv,)."""
         S = self.directions(bodies)
@@ -198,11 +202,41 @@ class LoopSplit:
 
 
 def _without_loops(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
-    from scipy.linalg.lapack import dposv
-
     if not push.size:  # fixed joints alone
         return push, np.zeros(0)
-    _, found, failed = dposv(space.H, push.T)
+    return solved(space.H, push.T).T, np.zeros(0)
+
+
+def solved(H: Array, push: Array) -> Array:
+    """ν of H ν = push, of one or several right-hand sides (nv, …); H by its upper triangle.
+
+    Raises:
+        LinAlgError: H is not positive definite.
+    """
+    from scipy.linalg.lapack import dposv  # here: whoever runs a ball need not wait for it
+
+    _, found, failed = dposv(H, push)
     if failed:
         raise np.linalg.LinAlgError("the mass matrix is not positive definite")
-    return np.asarray(found.T), np.zeros(0)
+    return np.asarray(found)
+
+
+class Held:
+    """Velocities without some directions, which are held; see :data:`Closing`.
+
+    Attributes:
+        force: along each of these, that holds it.
+    """
+
+    def __init__(self, held: Sequence[int]) -> None:
+        self._held, self.force = list(held), np.zeros(len(held))
+
+    def __call__(self, space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+        """Velocities (nv,), those held zero."""
+        free = np.setdiff1d(np.arange(len(push)), self._held)
+        H = space.H + np.triu(space.H, 1).T
+        velocities = np.zeros(len(push))
+        if len(free):
+            velocities[free] = solved(H[np.ix_(free, free)], push[free])
+        self.force = H[self._held] @ velocities - push[self._held]
+        return velocities, np.zeros(0)

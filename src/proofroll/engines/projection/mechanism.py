@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.integrators import INTEGRATORS
+from proofroll.core.events import Event
+from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, independent, mechanism_of
-from proofroll.engines.projection.dependent import DependentCoordinates
+from proofroll.elements.mechanism.switches import switched_joints
+from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
+from proofroll.engines.projection.joint_modes import SwitchedMotion
 from proofroll.engines.projection.recursion import compiled
 from proofroll.engines.projection.settings import ProjectionSettings
+from proofroll.engines.projection.stepping import STEPPERS
 
-PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
+PROVIDES = frozenset(
+    ALL_JOINTS
+    | ALL_LOOPS
+    | FORCES
+    | {
+        MechanismCapability.REDUNDANT,
+        MechanismCapability.JOINT_FRICTION,
+        MechanismCapability.STOPS,
+        MechanismCapability.REBOUNDS,
+    }
+)
 LACKING: Mapping[str, str] = {
-    MechanismCapability.JOINT_FRICTION: "these equations have no law that switches",
     MechanismCapability.ARMATURE: "the mass matrix of dependent coordinates is that of the bodies alone",
 }
 # Regularity of the loops' rows over the largest on the way: accelerations lose as many digits as it has zeros. Loops
@@ -35,6 +48,11 @@ class ProjectionMechanism:
     def __init__(self, scene: Any, settings: ProjectionSettings) -> None:
         mechanism = mechanism_of(scene)
         require(mechanism, PROVIDES, LACKING)
+        switched = switched_joints(mechanism)
+        if switched and mechanism.loops:
+            raise Refused("dry friction and stops are followed in trees of joints, and this mechanism has loops")
+        if switched and settings.equations == "compiled":
+            raise Refused("equations that switch are not compiled; choose preset=matched")
         for body in mechanism.bodies:
             if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
                 raise Refused(
@@ -44,10 +62,16 @@ class ProjectionMechanism:
         self._eliminates, self._most_regular = settings.eliminates, 0.0
         start = self._equations.start
         resolution = float(getattr(settings, settings.resolution))
-        integrator = INTEGRATORS[settings.integrator]
         equations = self._equations
         in_numpy = equations.rates, equations.eliminated
         rates, self._without_violations = compiled(mechanism) if settings.equations == "compiled" else in_numpy
+        self._switched: SwitchedMotion | None = None
+        self._motion: Integrator | SwitchedMotion
+        if switched:
+            stepper = STEPPERS[settings.integrator](resolution)
+            self._motion = self._switched = SwitchedMotion(self._equations, switched, stepper, self._accepted)
+            return
+        integrator = INTEGRATORS[settings.integrator]
         self._motion = integrator(rates, self._accepted, start, np.ones(len(start)), resolution)
 
     def _accepted(self, t: float, x: Array) -> Array:
@@ -72,10 +96,17 @@ class ProjectionMechanism:
         except Stalled as error:
             raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
+    def _solved(self, x: Array) -> SolvedState:
+        return self._switched.solve(x)[0] if self._switched else self._equations.solve(x)
+
+    def events(self) -> Sequence[Event]:
+        """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
+        return tuple(self._switched.events) if self._switched else ()
+
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._motion.x
-        solved = equations.solve(x)
+        solved = self._solved(x)
         force, torque = equations.reactions(solved)
         r, q, v, _ = equations.parts(x)
         R, w = solved.bodies.rotation, solved.bodies.spin
@@ -92,7 +123,7 @@ class ProjectionMechanism:
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         equations = self._equations
-        solved = equations.solve(self._motion.x)
+        solved = self._solved(self._motion.x)
         bodies, count, joints = solved.bodies, len(equations.mass), len(self._mechanism.joints)
         R, w = bodies.rotation, bodies.spin
         arm = np.einsum("nij,nj->ni", R, equations.com)

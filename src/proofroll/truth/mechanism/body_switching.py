@@ -12,15 +12,13 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint, changes, left_by
 from proofroll.truth.hybrid import Stretch, Transition, walked
 from proofroll.truth.mechanism.joint_switching import (
     SETTLED,
-    changes,
     effort_event,
     guard_values,
     guards_of,
-    left_by,
     noise_of,
 )
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations

@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.drives import MODES, Actuator
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, held_by
+from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, held_by, left_by
 from proofroll.truth.hybrid import Stretch, Transition, walked
 
 Motors = tuple[Actuator, ...]
@@ -226,21 +226,3 @@ def noise_of(
         leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))
         found.append(_DIGITS * float(np.spacing(max(1.0, abs(at)))) if leaves and at is not None else 0.0)
     return np.array(found)
-
-
-def left_by(mode: str) -> str:
-    """The event of a joint that leaves what held it."""
-    return "slip" if mode == "stick" else "lift_off"
-
-
-def changes(joints: tuple[SwitchedJoint, ...], before: Mode, after: Mode) -> tuple[tuple[str, str], ...]:
-    """Events of joints that come to be held, turn, or are set free by a change of mode."""
-    found = []
-    for joint, was, now in zip(joints, before, after, strict=False):
-        if now in HOLDING and was not in HOLDING:
-            found.append(("stick" if now == "stick" else "rest", joint.name))
-        elif was in HOLDING and now not in HOLDING:
-            found.append((left_by(was), joint.name))
-        elif was != now and was not in HOLDING:
-            found.append(("turn", joint.name))
-    return tuple(found)
