@@ -89,7 +89,9 @@ class Jointed:
     """A tree of joints with one coordinate each, in these coordinates; says nothing of reactions."""
 
     name: ClassVar[str] = "jointed"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(_FORMULATIONS, Projection.provides["dependent"])
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(
+        _FORMULATIONS, Projection.provides["dependent"] - {"dry friction in joints", "stops of joints"}
+    )
     settings: ClassVar[type[Any]] = HonestSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = Rolling.presets
 

@@ -14,9 +14,11 @@ import numpy as np
 
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
+from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import (
     HOLDING,
+    STOPPED,
     Mode,
     SwitchedJoint,
     changes,
@@ -76,6 +78,16 @@ class SwitchedMotion:
         """Equations of motion at a state in the present mode, and the forces that hold joints."""
         held = Held(self._held)
         return self._equations.solve(x, self._load(self.mode), held), held.force
+
+    def along_joints(self, count: int) -> dict[str, Array]:
+        """Forces of dry friction and of stops along the coordinates of all joints."""
+        held = self.solve(self.x)[1]
+        forces = dict(zip(held_by(self.mode), held.tolist(), strict=True))
+        found = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
+        for k, (joint, own) in enumerate(zip(self._joints, self.mode, strict=True)):
+            on = on_joint(own in STOPPED, joint.friction, forces.get(k, joint.push(own)))
+            found["friction"][joint.number], found["stop"][joint.number] = on
+        return found
 
     def _load(self, mode: Mode) -> Array:
         return load_of(self._joints, mode, self._equations.nv)

@@ -118,6 +118,7 @@ class ProjectionMechanism:
             q_WB=q / np.linalg.norm(q, axis=1, keepdims=True),
             joint_force=force,
             joint_torque=torque,
+            **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
         )
 
     def built(self) -> MechanismBuilt:
