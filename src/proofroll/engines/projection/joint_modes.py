@@ -135,7 +135,7 @@ class SwitchedMotion:
         return [(k, kind) for k, kind, excess, closing in self._excess(x) if excess > 0 and closing]
 
     def _excess(self, x: Array) -> list[tuple[int, str, float, bool]]:
-        """How far each mode is beyond each of its ends, which counts where it closes in on it.
+        """Excess of each mode over each of its ends, and whether it moves towards it.
 
         ``up``, ``down``: the force that holds is beyond its bound, and the joint moves so; ``still``: a joint that
         moves against friction has turned; ``low``, ``high``: it is beyond a stop.
@@ -156,7 +156,7 @@ class SwitchedMotion:
         return found
 
     def _crossing(self, k: int, kind: str) -> tuple[float, int, str]:
-        """When a mode ended within the last step; just after."""
+        """Time just after a mode ended within the last step, with that mode's joint and end."""
         stepper = self._stepper
         begun, low, high = stepper.t_before, stepper.t_before, stepper.t
 
