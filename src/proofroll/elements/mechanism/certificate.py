@@ -106,7 +106,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
 def _compare_contacts(
     element: MechanismElement, built: MechanismBuilt, compare: Callable[[str, str, Any, Any, float], None]
 ) -> None:
-    """Where and how contacts touch, and by which law."""
+    """Compares gaps, normals, places and coefficients of contacts."""
     contacts = element.mechanism.contacts
     if not contacts:
         return

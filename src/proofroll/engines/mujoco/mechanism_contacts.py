@@ -199,7 +199,7 @@ class Contacts:
                 data.efc_aref[row : row + contact.dim] -= along[: contact.dim]
 
     def take_lift(self, data: Any, rates: Array) -> None:
-        """As :meth:`correct`, but all of the lift where a force is on the cone, by the ``rates`` of all rows."""
+        """Takes all of the lift where a force is on the cone, by the ``rates`` of all rows; see :meth:`correct`."""
         missed = rates - data.efc_aref
         for index in range(data.ncon):
             contact = data.contact[index]
