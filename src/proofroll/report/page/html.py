@@ -8,6 +8,7 @@ import json
 import re
 import shlex
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -65,6 +66,7 @@ def page(
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
         data=packed(json.dumps(plain(drawn), allow_nan=False, separators=(",", ":")).encode()),
         plotly=_plotly(),
+        datatables=_datatables(),
     )
 
 
@@ -91,6 +93,12 @@ def _plotly() -> str:
     import plotly.offline
 
     return packed(plotly.offline.get_plotlyjs().encode())
+
+
+@functools.cache
+def _datatables() -> str:
+    """The library that sorts, filters and downloads tables (DataTables, as itables brings it), compressed."""
+    return packed((resources.files("itables") / "html" / "dt_bundle.js").read_bytes())
 
 
 def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:

@@ -1,0 +1,86 @@
+// Tables sort, filter and download once they come near; the library is kept compressed until the first one does.
+(() => {
+  const order = {{ symbols|list|tojson }};
+  let library = null;
+  function load() {
+    library ??= unpack("datatables").then((text) => {
+      const address = URL.createObjectURL(new Blob([text], { type: "text/javascript" }));
+      return import(address).finally(() => URL.revokeObjectURL(address));
+    });
+    return library;
+  }
+  const regular = (table) => table.tHead?.rows.length === 1 && !table.matches("#choice, .heat")
+    && ![...table.querySelectorAll("[rowspan], thead [colspan], tbody:not([data-engine]) [colspan]")].length;
+  const few = (table) => table.querySelectorAll("tbody tr:not(.group)").length < 4;
+
+  // Rows of engines one after the other, each with its engine: a table that sorts has neither groups nor joined cells.
+  function flatten(table) {
+    const body = table.tBodies[0];
+    for (const part of [...table.tBodies]) {
+      for (const row of [...part.rows]) {
+        if (row.classList.contains("group")) { row.remove(); continue; }
+        if (part.dataset.engine) {
+          row.dataset.engine = part.dataset.engine;
+          row.classList.toggle("off", part.classList.contains("off"));
+          if (row.cells[0].textContent.trim() !== part.dataset.engine) row.cells[0].prepend(`${part.dataset.engine} `);
+        }
+        for (const joined of row.querySelectorAll("[colspan]")) {
+          row.querySelector(".word").append(Object.assign(document.createElement("small"), { className: "why", textContent: joined.textContent, title: joined.textContent }));
+          for (let more = joined.colSpan; more > 0; --more) joined.before(Object.assign(document.createElement("td"), { className: "cell none", textContent: "–" }));
+          joined.remove();
+        }
+        body.append(row);
+      }
+      if (part !== body) part.remove();
+    }
+    delete body.dataset.engine;
+    body.classList.remove("off");
+  }
+  // What a cell is sorted by: its verdict, or the first number in it; beyond all numbers what is infinite.
+  function rank(cell, numeric) {
+    const verdict = cell.querySelector(":scope > .v");
+    if (verdict) return order.indexOf(verdict.classList[1]);
+    const text = cell.textContent;
+    if (!numeric) return text.trim();
+    const found = text.replace("−", "-").match(/-?\d[\d.]*(?:e[-+]?\d+)?/i);
+    return found ? Number(found[0]) : text.includes("∞") ? 1e300 : 1e301;
+  }
+  function said(cell) {
+    const copy = cell.cloneNode(true);
+    copy.querySelectorAll("[aria-hidden], .dt-column-order").forEach((part) => part.remove());
+    copy.querySelectorAll("br, small, b").forEach((part) => part.before(" "));
+    return copy.textContent.replace(/\s+/g, " ").trim();
+  }
+  async function enliven(table) {
+    const { default: DataTable } = await load();
+    const region = table.closest(".scroll");
+    const label = region.getAttribute("aria-label");
+    flatten(table);
+    const heads = [...table.tHead.rows[0].cells];
+    for (const row of table.tBodies[0].rows) {
+      heads.forEach((head, at) => { row.cells[at].dataset.order = rank(row.cells[at], head.classList.contains("n") || row.cells[at].classList.contains("step")); });
+    }
+    const made = new DataTable(table, {
+      paging: false, info: false, autoWidth: false, order: [],
+      language: { search: "Filter", zeroRecords: "no row has this" },
+      layout: {
+        topStart: "search",
+        topEnd: { buttons: [{ extend: "csv", text: "CSV", filename: label, title: null,
+          exportOptions: { format: { body: (_, __, ___, cell) => said(cell), header: (_, __, cell) => said(cell ?? heads[__]) } } }] },
+        bottomStart: null, bottomEnd: null,
+      },
+    });
+    const tools = made.table().container().querySelector(".dt-layout-row:not(.dt-layout-table)");
+    tools.classList.add("tools");
+    tools.querySelector("input").setAttribute("aria-label", `Filter: ${label}`);
+    tools.querySelector("button").setAttribute("aria-label", `CSV: ${label}`);
+    region.before(tools);
+    region.dataset.sorts = "";
+  }
+  const near = new IntersectionObserver((entries) => entries.forEach((entry) => {
+    if (!entry.isIntersecting) return;
+    near.unobserve(entry.target);
+    enliven(entry.target);
+  }), { rootMargin: "400px" });
+  document.querySelectorAll(".scroll > table").forEach((table) => { if (regular(table) && !few(table)) near.observe(table); });
+})();

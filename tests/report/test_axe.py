@@ -1,0 +1,42 @@
+"""The page as axe-core, the accessibility checker, sees it: light and dark, wide and narrow, unfolded."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from axe_playwright_python.base import AXE_FILE_PATH
+from browsing import Visit
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+RUN = "axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations)"
+
+
+def grave(visit: Visit) -> list[str]:
+    """Violations that are serious, critical or moderate, each with the first element that has it."""
+    found: list[dict[str, Any]] = visit.page.evaluate(RUN)
+    return [
+        f"{item['impact']} {item['id']}: {item['nodes'][0]['html'][:200]} ({len(item['nodes'])})"
+        for item in found
+        if item["impact"] in {"moderate", "serious", "critical"}
+    ]
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (900, "dark"), (400, "light")])
+def test_axe_finds_nothing_of_weight(report_page: Path, visit: Visiting, width: int, scheme: str) -> None:
+    """No violation that is serious or moderate, folded, unfolded and with tables that sort; a planted one is found."""
+    with visit(report_page, viewport={"width": width, "height": 900}) as opened:
+        opened.page.emulate_media(color_scheme=scheme)
+        opened.page.add_script_tag(content=Path(AXE_FILE_PATH).read_text(encoding="utf-8"))
+        assert grave(opened) == []
+        opened.unfold()
+        opened.page.evaluate("document.querySelectorAll('#choice button').forEach((button) => button.click())")
+        opened.page.evaluate("document.getElementById('verdicts').scrollIntoView()")
+        opened.wait("document.querySelectorAll('.scroll[data-sorts]').length > 0")
+        assert grave(opened) == []
+        opened.page.evaluate("document.querySelector('main').append(document.createElement('button'))")
+        assert any("button-name" in text for text in grave(opened))
+        opened.page.evaluate("document.querySelector('main').lastChild.remove()")

@@ -1,0 +1,90 @@
+"""Tables in a browser: they sort, filter and download, and nothing is loaded from anywhere."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+import pytest
+from browsing import Visit
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+TABLE = "[aria-label='Verdicts: An invented comparison'] table"
+
+
+@pytest.fixture
+def live(report_page: Path, visit: Visiting) -> Iterator[Visit]:
+    """The page with its first table of verdicts enlivened."""
+    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.page.evaluate("document.getElementById('verdicts').scrollIntoView()")
+        opened.wait("document.querySelector(\"[aria-label='Verdicts: An invented comparison']\").dataset.sorts === ''")
+        yield opened
+
+
+def column(live: Visit, number: int) -> list[str]:
+    """Texts of a column, of the rows that are shown, without what is hidden from a screen reader."""
+    return live.page.evaluate(
+        """([table, number]) => [...document.querySelectorAll(`${table} tbody tr`)].map((row) => {
+          const copy = row.cells[number].cloneNode(true);
+          copy.querySelectorAll('[aria-hidden], small').forEach((part) => part.remove());
+          return copy.textContent.trim();
+        })""",
+        [TABLE, number],
+    )
+
+
+def sort(live: Visit, name: str, wanted: str) -> None:
+    """Presses Enter on the sign of a column until a screen reader is told that it is sorted so."""
+    head = live.page.locator(f"{TABLE} thead th", has_text=name)
+    for _ in range(3):
+        if head.get_attribute("aria-sort") != wanted:
+            head.locator(".dt-column-order").press("Enter")
+    assert head.get_attribute("aria-sort") == wanted
+
+
+def test_a_table_sorts_by_a_column(live: Visit) -> None:
+    """By keys: settings keep their engine, numbers sort as numbers, verdicts from best to worst and back."""
+    settings = column(live, 0)
+    assert settings == ["alpha fine matched", "alpha fine default", "beta only", "gamma"]
+    sort(live, "γ", "ascending")
+    errors = [float(text.split()[-1]) for text in column(live, 3) if "–" not in text]
+    assert errors == sorted(errors)
+    assert len(errors) == 3
+    assert column(live, 0)[-1] == "gamma", "what has no number comes last"
+    sort(live, "γ", "descending")
+    assert column(live, 0)[1:] == ["alpha fine default", "beta only", "alpha fine matched"]
+    sort(live, "verdict", "ascending")
+    verdicts = [text.split()[1].removesuffix("not") for text in column(live, 2)]
+    assert verdicts == ["agrees", "incomplete", "differs", "failed"]
+    assert live.messages == []
+
+
+def test_a_table_filters_by_words(live: Visit) -> None:
+    """An engine, a verdict: the rows that have it are left; all come back."""
+    box = live.page.get_by_label("Filter: Verdicts: An invented comparison")
+    for words, found in (("alpha", 2), ("differs", 1), ("alpha matched", 1), ("", 4)):
+        box.fill(words)
+        live.wait(f'document.querySelectorAll("{TABLE} tbody tr").length === {found}')
+
+
+def test_a_table_downloads_as_csv(live: Visit, tmp_path: Path) -> None:
+    """The file has the heads and each row, verdicts in words; it comes from the page itself."""
+    with live.page.expect_download() as got:
+        live.page.get_by_label("CSV: Verdicts: An invented comparison").click()
+    got.value.save_as(tmp_path / "table.csv")
+    text = (tmp_path / "table.csv").read_text(encoding="utf-8-sig")
+    head, *rows = filter(None, csv.reader(text.splitlines()))
+    assert head[:3] == ["setting", "step", "verdict"]
+    assert [row[0] for row in rows] == ["alpha fine matched", "alpha fine default", "beta only", "gamma"]
+    assert all(len(row) == len(head) for row in rows)
+    assert rows[1][3].startswith("differs ")
+    assert [address for address in live.requested if not address.startswith(("file:", "blob:"))] == []
+
+
+def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:
+    """The boxes of the first screen act on the rows of a table that has been taken apart."""
+    live.page.get_by_role("checkbox", name="alpha").uncheck()
+    shown = live.page.locator(f"{TABLE} tbody tr:visible")
+    assert shown.count() == 2
