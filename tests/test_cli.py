@@ -16,6 +16,7 @@ import pytest
 
 from proofroll.cli.options import require_pages
 from proofroll.core.errors import Missing
+from proofroll.files.scene_file import scene_names
 from proofroll.running.process import Worker
 
 RUN = ["run", "sphere_in_cylinder", "--engine", "oracle", "--until", "0.1", "--every", "0.05"]
@@ -199,8 +200,7 @@ def test_run_tells_events(proofroll: Proofroll) -> None:
 
 def test_run_writes_netcdf(proofroll: Proofroll, tmp_path: Path) -> None:
     """``--out`` writes the trajectory over what was there, and leaves nothing else behind."""
-    from proofroll.files.scene_file import scene_names
-from proofroll.files.trajectory_file import read
+    from proofroll.files.trajectory_file import read
 
     target = tmp_path / "new" / "run.nc"
     target.parent.mkdir()
