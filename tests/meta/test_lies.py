@@ -25,6 +25,7 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, LimitFinding, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
+from proofroll.studies.comparison.default_comparison import bounds
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
 
@@ -125,6 +126,25 @@ def test_a_lie_where_nobody_says_what_is_judged(about: str, name: str, words: st
     found = judge_run(run, scene_of(about))
     assert words in str(found)
     assert found.agrees is ("not judged" in words)
+
+
+@pytest.mark.parametrize(
+    ("name", "agrees"), [("nothing", True), ("always sticking", False), ("always sticking, without events", False)]
+)
+def test_a_slip_is_missed_in_a_first_look(name: str, agrees: bool) -> None:
+    """Who says that a ball sticks which slips does not agree where nobody asks for events either."""
+    lie = next((lie for lie in table() if lie.name == name), Lie(name, ("slips",)))
+    heard = hear(scene_of("slips"), liar("slips", lie), first_look("slips"), UNTIL["slips"])
+    assert heard.agrees is agrees, heard
+    assert agrees or "first_slip" in heard.words
+
+
+def first_look(about: str) -> dict[str, str]:
+    """Tolerances of a comparison about which no file says anything."""
+    found = bounds(scene_of(about), EVERY)
+    return {
+        name: f"{100 * item.value} %" if item.relative else f"{item.value} {item.unit}" for name, item in found.items()
+    }
 
 
 @pytest.mark.parametrize("about", ALL)

@@ -140,7 +140,7 @@ def _comparison(name: str, where: str, loaded: Scene) -> str:
         f'{_quoted(key)} = "{100 * item.value:g} %"\n'
         if item.relative
         else f'{_quoted(key)} = "{item.value:g} {item.unit}"\n'
-        for key, item in bounds(loaded).items()
+        for key, item in bounds(loaded, _EVERY).items()
     )
     rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, first=True))
     return (

@@ -97,7 +97,7 @@ def test_velocities_of_mechanisms_are_judged(name: str) -> None:
     engine, settings = HONEST["double_pendulum"]
     liar = lying(engine, VELOCITIES[name], everywhere=True)
     run = simulate("double_pendulum", liar, until=UNTIL, every=EVERY, **settings)
-    bounds = first_look.bounds(load_scene("double_pendulum"))
+    bounds = first_look.bounds(load_scene("double_pendulum"), 0.01)
     assert {"positions", "v_WB", "w_WB"} <= bounds.keys()
     found = judge(run, "double_pendulum", dict.fromkeys(bounds, "1 %"))
     assert [item.judgement.observable for item in found.compared if not item.agrees] == [name]

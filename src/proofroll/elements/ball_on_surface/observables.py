@@ -85,7 +85,9 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             floor=speed,
         ),
         residual("creep", "m", "way slipped while sticking", a),
-        Observable("first_slip", "s", "time of the first slip", Role.EVENT, column=True, absent=never),
+        Observable(
+            "first_slip", "s", "time of the first slip", Role.EVENT, column=True, absent=never, watched=bool(bounded)
+        ),
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
     )

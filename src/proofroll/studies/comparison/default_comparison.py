@@ -54,7 +54,7 @@ def compared(
         until=every * max(1, int(duration / every + 1e-9)),
         every=every,
         vary={key: [scene.parameters[key]] for key in parameters},
-        bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene))},
+        bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene, every))},
         rows=rows,
         budget=budget,
     )
@@ -74,16 +74,21 @@ def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) 
     ]
 
 
-def bounds(scene: Scene) -> dict[str, Tolerance]:
-    """One per cent of what moves; where that has no size of its own, a thousandth of its unit."""
+def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
+    """One per cent of what moves; where that has no size of its own, a thousandth of its unit.
+
+    Times of watched events may be off by the sampling interval ``every`` [s].
+    """
     all_of = {key: item for key, item in scene.observables.items() if item.role is Role.MOTION}
     moves = {key: item for key, item in all_of.items() if item.headline}
     moves = moves or {scene.deciding: scene.observable(scene.deciding)}
     moves |= {key: item for key, item in all_of.items() if item.watched}
-    return {
+    found = {
         key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
         for key, item in moves.items()
     }
+    events = [key for key, item in scene.observables.items() if item.watched and item.role is Role.EVENT]
+    return found | dict.fromkeys(events, Tolerance(every, False, "s"))
 
 
 def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
