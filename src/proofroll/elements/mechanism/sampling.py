@@ -77,11 +77,6 @@ class MechanismBuilt:
     joint_position: Array | None = None
     joint_axis: Array | None = None
     gravity: Array | None = None
-    contact_gap: Array | None = None
-    contact_normal: Array | None = None
-    contact_place: Array | None = None
-    contact_friction: Array | None = None
-    contact_restitution: Array | None = None
     rows: int | None = None
     rank: int | None = None
     mobility: int | None = None
@@ -89,6 +84,11 @@ class MechanismBuilt:
     angular_acceleration: Array | None = None
     mass_matrix_error: float | None = None
     regularised: Mapping[str, Regularised] = field(default_factory=dict)
+    contact_gap: Array | None = None
+    contact_normal: Array | None = None
+    contact_place: Array | None = None
+    contact_friction: Array | None = None
+    contact_restitution: Array | None = None
 
 
 def mechanism_of(scene: Any) -> Mechanism:
