@@ -236,12 +236,18 @@ class MechanismElement:
         spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
         fastest = None if truth is None else float(np.max(np.linalg.norm(truth["w_WB"].to_numpy(), axis=-1)))
         fall = float(np.sqrt(np.linalg.norm(self.mechanism.gravity) / self.length))
+        damper, spring = self._equations.law_rates()
+        laws = [
+            StepNumber("damper", "hc/m", "step in parts of the time constant of a joint's damper or servo", damper * h),
+            StepNumber("servo", "h√(k/m)", "angle [rad] of a joint on its spring or servo in a step", spring * h),
+        ]
         return (
             StepNumber("spin", "|ω0|h", "largest angle [rad] by which a body turns in the first step", spin * h),
             StepNumber(
                 "rotation", "h|ω|", "largest angle [rad] by which a body turns in a step", fastest and fastest * h
             ),
             StepNumber("fall", "h√(g/L)", "step in parts of the time of a fall by the mechanism's size", fall * h),
+            *(number for number in laws if number.value),
         )
 
     @property

@@ -215,6 +215,19 @@ class JointCoordinates:
         noise = max(float(np.abs(each.acceleration - acceleration).max(initial=0.0)) for each in nudged)
         return max(1.0, float(np.sqrt(slope))), noise
 
+    def law_rates(self) -> tuple[float, float]:
+        """Fastest rate of the dampers and of the springs of joints at the start, servos with them [1/s, rad/s]."""
+        damping, stiffness = self._damping.copy(), np.zeros(self.mechanism.nv)
+        for of_joint, _, _, at_v in self._springs:
+            stiffness[at_v] += of_joint
+        for actuator, _, at in self.actuators:
+            damping[at] += actuator.gear**2 * actuator.kd
+            stiffness[at] += actuator.gear**2 * actuator.kp
+        M = self.inertial(self.tree.at(*self.mechanism.start()))[1]
+        into = np.linalg.inv(np.linalg.cholesky(M))
+        fastest = [np.linalg.eigvalsh((into * law) @ into.T).max(initial=0.0) for law in (damping, stiffness)]
+        return float(fastest[0]), float(np.sqrt(fastest[1]))
+
     def _least(self, tolerance: float) -> Array:
         """Errors of the coordinates and velocities below which steps only chase the noise of accelerations.
 

@@ -183,3 +183,23 @@ def test_a_coupled_joint_takes_its_start_from_the_other(tmp_path: Path) -> None:
     assert v == pytest.approx([2.0, 6.0])
     assert MechanismCapability.COUPLINGS in required(made)
     assert JointCoordinates(made).rank == 1
+
+
+_ARM = np.array([[8 / 3 + 0.1, 5 / 6], [5 / 6, 1 / 3 + 0.1]])  # mass matrix of the hanging arm, armature included
+
+
+@pytest.mark.parametrize(
+    ("scene", "damper", "servo"),
+    [
+        ("stiff_damper", 1000.0, None),
+        ("servo", 4.0, 10.0),
+        ("pendulum", None, None),
+        ("arm_pd", *(max(np.linalg.eigvals(np.linalg.solve(_ARM, np.diag(law)))) for law in ((10, 5), (100, 50)))),
+    ],
+)
+def test_a_step_is_measured_by_dampers_and_servos(scene: str, damper: float | None, servo: float | None) -> None:
+    """Numbers of a step tell how stiff the dampers, springs and servos of joints are, where there are any."""
+    numbers = {item.name: item.value for item in load_scene(scene).elements[0].step_numbers(1.0, None)}
+    servo = np.sqrt(servo) if scene == "arm_pd" and servo else servo
+    expected = {name: value for name, value in (("damper", damper), ("servo", servo)) if value}
+    assert {name: numbers[name] for name in ("damper", "servo") if name in numbers} == pytest.approx(expected)
