@@ -14,15 +14,17 @@ import pytest
 from invented import further
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
-from proofroll.core.verdict import Verdict
+from proofroll.core.verdict import LimitFinding, Verdict
 from proofroll.report.comparison.lines import lines_of
 from proofroll.report.long_table import LongTable
 from proofroll.report.page.growing import begun
 from proofroll.report.page.records import ReportContent
+from proofroll.report.tradeoff.part import _limit
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.tradeoff.records import CurveBudget
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -109,3 +111,11 @@ def test_infinite_numbers_are_empty(content: ReportContent) -> None:
     frame = LongTable([line]).csv.splitlines()
     values = dict(zip(frame[0].split(","), frame[1].split(","), strict=True))
     assert values["error"] == ""
+
+
+def test_a_trade_off_says_what_its_curves_tend_to() -> None:
+    """A limit that is off by far more than its bars is another; one within them is the truth's; none is none."""
+    budget = CurveBudget(engine="a", curve="a", quantity="z", model_form=1e-3, model_form_bar=1e-6, truth=1e-9)
+    assert _limit(budget) == LimitFinding.ANOTHER
+    assert _limit(dataclasses.replace(budget, model_form_bar=1e-3)) == LimitFinding.WITHIN
+    assert _limit(dataclasses.replace(budget, model_form=None)) == LimitFinding.NOT_SHOWN

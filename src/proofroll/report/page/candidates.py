@@ -9,7 +9,8 @@ from proofroll.core.verdict import LimitFinding, Verdict
 from proofroll.report.labels import step
 from proofroll.report.long_table import TableLine
 
-_BEYOND = {LimitFinding.ANOTHER, LimitFinding.NOT_SHOWN}
+# What a ladder of steps may say, from what leaves the most hope to what leaves none.
+_FINDINGS = (LimitFinding.WITHIN, LimitFinding.NO_LADDER, LimitFinding.NOT_SHOWN, LimitFinding.ANOTHER)
 
 
 @dataclass(frozen=True)
@@ -22,7 +23,7 @@ class Candidate:
         cost: wall seconds per simulated second at the slowest place; None: not measured.
         clean: the cost is that of clean runs.
         blame: verdict of a place without a result; None: every place has one.
-        another: its limit of small steps is not the truth, as far as its ladder shows.
+        motion_limit, forces_limit: what its ladder of steps says of either.
         href: id of the evidence of the place that is furthest off.
         message: why a place has no result.
     """
@@ -33,7 +34,8 @@ class Candidate:
     cost: float | None
     clean: bool
     blame: Verdict | None
-    another: bool
+    motion_limit: LimitFinding
+    forces_limit: LimitFinding
     href: str
     message: str
 
@@ -42,6 +44,11 @@ class Candidate:
         if not forces:
             return self.motion
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
+
+    def limit(self, forces: bool) -> LimitFinding:
+        """What its ladder says of all that is asked for."""
+        both = (self.motion_limit, self.forces_limit) if forces else (self.motion_limit,)
+        return max(both, key=_FINDINGS.index)
 
 
 def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
@@ -54,16 +61,21 @@ def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> 
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
-    another = any(line.limit in _BEYOND or line.verdict == Verdict.DIFFERS for line in lines)
+    limits = _limit(lines, "motion"), _limit(lines, "reaction")
     found = []
     for value in dict.fromkeys(line.step for line in lines):
         at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
-        found.append(_candidate(lines[0], value, at, another=another, anchors=_anchors(href, lines[0].row, places)))
+        found.append(_candidate(lines[0], value, at, limits=limits, anchors=_anchors(href, lines[0].row, places)))
     return sorted(found, key=lambda item: item.name != _name(lines[0], own))
 
 
 def _candidate(
-    first: TableLine, value: float | None, at: dict[str, list[TableLine]], *, another: bool, anchors: dict[str, str]
+    first: TableLine,
+    value: float | None,
+    at: dict[str, list[TableLine]],
+    *,
+    limits: tuple[LimitFinding, LimitFinding],
+    anchors: dict[str, str],
 ) -> Candidate:
     name, href = _name(first, value), anchors.get("", "")
     judged = {
@@ -80,7 +92,7 @@ def _candidate(
         furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
         href = anchors.get(furthest, href)
     motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
-    return Candidate(name, motion, forces, cost, clean, blame, another, href, message)
+    return Candidate(name, motion, forces, cost, clean, blame, *limits, href, message)
 
 
 def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
@@ -97,9 +109,20 @@ def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
 
 
 def _largest(lines: Sequence[TableLine], role: str) -> float | None:
-    """Largest relative error of the quantities of a role that summaries show, of all if they show none."""
+    """Largest relative error of what is shown of a role."""
+    return max((line.relative for line in _shown(lines, role)), default=None)
+
+
+def _shown(lines: Sequence[TableLine], role: str) -> list[TableLine]:
+    """Lines of the quantities of a role that summaries show, of all if they show none; without those of no size."""
     of_role = [line for line in lines if line.role == role and line.scale]
-    return max((line.relative for line in [x for x in of_role if x.headline] or of_role), default=None)
+    return [line for line in of_role if line.headline] or of_role
+
+
+def _limit(lines: Sequence[TableLine], role: str) -> LimitFinding:
+    """The worst that the ladder of a row says of a role."""
+    said = [item for line in _shown(lines, role) for item in _FINDINGS if line.limit == item]
+    return max(said, key=_FINDINGS.index, default=LimitFinding.NO_LADDER)
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:

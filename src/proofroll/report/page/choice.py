@@ -11,7 +11,7 @@ from itertools import groupby, product
 from typing import NamedTuple
 
 from proofroll.core.number_format import error, number
-from proofroll.core.verdict import Verdict
+from proofroll.core.verdict import LimitFinding, Verdict
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
 from proofroll.report.pages import packed
@@ -23,6 +23,12 @@ FIRST = 4
 NEEDS = ("motion", "motion and forces")
 NOT_RUN = "none"
 _SEVERITY = list(Verdict)
+_WHY = {
+    LimitFinding.WITHIN: "finer steps come closer",
+    LimitFinding.NO_LADDER: "the closest of what was run",
+    LimitFinding.NOT_SHOWN: "no limit of small steps is shown",
+    LimitFinding.ANOTHER: "its limit of small steps is another",
+}
 
 
 class ChoiceCell(NamedTuple):
@@ -175,8 +181,9 @@ def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
         return ChoiceCell(Verdict.AGREES, text, f"{item.name}: within {number(size)}, {spent}", item.href, cost)
     if told:
         size, item = min(told, key=lambda entry: entry[0])
-        why = "its limit is another" if item.another else "finer steps were not run"
-        state = Verdict.DIFFERS if item.another else Verdict.CONVERGES
+        limit = item.limit(forces)
+        state = Verdict.CONVERGES if limit == LimitFinding.WITHIN else Verdict.DIFFERS
+        why = _WHY[limit]
         return ChoiceCell(state, error(size, 1), f"{item.name}: off by {error(size)}; {why}", item.href)
     if whole:
         lacking = "no forces" if whole[0].motion is not None else "no motion"

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.number_format import counted
+from proofroll.core.verdict import LimitFinding
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.work_precision import svg
 from proofroll.report.kinds import group_of
@@ -24,7 +25,7 @@ from proofroll.studies.study_store import kept
 from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
 from proofroll.studies.tradeoff.cost_claims import ClaimJudgement
 from proofroll.studies.tradeoff.recommend import Answer, by_hand, recommend
-from proofroll.studies.tradeoff.records import TradeoffStudy
+from proofroll.studies.tradeoff.records import CurveBudget, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff
 from proofroll.studies.tradeoff.tradeoff import stored
@@ -32,6 +33,8 @@ from proofroll.studies.tradeoff.tradeoff import stored
 # Parts of its scale to which a quantity is wanted where nobody says otherwise: what an eye sees, an engineer needs, a
 # reference is made from, and what tells the orders of methods apart.
 PARTS = (1e-2, 1e-3, 1e-4, 1e-6)
+# A limit of small steps is another than the truth where it is off by so many of its bars, as for a verdict.
+_SHOWN = 10
 
 
 @dataclass(frozen=True)
@@ -111,6 +114,7 @@ class TradeoffPart(Part):
         assert study is not None  # it was made
         scene = self.asked.swept.loaded()
         group, place = group_of(scene), point_name(study.parameters)
+        limits = {(item.curve, item.quantity): _limit(item) for item in study.budgets}
         found = []
         for point in study.points:
             low, high = point.interval or (None, None)
@@ -130,6 +134,7 @@ class TradeoffPart(Part):
                     unit=study.quantities[name].unit,
                     role=scene.observables[name].role,
                     headline=scene.observables[name].headline,
+                    limit=limits.get((point.curve, name), ""),
                     error=error,
                     truth_error_bar=study.quantities[name].truth_error_bar,
                     scale=study.quantities[name].scale,
@@ -143,6 +148,14 @@ class TradeoffPart(Part):
         """The work-precision diagram."""
         assert self.study is not None  # it was made
         return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
+
+
+def _limit(budget: CurveBudget) -> str:
+    """What a curve shows of its limit of small steps: another than the truth, as far as both bars tell, or none."""
+    if budget.model_form is None:
+        return LimitFinding.NOT_SHOWN
+    known = (budget.model_form_bar or 0.0) + (budget.truth or 0.0) + (budget.floor or 0.0)
+    return LimitFinding.ANOTHER if budget.model_form > _SHOWN * known else LimitFinding.WITHIN
 
 
 def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:

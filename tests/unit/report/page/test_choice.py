@@ -73,8 +73,17 @@ def test_what_no_run_holds_shows_the_least_error_and_why() -> None:
     assert at(ARM, 8)[:2] == (Verdict.CONVERGES, "2e-7")
     wrong = [line(verdict="differs", limit="another limit", tolerance=1e-4)]
     assert at(wrong, 4)[:2] == (Verdict.DIFFERS, "5e-4")
-    assert "its limit is another" in at(wrong, 4).title
+    assert "its limit of small steps is another" in at(wrong, 4).title
     assert at([line(error=0.0, truth_error_bar=1e-5)], 6).state == Verdict.CONVERGES
+    once = at([line(limit="no ladder")], 4)
+    assert (once.state, "the closest of what was run" in once.title) == (Verdict.DIFFERS, True)
+
+
+def test_the_limit_of_forces_says_nothing_of_motion() -> None:
+    """Where forces tend to another limit and the motion does not, that counts only where forces are asked for."""
+    lines = [LINE, replace(FORCE, limit="another limit", verdict="differs")]
+    assert at(lines, 4).state == Verdict.CONVERGES
+    assert at(lines, 4, forces=True).state == Verdict.DIFFERS
 
 
 @pytest.mark.parametrize(
