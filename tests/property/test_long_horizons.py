@@ -73,11 +73,11 @@ def test_angles_stay_within_a_turn() -> None:
 
 @needs_heyoka
 def test_without_elimination_round_off_adds_up() -> None:
-    """What elimination is for: without it the same run ends with a slip a thousand times as large."""
+    """What elimination is for: without it the same run ends with a slip hundreds of times as large."""
     engine = "projection[formulation=rotating_frame,preset=tuned]"
     with_it, without = drift(engine, 3000), drift(f"{engine[:-1]},elimination=false]", 3000)
-    assert without[1] > 1e3 * with_it[1]
-    assert without[0] > 1e3 * with_it[0]
+    assert without[1] > 1e2 * with_it[1]
+    assert without[0] > 1e2 * with_it[0]
 
 
 def test_without_elimination_a_coarse_step_adds_up() -> None:

@@ -65,6 +65,7 @@ def test_events_and_fall(case: str, engine: str, late: float, off: float | None)
     assert [event.kind for event in events] == [("slip", "stick")[number % 2] for number in range(len(times))]
     wide = 1e-8 if engine in {COMPOSITE, FRAME} else 1.001e-3
     assert all(event.time_low <= event.time <= event.time_high <= event.time_low + wide for event in events)
+    # Tight, for how late an event is comes from the method at its step; processors change it by round-off.
     np.testing.assert_allclose([event.time for event in events], times, rtol=0, atol=late)
     if off is not None:
         assert float(found.z[-1]) == pytest.approx(height, abs=off)
@@ -171,7 +172,7 @@ def test_slope_flat_enough_to_roll(engine: str, spare: float) -> None:
         (FLYER, 1e-9, 1e-9),
         ("pinocchio[preset=default]", 1e-9, 1e-9),
         (PGS, 1e-9, 4e-8),
-        (FRAME, 1e-13, 1e-13),
+        (FRAME, 1e-12, 1e-12),
     ],
 )
 def test_no_friction(engine: str, fall: float, speed: float) -> None:

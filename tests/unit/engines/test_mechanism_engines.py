@@ -120,7 +120,7 @@ def test_a_loop_holds_as_the_joint_does(formulation, kind):
     assert run.built().mobility == on_joint.nv
     run.advance(0.05)
     sample = run.sample()
-    # soft loops of MuJoCo; second order of Exudyn at 1e-3 s; else the integrator's tolerance
+    # soft loops of MuJoCo; second order of Exudyn at 1e-3 s; else the integrator's tolerance: no processor changes them
     position, force = {"joints": (1e-7, 1e-4), "redundant": (1e-6, 1e-4)}.get(formulation, (1e-11, 1e-9))
     assert np.abs(sample.p_WB - truth.p_WB[-1]).max() < position
     found = runs.wrench(sample)[2]

@@ -315,6 +315,7 @@ def test_numbers_in_the_files_are_the_scenes(scene: str, formulation: str, prese
         for name in dir(owner):
             value = getattr(owner, name)
             if not name.startswith("_") and isinstance(value, (int, float, np.ndarray)):
+                # files have ten digits or more, and the two compute the same from them
                 np.testing.assert_allclose(value, getattr(other, name), rtol=1e-9, atol=1e-11, err_msg=name)
                 compared += 1
     assert compared > 200
