@@ -24,8 +24,8 @@ def test_richardson_recovers_order_and_limit(power: int, ratio: float) -> None:
     found = richardson([curve(h * ratio**k, power) for k in (2, 1, 0)], (ratio**2, ratio, 1))
     assert found.order == pytest.approx(power, abs=0.05)
     assert found.values == pytest.approx(LIMIT, abs=1e-12)
-    # Three curves cannot exclude a term h^(p-1), so that the bar is larger than what is left; of laws that are given, so
-    # that no round-off comes in.
+    # Three curves cannot exclude a term h^(p-1), so that the bar is larger than what is left. The laws
+    # are given, so that no round-off comes in.
     assert found.error_bar < 0.2 * np.max(np.abs(curve(h, power) - LIMIT))
 
 

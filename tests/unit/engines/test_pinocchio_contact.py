@@ -82,7 +82,7 @@ def test_certificate(scene: str, parameters: dict[str, float], solver: str, pres
     assert softened == [*numbers, "acceleration", "angular acceleration", "N", "F2", "F3"]
     if (
         preset == "matched"
-    ):  # what the adapter grants itself: a force that is wrong by a hundred-millionth would be found
+    ):  # what it grants itself: a force that is wrong by a hundred-millionth is found
         assert all(line.tolerance < 2e-9 for line in lines if line.quantity not in numbers)
 
 
