@@ -234,6 +234,21 @@ def test_bodies_in_another_order(tmp_path: Path) -> None:
             proofroll.judge(file, "double_pendulum")
 
 
+def test_reactions_of_a_file_are_judged(tmp_path: Path) -> None:
+    """A CSV of a run is judged with its forces and moments, as the run itself is, and a wrong one differs."""
+    run = proofroll.simulate("pendulum", "pinocchio", until=0.1)
+    write(run, file := tmp_path / "run.csv")
+    found = proofroll.judge(file, "pendulum")
+    assert found.agrees
+    assert {"forces", "torques"} <= {item.judgement.observable for item in found.compared}
+    assert not any(name.startswith(("force", "torque")) for name in found.unjudged)
+    run["forces"] = run["forces"] * 1.1
+    write(run, file)
+    assert [item.judgement.observable for item in proofroll.judge(file, "pendulum").compared if not item.agrees] == [
+        "forces"
+    ]
+
+
 def test_arrays_of_numpy_in_a_file(tmp_path: Path) -> None:
     """A file of ``numpy.savez`` is judged as its arrays are; any other file of that ending is one line."""
     np.savez(tmp_path / "own.npz", **swing())
@@ -312,7 +327,7 @@ def test_what_is_not_judged_is_named() -> None:
     run = proofroll.simulate("pendulum", "projection", until=0.1)
     assert not proofroll.judge(run, "pendulum").unjudged
     state = {name: run[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB", "energy")}
-    assert proofroll.judge(state, "pendulum").unjudged == {"energy": "it is taken from the state"}
+    assert proofroll.judge(state, "pendulum").unjudged == {"energy": "it follows from the state, which is judged"}
     of_places = proofroll.judge(state, "pendulum", {"positions": "1 %"}).unjudged
     assert {name for name, why in of_places.items() if why == "no tolerance is given for it"} == {"v_WB", "w_WB"}
 

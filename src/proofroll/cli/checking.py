@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -41,9 +40,8 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     counts = ", ".join(counted(count, what) for what, count in sound.counts.items())
     needs = f"; engines must provide: {', '.join(sound.requires)}" if sound.requires else ""
     about = f"{sound.scene}, " if sound.kind != "scene" and sound.scene else ""
-    sys.stdout.write(f"{sound.name} is sound: {sound.kind}, {about}{counts}{needs}\n")
-    for line in sound.start:
-        sys.stdout.write(f"  {line}\n")
+    head = f"{sound.name} is sound: {sound.kind}, {about}{counts}{needs}"
+    options.show(sound, False, lambda: [head, *(f"  {line}" for line in sound.start)])
 
 
 def _draw(found: SoundFile, plot: Path) -> None:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
-_COMPILES = 1.0  # s before the first step that a reader wants to know of
+_COMPILES = 10.0  # s before the first step: machine code of equations takes one or two, on a busy machine some more
 STYLES = {
     "agrees": "green",
     "unconfirmed": "yellow",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,7 @@ _SPELT = {
     "meter": "m", "meters": "m", "metre": "m", "metres": "m",
 }  # fmt: skip
 _WRITE_NETCDF = "; xarray writes it by to_netcdf(path, format='NETCDF3_64BIT')"
-FROM_STATE = "it is taken from the state"
+FROM_STATE = "it follows from the state, which is judged"
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,14 @@ class GivenRun:
         labels: of the dimensions that have names, as bodies, in their order.
         besides: variables that are none of the state, and velocities, with why they are not judged where that is known
             already; none of a run of proofroll's own.
+        reactions: those of them that do not follow from the state; forces and moments together have them all.
     """
 
     dataset: xr.Dataset
     units: Mapping[str, str]
     labels: Mapping[str, list[str]]
     besides: Mapping[str, str | None]
+    reactions: Collection[str] = ()
 
     def require_units(self, truth: xr.Dataset) -> None:
         """Every variable that the truth has too is in the truth's unit, if it says its own, and bodies in its order.
@@ -107,9 +109,17 @@ def read_run(run: Run, scene: Scene) -> GivenRun:
     if not all(name in dataset for name in REQUIRED) or len(scene.elements) > 1 or times[0] > 0:
         return GivenRun(dataset, units, labels, dict.fromkeys(names))
     state = [field.name for field in fields(scene.elements[0].sample_type) if field.name in dataset]
-    besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in state], FROM_STATE)
-    besides |= dict.fromkeys(REQUIRED[1:])  # velocities: what is asked may be of places alone
-    return GivenRun(_completed(dataset, scene, times, state), units, labels, besides)
+    completed = _completed(dataset, scene, times, state)
+    # Reactions do not follow from a state that has none: they are judged as they are given.
+    kept = [name for name in names if name not in state and not _told(completed, name)]
+    besides: dict[str, str | None] = dict.fromkeys([name for name in names if name not in (*state, *kept)], FROM_STATE)
+    besides |= dict.fromkeys((*REQUIRED[1:], *kept))  # velocities: what is asked may be of places alone
+    return GivenRun(completed.assign({name: dataset[name] for name in kept}), units, labels, besides, kept)
+
+
+def _told(run: xr.Dataset, name: str) -> bool:
+    """True if a variable has some number."""
+    return name in run and bool(np.any(np.isfinite(run[name].to_numpy())))
 
 
 def _whole(run: xr.Dataset, scene: Scene) -> bool:

@@ -161,6 +161,8 @@ def judge(
     unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
     if tolerance is None:
         unjudged |= _events_left(scene, observed, bounds)
+        if any(scene.observables[name].role is Role.REACTION for name in bounds if name in scene.observables):
+            unjudged = {name: why for name, why in unjudged.items() if name not in given.reactions}
     return Judged(scene.name, tuple(compared), because, unjudged)
 
 
