@@ -12,7 +12,7 @@ from robot_templates import mjcf, urdf
 
 from proofroll.core.errors import InputError
 from proofroll.robots import check
-from proofroll.robots.judging import with_the_copy
+from proofroll.robots.importer_row import with_the_copy
 from proofroll.robots.protocol import Whole
 from proofroll.robots.reading import AsWritten
 from proofroll.robots.records import ImporterRow

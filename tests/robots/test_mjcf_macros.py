@@ -11,7 +11,7 @@ from robot_templates import mjcf, urdf
 
 from proofroll.core.errors import InputError
 from proofroll.core.limits import TIME_LIMIT
-from proofroll.robots.judging import meaning, opened
+from proofroll.robots.meaning import meaning, opened
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write

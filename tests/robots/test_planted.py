@@ -16,7 +16,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.robots import defining, reading
 from proofroll.robots.against import reading_of
 from proofroll.robots.check import check
-from proofroll.robots.judging import judged
+from proofroll.robots.importer_row import judged
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot

@@ -20,7 +20,7 @@ from proofroll.core.limits import TIME_LIMIT
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.robots.gallery import locate, read_gallery
-from proofroll.robots.judging import meaning
+from proofroll.robots.meaning import meaning
 from proofroll.robots.opening import open_robot
 from proofroll.robots.reading import write
 from proofroll.robots.states import random_states

@@ -18,9 +18,10 @@ from proofroll.core.plugins import EngineSpec
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.check import bar_of, drawn
-from proofroll.robots.judging import judged, meaning, opened
+from proofroll.robots.importer_row import judged
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
+from proofroll.robots.meaning import meaning, opened
 from proofroll.robots.model import Array, Mimic, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth

@@ -18,9 +18,10 @@ from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
 from proofroll.robots.hypotheses import hypotheses
-from proofroll.robots.judging import judged, meaning, opened, with_the_copy
+from proofroll.robots.importer_row import judged, with_the_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
 from proofroll.robots.lint import lint
+from proofroll.robots.meaning import meaning, opened
 from proofroll.robots.protocol import Request
 from proofroll.robots.records import DrawnBody, DrawnJoint, DrawnRobot, ImporterRow, RobotCheck, UsedTruth
 from proofroll.robots.robot_file import RobotFile

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.joint import LAWS
 from proofroll.elements.mechanism.rotations import to_rpy
-from proofroll.robots.judging import meant, opened
+from proofroll.robots.meaning import meant, opened
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotJoint
 from proofroll.robots.motors import motors
 from proofroll.robots.opening import BASES

@@ -1,0 +1,94 @@
+"""Meaning of a robot file: our own reading of URDF, and of MJCF the answer of the engine that defines it."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import TypeVar
+from xml.etree.ElementTree import Element, fromstring
+
+from proofroll.core.errors import InputError
+from proofroll.core.limits import TIME_LIMIT
+from proofroll.robots import defining, reading
+from proofroll.robots.model import Robot
+from proofroll.robots.opening import open_robot
+from proofroll.robots.robot_file import RobotFile
+from proofroll.robots.urdf import read_urdf
+from proofroll.running.asking import lent_workers
+from proofroll.running.process import Worker, WorkerDied
+from proofroll.running.worker_pool import Workers
+
+_Answer = TypeVar("_Answer")
+# Format -> the engine that was last found to define it: a guess at whose idle process to ask; until one is known a
+# process goes by the format, and is renamed when it has said whose it is.
+_defines: dict[str, str] = {}
+
+
+def meaning(
+    file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
+) -> tuple[Robot, defining.Compiler | None]:
+    """The robot that a file means, and the engine here that defines the format; None: we read it.
+
+    An engine that defines the format is asked for no longer than ``time_limit`` [s], of the file as engines get it.
+
+    Raises:
+        InputError: it has no meaning.
+    """
+    if file.kind == "urdf":
+        return read_urdf(file), None
+    robot, by = _by_definer(
+        file.kind, file.path, workers, lambda worker: defining.compiled(worker, file, written, time_limit)
+    )
+    return robot.change(name=file.root.get("model", "robot")), by
+
+
+def opened(
+    path: Path,
+    base: str,
+    root: Path | None = None,
+    time_limit: float = TIME_LIMIT,
+    workers: Workers | None = None,
+) -> RobotFile:
+    """A file as :func:`proofroll.robots.opening.open_robot` reads it, its macros written out.
+
+    The engine that defines the format is asked for no longer than ``time_limit`` [s].
+    """
+
+    def expand(parts: Mapping[str, Element]) -> Element:
+        return _by_definer("mjcf", path, workers, lambda w: defining.expanded(w, path, parts, time_limit))[0]
+
+    return open_robot(path, base, root, expand)
+
+
+def _by_definer(
+    kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, defining.Compiler]]
+) -> tuple[_Answer, defining.Compiler]:
+    """Answer of the engine that defines a format.
+
+    Raises:
+        InputError: it crashed or took too long.
+    """
+    asked = _defines.get(kind, kind)
+    with lent_workers(workers) as lent:
+        try:
+            with lent.lend(asked) as worker:
+                answer, by = ask(worker)
+        except WorkerDied as error:
+            raise InputError("file", path, f"it could not be compiled: {error}") from None
+        _defines[kind] = by.engine
+        lent.rename(asked, by.engine)  # which it has loaded, and is asked next what it holds
+    return answer, by
+
+
+@lru_cache(maxsize=8)
+def meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
+    """Robot of a file with this content; MJCF is compiled in a process, so the result is kept.
+
+    Raises:
+        InputError: it has no meaning.
+    """
+    file = RobotFile(path, kind, fromstring(content), base)
+    with tempfile.TemporaryDirectory() as folder:
+        return meaning(file, reading.write(file, Path(folder)), TIME_LIMIT)[0]
