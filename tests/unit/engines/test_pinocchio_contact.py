@@ -80,9 +80,7 @@ def test_certificate(scene: str, parameters: dict[str, float], solver: str, pres
     softened = [line.quantity for line in lines if line.because]
     numbers = [] if "mu_static" in parameters else ["1 / static friction", "1 / kinetic friction"]
     assert softened == [*numbers, "acceleration", "angular acceleration", "N", "F2", "F3"]
-    if (
-        preset == "matched"
-    ):  # what it grants itself: a force that is wrong by a hundred-millionth is found
+    if preset == "matched":  # what it grants itself: a force that is wrong by a hundred-millionth is found
         assert all(line.tolerance < 2e-9 for line in lines if line.quantity not in numbers)
 
 

@@ -46,7 +46,7 @@ class Candidate:
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
 
     def limit(self, forces: bool) -> LimitFinding:
-        """What its ladder says of all that is asked for."""
+        """Finding of its ladder about all that is asked for."""
         both = (self.motion_limit, self.forces_limit) if forces else (self.motion_limit,)
         return max(both, key=_FINDINGS.index)
 

@@ -151,7 +151,7 @@ class TradeoffPart(Part):
 
 
 def _limit(budget: CurveBudget) -> str:
-    """What a curve shows of its limit of small steps: another than the truth, as far as both bars tell, or none."""
+    """Finding of a curve about its limit of small steps: unlike the truth beyond both bars, or none shown."""
     if budget.model_form is None:
         return LimitFinding.NOT_SHOWN
     known = (budget.model_form_bar or 0.0) + (budget.truth or 0.0) + (budget.floor or 0.0)
