@@ -27,12 +27,14 @@ from proofroll.elements.mechanism.sampling import (
 )
 from proofroll.engines.exudyn.connections import Connections, add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
+from proofroll.engines.exudyn.joint_laws import add_laws, along_joints, force_of
 from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
 from proofroll.engines.exudyn.settings import ExudynSettings
 
-PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT})
+_SWITCHING = {MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS}
+PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _SWITCHING | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {
-    MechanismCapability.JOINT_FRICTION: "this model has no friction in joints",
+    MechanismCapability.REBOUNDS: "its stops are springs with dampers, which have no coefficient of restitution",
     MechanismCapability.ARMATURE: "Exudyn's joints between bodies have no inertia of their own",
 }
 
@@ -61,6 +63,7 @@ class Redundant(ExudynModel):
             for between, joint in zip_longest(mechanism.connections, mechanism.joints)  # loops follow the joints
         ]
         add_springs(self.system, mechanism, self.marker)
+        self._laws = add_laws(self.system, mechanism, self.bodies, self._com, settings.dt)
         self.system.Assemble()
         self._rows = self._constraint_rows(settings)
         self._rank = independent(self._rows)
@@ -104,6 +107,10 @@ class Redundant(ExudynModel):
         force, torque = unsaid(self._mechanism)
         for number, made in enumerate(self._joints):
             force[number], torque[number] = self._connections.reaction(made)
+        for law in self._laws:
+            made, joint = self._joints[law.number], self._mechanism.joints[law.number]
+            along = force_of(self.system, law) * self._connections.axes(made)[0][:, 2]
+            (force if joint.kind == "prismatic" else torque)[law.number] += along
         return MechanismSample(
             p_WB=self._over_bodies(Output.Position),
             v_WB=self._over_bodies(Output.Velocity),
@@ -111,6 +118,7 @@ class Redundant(ExudynModel):
             q_WB=np.array([to_quaternion(R.reshape(3, 3)) for R in self._over_bodies(Output.RotationMatrix)]),
             joint_force=force,
             joint_torque=torque,
+            **(along_joints(self.system, self._mechanism, self._laws) if self._laws else {}),
         )
 
     def built(self) -> MechanismBuilt:
@@ -166,5 +174,5 @@ def _check(mechanism: Mechanism) -> None:
         if not body.mass:
             raise Refused(f"{body.name} has no mass; in redundant coordinates each body needs one")
     for joint in mechanism.joints:
-        if joint.kind == "universal" and (joint.stiffness or joint.damping):
-            raise Refused(f"Exudyn has no torsional spring or damper for the two angles of {joint.name}")
+        if joint.kind == "universal" and (joint.stiffness or joint.damping or joint.friction):
+            raise Refused(f"Exudyn has no torsional spring, damper or friction for the two angles of {joint.name}")

@@ -46,7 +46,7 @@ def seen():
         if kind == "RigidBody":
             weight = item["mass"] * np.array(GRAVITY)
             energy += told(number, "KineticEnergy") - weight @ told(number, "Position")
-        elif kind.startswith("Connector"):
+        elif kind.startswith("Connector") and not kind.endswith("Ext"):  # friction and stops tell no energy
             energy += told(number, "PotentialEnergy")
         elif kind.startswith("Joint"):
             held = np.array(item.get("constrainedAxes", [1, 1, 1])[:3])

@@ -1,0 +1,56 @@
+"""Dry friction and stops of joints in Exudyn's redundant coordinates, by its own law along a coordinate."""
+
+import mechanism_runs as runs
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism import Body, Joint, Mechanism
+
+CUBE = Body("mass", 2.0, inertia=(0.1, 0.1, 0.1))
+G = 9.81
+
+
+def slider(**law):
+    """A mass of 2 kg on a vertical guide."""
+    return Mechanism((CUBE,), (Joint("guide", "prismatic", "world", "mass", **law),))
+
+
+def test_a_mass_rests_on_its_stop():
+    """It gives way by what its weight presses a spring together that stops it within a step, and carries the weight."""
+    run = runs.build("redundant", slider(q0=(0.1,), limits=(0.0, 1.0)), dt=1e-3)
+    run.advance(1.0)
+    sample = run.sample()
+    assert sample.p_WB[0, 2] == pytest.approx(-G * 1e-6, rel=1e-3)
+    assert sample.stop == pytest.approx([2 * G], rel=1e-4)
+    np.testing.assert_allclose(sample.joint_force[0], [0, 0, 2 * G], atol=1e-3)
+
+
+def test_friction_slows_a_mass_and_holds_it():
+    """The mass loses its speed at the rate F/m, and then stands."""
+    mechanism = Mechanism(
+        (CUBE,), (Joint("guide", "prismatic", "world", "mass", v0=(1.0,), friction=8.0),), gravity=(0.0, 0.0, 0.0)
+    )
+    run = runs.build("redundant", mechanism, dt=1e-3)
+    run.advance(0.1)
+    assert run.sample().v_WB[0, 2] == pytest.approx(1 - 4 * 0.1, abs=0.02)
+    assert run.sample().friction == pytest.approx([-8.0], rel=1e-6)
+    run.advance(1.0)
+    assert run.sample().p_WB[0, 2] == pytest.approx(0.125, abs=2e-3)
+    assert abs(run.sample().v_WB[0, 2]) < 1e-6
+
+
+def test_a_hinge_rubs():
+    """A wheel on an axle loses its spin at the rate M/I."""
+    wheel = Body("wheel", 1.0, inertia=(0.1, 0.1, 0.2))
+    axle = Joint("axle", "revolute", "world", "wheel", v0=(5.0,), friction=0.2)
+    run = runs.build("redundant", Mechanism((wheel,), (axle,), gravity=(0.0, 0.0, 0.0)), dt=1e-3)
+    run.advance(2.0)  # more than a turn
+    assert run.sample().w_WB[0, 2] == pytest.approx(3.0, abs=0.02)
+    assert run.sample().joint_torque[0, 2] == pytest.approx(-0.2, rel=1e-6)
+
+
+def test_rebounds_are_refused():
+    """A stop with restitution is refused with the reason."""
+    with pytest.raises(Refused, match="springs with dampers"):
+        runs.build("redundant", slider(q0=(0.1,), limits=(0.0, 1.0), restitution=0.5))
