@@ -24,6 +24,10 @@ from proofroll.core.source_code import code_of
 _NOTHING = "nothing of this scene can be asked for besides its motion; leave it out"
 
 
+# Endings of files in the formats of engines, and of the meshes that these name.
+_MODELS = frozenset({".xml", ".mjcf", ".urdf", ".sdf", ".obj", ".stl", ".msh", ".dae"})
+
+
 @dataclass(frozen=True)
 class Scene:
     """One mechanical problem.
@@ -124,7 +128,11 @@ class Scene:
         everything = [self.name, content, self.asks, *([code] if code else [])]
         digest = hashlib.sha256(json.dumps(everything, sort_keys=True, default=str).encode())
         if self.folder != Path():
-            for file in sorted(self.folder.iterdir()):
-                if file.is_file() and file.suffix not in {".toml", ".md", ".bib"}:
-                    digest.update(file.name.encode() + file.read_bytes())
+            for file in model_files(self.folder):
+                digest.update(file.name.encode() + file.read_bytes())
         return digest.hexdigest()[:16]
+
+
+def model_files(folder: Path) -> list[Path]:
+    """Files of a scene's folder that an engine may read: models by their endings; results beside them are no matter."""
+    return [file for file in sorted(folder.iterdir()) if file.suffix.lower() in _MODELS and file.is_file()]

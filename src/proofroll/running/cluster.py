@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.core.scene import model_files
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import scene_folder
 from proofroll.files.scene_sources import source_of
@@ -224,13 +225,13 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
 
 
 def _files(case: Case) -> dict[str, bytes]:
-    """Files of a scene folder of the user's own, or of its robot file: no other machine need have them."""
+    """What decides a scene of the user's own, in its folder or a robot file: no other machine need have it."""
     if (source := source_of(case.scene)) is not None:
         return {source[1].name: source[1].read_bytes()}
     folder = scene_folder(case.scene) if case.scene else Path()
     if folder.parent == data_folder("models"):
         return {}
-    return {file.name: file.read_bytes() for file in sorted(folder.iterdir()) if file.is_file()}
+    return {file.name: file.read_bytes() for file in (folder / "scene.toml", *model_files(folder))}
 
 
 def _connected(address: str) -> tuple[Any, Any]:

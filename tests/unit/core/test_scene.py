@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,7 +17,11 @@ from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import slip_velocity
 from proofroll.elements.ball_on_surface.model import Ball, BallCapability, Contact, InitialMotion
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
+from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene
+from proofroll.running.case import EngineFacts
+from proofroll.running.cluster import _files
+from proofroll.studies.cases import case_of
 
 
 def test_paper_ball() -> None:
@@ -185,3 +190,19 @@ def test_code_of_another_package_is_in_the_digest(tmp_path: Path, monkeypatch: p
     assert len(before) == 1
     assert code_of([{"surface": wall}]) != before
     assert code_of(load_scene("sphere_in_cylinder").elements) == []
+
+
+def test_what_lies_beside_a_scene_and_is_no_model_is_no_matter(tmp_path: Path) -> None:
+    """Results beside a scene change no digest and go to no cluster; a file that an engine may read does both."""
+    folder = tmp_path / "own"
+    shutil.copytree(data_folder("models") / "inclined_plane", folder)
+    before = load_scene(str(folder)).digest
+    (folder / "run.nc").write_bytes(b"x" * 1000)
+    (folder / "out").mkdir()
+    scene = load_scene(str(folder))
+    assert scene.digest == before
+    engine = EngineFacts("projection", "1", "code", {})
+    sent = _files(case_of(str(folder), scene, (), engine, 1.0, 0.1))
+    assert sorted(sent) == ["mujoco_chart.xml", "mujoco_free.xml", "scene.toml"]
+    (folder / "mujoco_free.xml").write_text("<mujoco/>")
+    assert load_scene(str(folder)).digest != before
