@@ -21,7 +21,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
 from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.exudyn import redundant, tree
+from proofroll.engines.exudyn import redundant, spheres, tree
 from proofroll.engines.exudyn.carrier import Carrier
 from proofroll.engines.exudyn.contact import PenaltyContact
 from proofroll.engines.exudyn.generic import Generic
@@ -31,6 +31,7 @@ from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.redundant import Redundant
 from proofroll.engines.exudyn.rolling_disc import RollingDisc
 from proofroll.engines.exudyn.settings import PRESETS, ExudynSettings
+from proofroll.engines.exudyn.spheres import Spheres
 from proofroll.engines.exudyn.tree import KinematicTree
 from proofroll.engines.exudyn.world_coordinates import WorldCoordinates
 
@@ -40,7 +41,11 @@ OF_BALLS: Mapping[str, Callable[[RollingBall, ExudynSettings], ExudynModel]] = {
     "rolling_disc": RollingDisc,
     "contact": PenaltyContact,
 }
-OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {"redundant": Redundant, "tree": KinematicTree}
+OF_MECHANISMS: Mapping[str, type[Redundant | KinematicTree]] = {
+    "redundant": Redundant,
+    "spheres": Spheres,
+    "tree": KinematicTree,
+}
 _HELD = "its constraint holds the ball on the wall"
 _ROLLS_AT_REST: Mapping[str, str] = {
     BallCapability.IMPACTS: _HELD,
@@ -62,6 +67,7 @@ class Exudyn:
         "rolling_disc": ROLLS | {BallCapability.ORIENTATION},
         "contact": ALL_OF_A_BALL | {BallCapability.IMPACTS},
         "redundant": redundant.PROVIDES,
+        "spheres": spheres.PROVIDES,
         "tree": tree.PROVIDES,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
@@ -76,6 +82,7 @@ class Exudyn:
         "carrier": _ROLLS_AT_REST,
         "rolling_disc": _ROLLS_AT_REST,
         "redundant": redundant.LACKING,
+        "spheres": spheres.LACKING,
         "tree": tree.LACKING,
     }
     settings: ClassVar[type[ExudynSettings]] = ExudynSettings
@@ -86,19 +93,20 @@ class Exudyn:
         "rolling_disc": Level.CONSTRAINT,
         "contact": Level.CONTACT,
         "redundant": Level.CONSTRAINT,
+        "spheres": Level.CONTACT,
         "tree": Level.REDUCED,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
             "new Jacobian at every step",
-            ("carrier", "rolling_disc", "contact", "redundant"),
+            ("carrier", "rolling_disc", "contact", "redundant", "spheres"),
             {"jacobian": "step"},
             {"jacobian": "reused"},
             "lets Newton's method end after two or three iterations where an old Jacobian needs seven",
         ),
         Term(
             "halving of steps",
-            ("contact",),
+            ("contact", "spheres"),
             {"halvings": 10},
             {"halvings": 0},
             "goes on where Newton's method fails at the edge of the friction zone",
@@ -156,6 +164,8 @@ class Exudyn:
         from proofroll.engines.exudyn.reproducer import mechanism, source
 
         model = cls.build(scene, settings)
+        if settings.formulation == "spheres":
+            raise Refused("programs hold no contacts between bodies yet")
         if settings.formulation in OF_MECHANISMS:
             return mechanism.source(model, mechanism_of(scene), settings)
         return source(model, rolling_ball(scene), settings)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import zip_longest
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -45,11 +45,18 @@ _DIFFERENCED = Regularised(
 
 
 class Redundant(ExudynModel):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """See :class:`proofroll.core.engine.Engine` for the methods.
+
+    Attributes:
+        provides, lacking: of its formulation.
+    """
+
+    provides: ClassVar[frozenset[str]] = PROVIDES
+    lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def __init__(self, scene: Any, settings: ExudynSettings) -> None:
         mechanism = mechanism_of(scene)
-        require(mechanism, PROVIDES, LACKING)
+        require(mechanism, self.provides, self.lacking)
         _check(mechanism)
         self._mechanism = mechanism
         super().__init__()
@@ -64,6 +71,7 @@ class Redundant(ExudynModel):
         ]
         add_springs(self.system, mechanism, self.marker)
         self._laws = add_laws(self.system, mechanism, self.bodies, self._com, settings.dt)
+        self._add_contacts(mechanism, settings)
         self.system.Assemble()
         self._rows = self._constraint_rows(settings)
         self._rank = independent(self._rows)
@@ -89,6 +97,9 @@ class Redundant(ExudynModel):
             self.bodies[body.name] = made
             marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=made))
             system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self._mechanism.gravity))
+
+    def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
+        """Adds contacts; this formulation has none."""
 
     def _constraint_rows(self, settings: ExudynSettings) -> Array:
         """Rows of all constraints on Exudyn's velocities; free axes have none."""

@@ -19,8 +19,8 @@ class ExudynSettings:
         formulation: ``generic`` (minimal coordinates and multipliers), ``carrier`` (rigid ball on a massless carrier,
             built-in joints only), ``rolling_disc`` (the engine's rolling-disc joint, re-aimed at every iterate) or
             ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction); of
-            mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints) or ``tree`` (its
-            kinematic tree in joint coordinates).
+            mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same
+            with its penalty contacts of spheres) or ``tree`` (its kinematic tree in joint coordinates).
         preset: which preset the values started from.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
@@ -30,14 +30,15 @@ class ExudynSettings:
         newton_tolerance: relative tolerance of Newton's method [1]; the absolute one is a hundredth of it, which is
             the engine's own ratio. Explicit integrators have none, and look at neither this nor ``jacobian``.
         jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
-        halvings: how often a step is halved where Newton's method fails, before the run ends; ``contact`` only, as the
-            following. With 0, and in the other formulations, all steps are dt.
+        halvings: how often a step is halved where Newton's method fails, before the run ends; ``contact`` and
+            ``spheres`` only, as the following. With 0, and in the other formulations, all steps are dt.
         stiffness: of the contact's normal force [N/m].
         friction_zone: slip velocity up to which friction is proportional to it [m/s].
         grip: coefficient that stands for unbounded friction [1]; the ball creeps by friction_zone |F| / (grip N).
+            ``contact`` only.
     """
 
-    formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "tree"] = "generic"
+    formulation: Literal["generic", "carrier", "rolling_disc", "contact", "redundant", "spheres", "tree"] = "generic"
     preset: Literal["default", "matched", "tuned"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-4
     integrator: Literal["generalized_alpha", "trapezoidal_index2", "rk44", "rk67"] = "trapezoidal_index2"
@@ -69,11 +70,11 @@ class ExudynSettings:
             self._has_no("spectral_radius", "the trapezoidal rule has no damping; set integrator=generalized_alpha")
         if self.integrator in EXPLICIT:
             self._has_no("spectral_radius", "explicit integrators have no damping; leave it out")
-        for name in CONTACT_ONLY:
-            if self.formulation != "contact":
+        for name in CONTACT_ONLY["contact"]:
+            if name not in CONTACT_ONLY.get(self.formulation, ()):
                 self._has_no(name, f"{self.formulation} does not use it; set formulation=contact")
             elif getattr(self, name) is None:
-                raise InputError(f"exudyn: {name}", None, "formulation=contact needs a number")
+                raise InputError(f"exudyn: {name}", None, f"formulation={self.formulation} needs a number")
 
     def _has_no(self, name: str, advice: str) -> None:
         value = getattr(self, name)
@@ -86,16 +87,19 @@ class ExudynSettings:
 
     @property
     def penalty(self) -> tuple[float, float, float]:
-        """Stiffness [N/m], friction zone [m/s] and grip [1] of the contact."""
+        """Stiffness [N/m], friction zone [m/s] and grip [1] of the contact; without a grip none can stand for it."""
         assert self.stiffness is not None  # see __post_init__, here and below
         assert self.friction_zone is not None
-        assert self.grip is not None
-        return self.stiffness, self.friction_zone, self.grip
+        return self.stiffness, self.friction_zone, self.grip or 0.0
 
 
 # Explicit integrators, and their order.
 EXPLICIT = {"rk44": 4, "rk67": 6}
-CONTACT_ONLY = ("halvings", "stiffness", "friction_zone", "grip")
+# Settings that formulations with a penalty contact alone have.
+CONTACT_ONLY: Mapping[str, tuple[str, ...]] = {
+    "contact": ("halvings", "stiffness", "friction_zone", "grip"),
+    "spheres": ("halvings", "stiffness", "friction_zone"),
+}
 
 
 # ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Its own step,
@@ -166,6 +170,17 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         # offers too, and nodes without Euler parameters do worse.
         # Dependent constraints leave Newton's method with more round-off than a tighter tolerance asks for.
         "tuned": ExudynSettings("redundant", "tuned", 1e-3, "trapezoidal_index2", None, 1e-8, "reused"),
+    },
+    "spheres": {
+        # Integrator, Newton options, adaptive step and friction zone as Exudyn has them; a stiffness it does not have.
+        "default": ExudynSettings(
+            "spheres", "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused", 10, 1e6, 1e-3, None
+        ),
+        # A tenth of the default's creep. Newton's method leaves the edge of the zone with more round-off than a
+        # tighter tolerance asks for.
+        "matched": ExudynSettings(
+            "spheres", "matched", 1e-3, "generalized_alpha", 0.9, 1e-6, "step", 10, 1e6, 1e-4, None
+        ),
     },
     "tree": {
         "default": ExudynSettings("tree", "default", 1e-3, "rk44"),
