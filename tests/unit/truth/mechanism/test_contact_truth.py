@@ -210,3 +210,26 @@ def test_friction_of_joints_beside_contact_is_refused() -> None:
     axle = replace(table.joints[0], friction=0.1)
     with pytest.raises(Refused, match="dry friction or stops of joints beside contacts"):
         truth_of(replace(table, joints=(axle, *table.joints[1:])), np.array([0.0, 0.1]))
+
+
+def test_a_table_and_the_ball_on_it_keep_their_moment_of_momentum() -> None:
+    """A ball that rolls on a free turntable drives it, and what one gains about the axle the other loses."""
+    found = motion("free_turntable", [0.0, 0.2])
+    assert happened(found) == []
+    p, v = found.record.p_WB[:, 1], found.record.v_WB[:, 1]
+    spin = found.record.w_WB[:, 0, 2]
+    moment = 0.02 * spin + 0.3 * (p[:, 0] * v[:, 1] - p[:, 1] * v[:, 0])
+    assert moment == pytest.approx(0.125, abs=DIGITS)
+    assert abs(spin[1] - spin[0]) > 0.01
+    energy = found.record.placed(mechanism_of("free_turntable")).energy()
+    assert energy == pytest.approx(energy[0], abs=DIGITS)
+
+
+def test_a_disc_rolls_on_its_edge_without_loss() -> None:
+    """Rolling keeps the energy of a tilted disc, whose edge touches at every time."""
+    found = motion("tilted_disc", [0.0, 0.2])
+    assert happened(found) == []
+    energy = found.record.placed(mechanism_of("tilted_disc")).energy()
+    assert energy == pytest.approx(energy[0], abs=DIGITS)
+    assert found.pressed is not None
+    assert (found.pressed[:, 0, 2] > 0).all()
