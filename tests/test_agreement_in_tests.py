@@ -224,6 +224,13 @@ def test_a_word_in_a_table(tmp_path: Path) -> None:
         proofroll.judge(file, "pendulum")
 
 
+def test_a_quote_without_an_end(tmp_path: Path) -> None:
+    """A CSV file that is no CSV is one line with the place."""
+    (file := tmp_path / "own.csv").write_text('time [s],q.pivot [rad]\n0.0,"2.8\n0.1,2.7\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 3: unexpected end of data"):
+        proofroll.judge(file, "pendulum")
+
+
 def test_bodies_in_another_order(tmp_path: Path) -> None:
     """Bodies of a file stand in the order of the scene, or are told to."""
     run = proofroll.simulate("double_pendulum", "projection", until=0.1)

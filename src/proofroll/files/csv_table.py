@@ -46,7 +46,11 @@ def read_csv(text: str) -> xr.Dataset:
     Raises:
         ValueError: it is no table of numbers under names, one of them time.
     """
-    rows = list(csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True))
+    reader = csv.reader(io.StringIO(text.removeprefix("\ufeff")), strict=True)
+    try:
+        rows = list(reader)
+    except csv.Error as error:  # as a quote without an end
+        raise ValueError(f"line {reader.line_num}: {error}") from None
     header = [field.strip() for field in rows[0]] if rows else []
     numbers = _numbers(header, rows[1:])
     columns: dict[str, dict[tuple[str, ...], Any]] = {}
