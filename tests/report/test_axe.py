@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,16 @@ def grave(visit: Visit) -> list[str]:
         for item in found
         if item["impact"] in {"moderate", "serious", "critical"}
     ]
+
+
+def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visit: Visiting) -> None:
+    """With two comparisons that have the same points and settings, axe finds nothing either."""
+    first = everything.content.comparisons[0]
+    content = replace(everything.content, comparisons=[first, replace(first, name="again", title="Again")])
+    both = replace(everything, content=content, curves=2 * everything.curves)
+    with visit(both.write(tmp_path / "report.html")) as opened:
+        opened.page.add_script_tag(content=Path(AXE_FILE_PATH).read_text(encoding="utf-8"))
+        assert grave(opened) == []
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (900, "dark"), (400, "light")])

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from proofroll.core.errors import InputError
@@ -15,8 +16,13 @@ from proofroll.report.long_table import COLUMNS, TableLine
 
 # Round-off of another build may change an error by this part of the quantity's size, and by this part of itself.
 _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
-# Intervals of costs that do not meet are news where the costs differ by this factor, too: hundreds are compared.
-_COST = 1.2
+# Intervals of costs that do not meet are news where the costs differ by this factor, too: hundreds are compared, and a
+# machine is slower at one time than at another.
+_COST = 1.5
+
+
+# So many costs tell how much slower the machine was.
+_ENOUGH = 5
 
 
 @dataclass(frozen=True)
@@ -45,6 +51,7 @@ class Against:
         date: when it was written.
         versions: what ran in another version: name -> both versions.
         costs: costs were compared, for both reports are of one machine.
+        drift: median ratio of all costs, by which old ones are multiplied first: the machine's, not the engines'.
         compared: how many runs are in both.
         changes: the runs that changed.
     """
@@ -53,6 +60,7 @@ class Against:
     date: str
     versions: dict[str, tuple[str, str]]
     costs: bool
+    drift: float
     compared: int
     changes: list[RunChange]
 
@@ -73,7 +81,11 @@ class Against:
             "new": "new runs",
         }
         said = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in words.items() if kind in kinds)
-        costs = "" if self.costs else "; costs are of another machine and not compared"
+        costs = f"; costs are {number(self.drift)} of the old ones throughout, which is left out"
+        if not self.costs:
+            costs = "; costs are of another machine and not compared"
+        elif 1 / _COST < self.drift < _COST:
+            costs = ""
         return f"Of {counted(self.compared, 'runs')} in both reports, changed: {said or 'nothing'}{costs}."
 
 
@@ -117,6 +129,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
     before, after = _runs(old.lines), _runs(lines)
     shared = {study for study, *_ in before} & {study for study, *_ in after}
     costs = old.machine == machine
+    drift = _drift((_first(before[key]), _first(run)) for key, run in after.items() if key in before)
     changes = []
     for key in dict.fromkeys([*after, *before]):
         study, place, run, *_ = key
@@ -125,7 +138,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         if key not in after or key not in before:
             changes.append(RunChange(study, run, place, "gone" if key not in after else "new", []))
             continue
-        found = list(_changes(before[key], after[key], costs=costs))
+        found = list(_changes(before[key], after[key], drift=drift if costs else None))
         if found:
             kinds = [kind for kind, _ in found]
             first = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
@@ -136,7 +149,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         if name in versions and versions[name] != version
     }
     both = sum(key in before for key in after)
-    return Against(str(old.path), old.date, others, costs, both, changes)
+    return Against(str(old.path), old.date, others, costs, drift, both, changes)
 
 
 def _runs(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
@@ -149,9 +162,11 @@ def _runs(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[st
     return {(*key, place): run for key, found in rows.items() for place, run in enumerate(found.values())}
 
 
-def _changes(before: dict[str, TableLine], after: dict[str, TableLine], *, costs: bool) -> Iterator[tuple[str, str]]:
+def _changes(
+    before: dict[str, TableLine], after: dict[str, TableLine], *, drift: float | None
+) -> Iterator[tuple[str, str]]:
     """Kind and clause of each change of a run."""
-    one, other = next(iter(before.values())), next(iter(after.values()))
+    one, other = _first(before), _first(after)
     if one.status != other.status:
         yield "verdict", f"{one.status} → {other.status} {other.message}".rstrip()
         return
@@ -170,7 +185,7 @@ def _changes(before: dict[str, TableLine], after: dict[str, TableLine], *, costs
         yield "value", f"{max(values)[1]}{more}"
     for name in before.keys() - after.keys():
         yield "verdict", f"{name} is gone"
-    if costs and (text := _cost(one, other)):
+    if drift is not None and (text := _cost(one, other, drift)):
         yield "cost", text
 
 
@@ -184,12 +199,32 @@ def _beyond(old: TableLine, new: TableLine) -> float:
     return max(0.0, abs(new.error - old.error) - allowed) / scale
 
 
-def _cost(old: TableLine, new: TableLine) -> str:
+def _first(run: dict[str, TableLine]) -> TableLine:
+    """A line of a run, for what all of them say."""
+    return next(iter(run.values()))
+
+
+def _interval(line: TableLine) -> tuple[float, float, float] | None:
+    """Lowest, median and highest cost; None: the cost has no interval."""
+    if line.cost is None or line.cost_low is None or line.cost_high is None:
+        return None
+    return line.cost_low, line.cost, line.cost_high
+
+
+def _drift(pairs: Iterable[tuple[TableLine, TableLine]]) -> float:
+    """Median ratio of new costs to old ones; 1 where there are too few to tell."""
+    both = [(_interval(old), _interval(new)) for old, new in pairs]
+    ratios = [new[1] / old[1] for old, new in both if old and new and old[1]]
+    return median(ratios) if len(ratios) >= _ENOUGH else 1.0
+
+
+def _cost(old: TableLine, new: TableLine, drift: float) -> str:
     """A cost beyond both intervals, as a clause; empty: it is not, or an interval is not known."""
-    if None in (old.cost, old.cost_low, old.cost_high, new.cost, new.cost_low, new.cost_high):
+    one, other = _interval(old), _interval(new)
+    if one is None or other is None:
         return ""
-    low, high = sorted((old, new), key=lambda line: line.cost or 0.0)
-    if (high.cost_low or 0.0) <= (low.cost_high or 0.0) or (high.cost or 0.0) < _COST * (low.cost or 0.0):
+    low, high = sorted(([drift * value for value in one], list(other)), key=lambda item: item[1])
+    if high[0] <= low[2] or high[1] < _COST * low[1]:
         return ""
     between = [f"{number(line.cost)} ({number(line.cost_low)} to {number(line.cost_high)})" for line in (old, new)]
     return f"cost {between[0]} → {between[1]} s/s"

@@ -73,6 +73,17 @@ def test_costs_of_other_machines_are_not_compared() -> None:
     assert held(changed(0, cost=0.012, cost_low=0.0105, cost_high=0.013)).changes == []
 
 
+def test_a_machine_that_is_slower_throughout_accuses_no_engine() -> None:
+    """Where most costs grew alike, that is told once; the run that grew by more is named."""
+    old = [replace(LINE, row=number, engine=f"e{number}") for number in range(8)]
+    slow = [replace(line, **SLOW) for line in old]
+    found = held(slow, old=old)
+    assert found.changes == []
+    assert "costs are 2 of the old ones throughout" in found.sentence
+    slow[3] = replace(slow[3], cost=0.05, cost_low=0.048, cost_high=0.052)
+    assert [(item.run.split()[0], item.kind) for item in held(slow, old=old).changes] == [("e3", "cost")]
+
+
 def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:
     """A run that is not made any more is a change; one that is new is told; other studies are left alone."""
     assert [(item.kind, item.run) for item in held(LINES[:2]).changes] == [("gone", "beta joints default dt 1e-3")]
