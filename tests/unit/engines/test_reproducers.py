@@ -152,6 +152,17 @@ def test_a_mechanism_moves_as_in_the_adapter(formulation: str, options: dict[str
     assert opened < 1e-14  # 2e-12 without
 
 
+@pytest.mark.parametrize("name", ["stop", "spring_friction"])
+def test_a_program_has_friction_and_stops_of_joints(name: str) -> None:
+    """Exudyn's law along a coordinate is part of the program, though it tells no energy."""
+    kind, scene = kind_of("exudyn"), load_scene(name)
+    settings = resolve_settings(kind, {"formulation": "redundant", "preset": "tuned"})
+    ((places, _, _),) = program("exudyn", settings, scene)["run"]([0.6])
+    adapter = kind.build(scene, settings)
+    adapter.advance(0.6)
+    np.testing.assert_allclose(places, adapter.sample().p_WB, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("engine", "options", "parameters", "words"),
     [
