@@ -209,7 +209,7 @@ def test_what_a_formulation_lacks_is_refused_with_the_reason(formulation):
             runs.build(formulation, mechanism)
 
 
-@pytest.mark.parametrize("formulation", ["joints", "null_space", "constraint_dynamics"])
+@pytest.mark.parametrize("formulation", ["joints", "null_space", "constraint_dynamics", "dependent"])
 def test_the_inertia_of_a_drive_slows_its_coordinate(formulation):
     """A pendulum with an armature swings as the truth says, slower than without."""
     mechanism = runs.model("pendulum")

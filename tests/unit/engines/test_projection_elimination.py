@@ -12,6 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
 from proofroll.elements.ball_on_surface.compiled.library import available
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.sampling import independent
 from proofroll.engines.projection.connections import Bodies
 from proofroll.engines.projection.dependent import DependentCoordinates
@@ -147,3 +148,25 @@ def test_compiled_equations_refuse_what_they_do_not_hold(name, reason):
     kind = load_engine("projection")
     with pytest.raises(Refused, match=reason):
         kind.build(mechanism, kind.presets["dependent"]["tuned"])
+
+
+@pytest.mark.parametrize(
+    ("law", "effort"),
+    [
+        ({"kind": "torque", "target": 3.0, "gear": 2.0}, lambda _q, _v: 6.0),
+        ({"kind": "velocity", "target": 3.0, "kd": 2.0, "gear": 2.0}, lambda _q, v: 2 * 2 * (3 - 2 * v)),
+        ({"kind": "position", "target": 3.0, "kp": 5.0, "kd": 2.0, "gear": 2.0}, lambda q, v: 10 * (3 - 2 * q) - 8 * v),
+    ],
+)
+def test_an_actuator_moves_its_joint(law, effort):
+    """The effort is that of its law at the present coordinate and velocity, and accelerates the mass."""
+    body = Body("b", 2.0, inertia=(0.2, 0.2, 0.3))
+    joint = Joint("j", "prismatic", "world", "b", q0=(0.1,), v0=(0.4,))
+    motor = Actuator("m", "j", **law)
+    run = runs.build("dependent", Mechanism((body,), (joint,), gravity=(0.0, 0.0, 0.0), actuators=(motor,)))
+    for _ in range(2):
+        sample = run.sample()
+        expected = effort(sample.p_WB[0, 2], sample.v_WB[0, 2])
+        np.testing.assert_allclose(sample.effort, [expected], rtol=1e-12)
+        np.testing.assert_allclose(sample.joint_force[0, 2], expected, rtol=1e-12)
+        run.advance(0.1)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.elements.mechanism import Joint, Mechanism
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.connections import SKEW, Bodies, Ends
@@ -37,6 +38,12 @@ class Applied:
     def __init__(self, mechanism: Mechanism) -> None:
         index, count = mechanism.body_index, len(mechanism.bodies)
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
+        number = {joint.name: index for index, joint in enumerate(mechanism.joints)}
+        self._motors = [
+            _motor(actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
+            for actuator in mechanism.actuators
+        ]
+        self._laws += self._motors
         sprung = [law for law in self._laws if law.stiffness and law.axis != "slide"]
         start = ((law, mechanism.joints[law.connection].q0) for law in sprung)
         self._angles = {law: q0[1 if law.axis == "x" else 0] for law, q0 in start}
@@ -82,18 +89,20 @@ class Applied:
     def of_joints(self, ends: Ends) -> tuple[Array, Array]:
         """Forces and moments of the joints' own laws on body b at its point, world axes, (connections, 3) each."""
         force, torque = np.zeros_like(ends.d), np.zeros_like(ends.d)
-        w = 0.5 * ends.relative[:, :3, :3].reshape(-1, 9) @ SKEW.T
         for law in self._laws:
-            c = law.connection
-            direction = ends.B[c, :, 0] if law.axis == "x" else ends.A[c, :, 2]
-            rate = direction @ (ends.e if law.axis == "slide" else w)[c]
-            size = law.drive - law.damping * rate
-            if law.stiffness:
-                size -= law.stiffness * (self._coordinate(law, ends) - law.rest)
-            (force if law.axis == "slide" else torque)[c] += size * direction
+            on = force if law.axis == "slide" else torque
+            on[law.connection] += self._size(law, ends) * _direction(law, ends)
         for c, damping in self._balls:
-            torque[c] -= damping * w[c]
+            torque[c] -= damping * 0.5 * ends.relative[c, :3, :3].ravel() @ SKEW.T
         return force, torque
+
+    def efforts(self, ends: Ends) -> Array:
+        """Efforts of the actuators at their joints, (actuators,)."""
+        return np.array([self._size(law, ends) for law in self._motors])
+
+    def _size(self, law: _Law, ends: Ends) -> float:
+        size = law.drive - law.damping * self._rate(law, ends)
+        return size - law.stiffness * (self._coordinate(law, ends) - law.rest) if law.stiffness else size
 
     def watched(self, ends: Ends) -> list[tuple[float, float]]:
         """Coordinate and velocity of each joint with dry friction or stops."""
@@ -102,9 +111,8 @@ class Applied:
     @staticmethod
     def _rate(law: _Law, ends: Ends) -> float:
         c = law.connection
-        direction = ends.B[c, :, 0] if law.axis == "x" else ends.A[c, :, 2]
         w = 0.5 * ends.relative[c, :3, :3].ravel() @ SKEW.T
-        rate: float = direction @ (ends.e[c] if law.axis == "slide" else w)
+        rate: float = _direction(law, ends) @ (ends.e[c] if law.axis == "slide" else w)
         return rate
 
     def _coordinate(self, law: _Law, ends: Ends) -> float:
@@ -128,6 +136,19 @@ class Applied:
         """Remembers the angles of springs, so that they may turn more than once."""
         for law in self._angles:
             self._angles[law] = self._coordinate(law, ends)
+
+
+def _direction(law: _Law, ends: Ends) -> Array:
+    return ends.B[law.connection, :, 0] if law.axis == "x" else ends.A[law.connection, :, 2]
+
+
+def _motor(actuator: Actuator, number: int, joint: Joint) -> _Law:
+    """The effort of an actuator with a constant target, as a spring, damper and drive at its joint."""
+    n, target = actuator.gear, actuator.target
+    assert isinstance(target, float)  # other targets are refused
+    gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
+    axis = "slide" if joint.kind == "prismatic" else "z"
+    return _Law(number, axis, n * n * actuator.kp, 0.0, n * n * actuator.kd, n * gain * target)
 
 
 def _laws(number: int, joint: Joint) -> list[_Law]:

@@ -243,6 +243,10 @@ class DependentCoordinates:
         torque[at] = total[:, :3, :3].reshape(-1, 9) @ SKEW.T - cross(ends.place[at], force[at])
         return force, torque
 
+    def efforts(self, bodies: Bodies) -> Array:
+        """Efforts of the actuators at their joints, (actuators,)."""
+        return self.applied.efforts(self.connections.ends(bodies, slice(0, self._joints)))
+
     def constraint_rows(self, bodies: Bodies) -> Array:
         """Rows of all connections on the velocities of the bodies, (rows, 6 bodies)."""
         ends, every = self.connections.ends(bodies), self.connections.constraints()

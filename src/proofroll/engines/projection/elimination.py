@@ -67,6 +67,7 @@ class Elimination:
     Attributes:
         behind: 1 where a body is carried by a joint, (joints, bodies).
         joint: the joint of each velocity; ``turns`` whether it turns its child.
+        armature: inertia of the drive along each velocity.
     """
 
     def __init__(self, mechanism: Mechanism, connections: ProjectedConnections) -> None:
@@ -92,6 +93,7 @@ class Elimination:
                 own[:3, 3] = -own[:3, :3] @ place
             else:
                 own[:3, 3] = direction
+        self.armature = np.array([joints[number].armature for number in self.joint.tolist()])
         self._carrier = np.array(carriers, dtype=np.intp)
         # bodies behind each velocity, and velocities before each body; the world moves with none
         self._sums = self.behind[self.joint]
@@ -119,7 +121,7 @@ class Elimination:
         S, inertia = self.directions(bodies), self.inertia(bodies).reshape(-1, 16)
         moved = (S @ (self._sums @ inertia).reshape(-1, 4, 4)).reshape(-1, 16)
         flat = S.reshape(-1, 16)
-        return Space(flat, (flat @ moved.T) * self._related)
+        return Space(flat, (flat @ moved.T) * self._related + np.diag(self.armature))
 
     def forces(self, bodies: Bodies, acceleration: Array) -> Array:
         """Forces that bodies need for accelerations [α× a; 0 0] along their own axes, (…, bodies, 4, 4).

@@ -29,13 +29,16 @@ PROVIDES = frozenset(
     | FORCES
     | {
         MechanismCapability.REDUNDANT,
+        MechanismCapability.ACTUATORS,
+        MechanismCapability.ARMATURE,
         MechanismCapability.JOINT_FRICTION,
         MechanismCapability.STOPS,
         MechanismCapability.REBOUNDS,
     }
 )
 LACKING: Mapping[str, str] = {
-    MechanismCapability.ARMATURE: "the mass matrix of dependent coordinates is that of the bodies alone",
+    MechanismCapability.SATURATION: "its switches are those of friction and stops",
+    MechanismCapability.SIGNALS: "its equations do not depend on time",
 }
 # Regularity of the loops' rows over the largest on the way: accelerations lose as many digits as it has zeros. Loops
 # that pass a singular pose by a hundredth of a radian have some hundredth.
@@ -118,6 +121,7 @@ class ProjectionMechanism:
             q_WB=q / np.linalg.norm(q, axis=1, keepdims=True),
             joint_force=force,
             joint_torque=torque,
+            effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
         )
 
