@@ -66,6 +66,14 @@ def test_a_sled_turns_about_a_foot_and_rests() -> None:
     assert found.record.v_WB[2] == pytest.approx(0.0, abs=1e-15)
 
 
+def test_a_sled_on_a_slope_turns_about_a_foot_and_rests() -> None:
+    """Where the slope unloads a foot, times and place of rest are the laboratory's, too."""
+    found = motion("sled_on_slope", [0.0, 0.95])
+    assert happened(found) == [("stick", "right"), ("rest", "left"), ("rest", "back")]
+    times_of(found, 0.778538681103, 0.898021026008, 0.898021026008)
+    assert found.record.p_WB[1, 0, :2] == pytest.approx([0.3727448404, 0.308618949299], abs=DIGITS)
+
+
 def test_a_sphere_with_its_mass_off_its_centre_slides_and_rolls() -> None:
     """It rolls from the laboratory's time on, and is where that found it; so is the force."""
     found = motion("eccentric_sphere", [0.0, 2.0])
@@ -185,6 +193,18 @@ def test_a_ball_moves_as_its_own_truth_says(
     for (_, theirs), event in zip(expected, found.events, strict=True):
         assert event.time_low - 1e-12 <= theirs.time_high
         assert theirs.time_low <= event.time_high + 1e-12
+
+
+def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
+    """A ball that bounces to a fifth of its speed settles after one and a half times the time of its fall."""
+    mechanism, _ = as_bodies("bouncing_ball", 0.1, 0.0, height=0.05, restitution=0.2)
+    found = truth_of(mechanism, np.array([0.0, 0.2]))
+    rests = np.sqrt(2 * 0.05 / 9.81) * (1 + 0.2) / (1 - 0.2)
+    assert found.events[-1].kind == "settle"
+    assert found.events[-1].time == pytest.approx(rests, abs=DIGITS)
+    assert found.record.p_WB[1, 0] == pytest.approx([0, 0, 0.025], abs=1e-15)
+    assert found.pressed is not None
+    assert found.pressed[1, 0, 2] == pytest.approx(0.517 * 9.81, abs=DIGITS)
 
 
 def test_friction_that_tears_is_refused() -> None:
