@@ -225,7 +225,7 @@ def _made(content: dict[str, Any], data: bytes | None, path: Path) -> Result:
 
 
 def _files(case: Case) -> dict[str, bytes]:
-    """What decides a scene of the user's own, in its folder or a robot file: no other machine need have it."""
+    """Content that decides a scene of the user's own, from its folder or robot file: no other machine need have it."""
     if (source := source_of(case.scene)) is not None:
         return {source[1].name: source[1].read_bytes()}
     folder = scene_folder(case.scene) if case.scene else Path()
