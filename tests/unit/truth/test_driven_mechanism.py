@@ -66,6 +66,16 @@ def test_a_limit_that_is_never_reached_changes_nothing() -> None:
     assert np.abs(one.record.q - two.record.q).max() <= one.bars["q"][-1] + two.bars["q"][-1]
 
 
+def test_one_effort_at_its_limit_all_the_time_is_clamped_beside_another_that_never_is() -> None:
+    """Of two motors with limits, one pushes with its limit from the start on, though nothing ever switches."""
+    bodies = (Body("a", 1.0, inertia=ONES), Body("b", 1.0, inertia=ONES))
+    joints = (Joint("one", "prismatic", "world", "a"), Joint("two", "prismatic", "world", "b"))
+    motors = (Actuator("m", "one", "torque", 5.0, limit=2.0), Actuator("n", "two", "torque", 1.0, limit=2.0))
+    found = truth_of(Mechanism(bodies, joints, actuators=motors, gravity=(0, 0, 0)), np.array([0.0, 1.0]))
+    assert found.record.q[1] == pytest.approx([1.0, 0.5], abs=TIGHT)
+    assert found.events == ()
+
+
 def test_a_gear_carries_the_force_of_the_second_wheel() -> None:
     """Both wheels turn as their reflected inertia says, and the gear pushes the second one with -1 N m."""
     found = motion("gear_pair", [0.0, 0.5, 1.0])

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import breaks
+from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.truth.hybrid import HybridPath, Stretch, follow, least_margin, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
@@ -49,6 +49,8 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """
     times = np.asarray(times, dtype=float)
     if mechanism.contacts:
+        if any(map(varies, mechanism.signals)) or any(actuator.limit for actuator in mechanism.actuators):
+            raise Refused("no route follows contacts together with limits of efforts or with what changes in time")
         return contact_truth(mechanism, times)
     equations = JointCoordinates(mechanism)
     kinks = breaks(mechanism.signals)
@@ -58,7 +60,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     try:
         if smooth:
             look = follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1]))
-            if not look.happenings and not any("linear" not in leg.mode for leg in look.legs if equations.limited):
+            if not look.happenings and not any(own in {"least", "greatest"} for own in look.legs[0].mode):
                 return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
         return _switched(mechanism, equations, times)
     except Diverged as stopped:
