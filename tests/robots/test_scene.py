@@ -136,7 +136,7 @@ def test_what_no_scene_has_is_refused_by_name(robot):
     assert "j3" in {joint.name for joint in load_scene(mimic, couplings=0).elements[0].mechanism.joints}
     rough = robot("rough.urdf", urdf(second='<dynamics friction="2"/>'))
     with pytest.raises(Refused, match="needs dry friction in joints"):
-        simulate(load_scene(rough), "projection", until=0.1)
+        simulate(load_scene(rough), "pinocchio", until=0.1)
     assert load_scene(rough, friction=0).requires < load_scene(rough).requires
     tendon = mjcf(extra="").replace(
         "<actuator>", '<tendon><fixed name="cord" stiffness="3"><joint joint="k1" coef="1"/></fixed></tendon><actuator>'
@@ -179,7 +179,7 @@ def test_stops_are_there_when_asked_for(robot):
     path = robot("arm.urdf", urdf())
     assert load_scene(path, limits=1).requires - load_scene(path).requires == {"stops of joints"}
     with pytest.raises(Refused, match="stops of joints"):
-        simulate(load_scene(path, limits=1), "projection", until=0.1)
+        simulate(load_scene(path, limits=1), "pinocchio", until=0.1)
     struck = truth(load_scene(path, limits=1, speed=3), np.linspace(0, 1, 3))
     assert [(event.kind, event.name) for event in events_of(struck)] == [("impact", "j2")]  # it leaves at once
     assert "ill_posed" not in struck.attrs
