@@ -228,8 +228,7 @@ def _files(case: Case) -> dict[str, bytes]:
     """Content that decides a scene of the user's own, from its folder or robot file: no other machine need have it."""
     if (source := source_of(case.scene)) is not None:
         return {source[1].name: source[1].read_bytes()}
-    folder = scene_folder(case.scene) if case.scene else Path()
-    if folder.parent == data_folder("models"):
+    if not case.scene or (folder := scene_folder(case.scene)).parent == data_folder("models"):
         return {}
     return {file.name: file.read_bytes() for file in (folder / "scene.toml", *model_files(folder))}
 

@@ -156,7 +156,7 @@ def test_importing_proofroll_is_light() -> None:
 def test_public_names() -> None:
     """The public names are those that are announced, and no others are made up."""
     errors = {"Diverged", "InputError", "Missing", "ProofrollError", "Refused"}
-    assert set(proofroll.__all__) == errors | {"judge", "load_scene", "simulate"}
+    assert set(proofroll.__all__) == errors | {"compare", "judge", "load_scene", "simulate"}
     assert all(issubclass(getattr(proofroll, name), proofroll.ProofrollError) for name in errors)
     assert all(callable(getattr(proofroll, name)) for name in proofroll.__all__)
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):

@@ -176,10 +176,9 @@ PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {
         "default": ExudynSettings(
             "spheres", "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused", 10, 1e6, 1e-3, None
         ),
-        # A tenth of the default's creep. Newton's method leaves the edge of the zone with more round-off than a
-        # tighter tolerance asks for.
+        # A tenth of the default's creep.
         "matched": ExudynSettings(
-            "spheres", "matched", 1e-3, "generalized_alpha", 0.9, 1e-6, "step", 10, 1e6, 1e-4, None
+            "spheres", "matched", 1e-3, "generalized_alpha", 0.9, 1e-8, "step", 10, 1e6, 1e-4, None
         ),
     },
     "tree": {
