@@ -39,8 +39,11 @@ def sort(live: Visit, name: str, wanted: str) -> None:
     """Presses Enter on the sign of a column until a screen reader is told that it is sorted so."""
     head = live.page.locator(f"{TABLE} thead th", has_text=name)
     for _ in range(3):
-        if head.get_attribute("aria-sort") != wanted:
-            head.locator(".dt-column-order").press("Enter")
+        before = head.get_attribute("aria-sort")
+        if before == wanted:
+            return
+        head.locator(".dt-column-order").press("Enter")
+        live.page.wait_for_function("([head, before]) => head.ariaSort !== before", arg=[head.element_handle(), before])
     assert head.get_attribute("aria-sort") == wanted
 
 
