@@ -11,6 +11,8 @@ from proofroll.engines.exudyn.generic_forces import base, force_function, quadra
 from proofroll.engines.exudyn.local_frame import local_geometry
 from proofroll.files.scene_file import load_scene
 
+pytest.importorskip("exudyn")
+
 
 @pytest.mark.parametrize(
     ("scene", "parameters"),

@@ -7,6 +7,8 @@ import pytest
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
 
+pytest.importorskip("exudyn")
+
 CUBE = Body("mass", 2.0, inertia=(0.1, 0.1, 0.1))
 G = 9.81
 

@@ -11,6 +11,8 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.element import MechanismElement
 
+pytest.importorskip("exudyn")
+
 EXUDYN = load_engine("exudyn")
 MATCHED = EXUDYN.presets["spheres"]["matched"]
 FLOOR = Geometry("floor", "world", "plane")

@@ -14,6 +14,8 @@ from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.kinematics import Tree
 
+pytest.importorskip("mujoco")
+
 MUJOCO = load_engine("mujoco")
 FLOOR = Geometry("floor", "world", "plane", (0, 0, 0.2), normal=(0.1, 0.0, 1.0))
 TILTED = (0.1, 0.2, 0.9, 0.9, 0.3, 0.2, 0.1)

@@ -123,7 +123,7 @@ def test_elimination_joint_by_joint_is_that_by_sums(violated):
         np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
 
 
-@pytest.mark.skipif(not available(), reason="needs heyoka")
+@pytest.mark.skipif(not available(), reason="heyoka is not installed")
 @pytest.mark.parametrize("mechanism", [sprung_tree(), runs.model("heavy_top")], ids=["every kind", "top"])
 def test_compiled_equations_end_where_others_do(mechanism):
     """A run in machine code gives the motion and the reactions of one in numpy."""
@@ -138,7 +138,6 @@ def test_compiled_equations_end_where_others_do(mechanism):
         np.testing.assert_allclose(getattr(ends[1], name), expected, atol=1e-9 * (1 + np.abs(expected).max()))
 
 
-@pytest.mark.skipif(not available(), reason="needs heyoka")
 @pytest.mark.parametrize(("name", "reason"), [("four_bar", "loops are not compiled"), ("pendulum", "turned")])
 def test_compiled_equations_refuse_what_they_do_not_hold(name, reason):
     """Loops, and springs that count turns, are refused with the reason."""

@@ -74,7 +74,6 @@ def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[
     Raises:
         Refused: heyoka is missing, or the mechanism has what these formulas do not.
     """
-    require_heyoka("equations=compiled")
     if mechanism.loops:
         raise Refused("singular values of loops are not compiled; choose preset=matched")
     equations = DependentCoordinates(mechanism, Recursion)
@@ -82,6 +81,7 @@ def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[
         raise Refused(
             "springs of joints remember how often these have turned, and are not compiled; choose preset=matched"
         )
+    require_heyoka("equations=compiled")
     import heyoka
 
     numbers = heyoka.make_vars(*(f"x{number}" for number in range(len(equations.start))))

@@ -24,6 +24,8 @@ from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Stretch, Transition, walked
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import (
+    AT_REST,
+    STANDS,
     STOPPED,
     events,
     faint_time,
@@ -37,7 +39,6 @@ from proofroll.truth.mechanism.maximal_coordinates import RANK
 
 _MOST = 6  # contacts that are closed at once: each has up to four candidates
 _SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
-_AT_REST, _STANDS = 1e-13, 1e-9  # m/s and m/s², with angles: nothing moves, and nothing will
 _SIDES = 180  # of the pyramid inside a cone of friction, by which balance at rest is tried
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
@@ -197,7 +198,7 @@ class ContactBodies:
         """True if nothing moves and forces within the cones of friction hold everything in place."""
         from scipy.optimize import nnls
 
-        if np.abs(found.u).max() > _AT_REST:
+        if np.abs(found.u).max() > AT_REST:
             return False
         angles = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False)
         columns = [found.C.T, -found.C.T]
@@ -354,9 +355,9 @@ class ContactBodies:
     def _stands(self, state: Array, mode: ContactMode) -> bool:
         """True if nothing moves, and nothing will."""
         found = self.equations.at(state)
-        if np.abs(found.u).max() > _AT_REST or any(own.kind == "slip" for own in mode):
+        if np.abs(found.u).max() > AT_REST or any(own.kind == "slip" for own in mode):
             return False
-        return float(np.abs(self.equations.accelerated(found, mode).moved).max()) <= _STANDS
+        return float(np.abs(self.equations.accelerated(found, mode).moved).max()) <= STANDS
 
     def _guards(self, state: Array, mode: ContactMode) -> FloatArray:
         found = self.equations.at(self.equations.equations.normalised(state))

@@ -15,6 +15,9 @@ from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 
+# Speeds [m/s, rad/s] below which nothing moves, and accelerations [m/s², rad/s²] below which nothing will: both routes
+# stop there, so that they integrate no round-off of a state at rest.
+AT_REST, STANDS = 1e-13, 1e-9
 STOPPED = 1e-11  # m/s: what is left of a slip that has come to rest, in a straight line from what is faint
 # Part of a normal force's answer without friction below which Painlevé's measure is taken to come to zero.
 _LEAST_RESPONSE = 1e-3

@@ -13,6 +13,8 @@ from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, Transition, walked
 from proofroll.truth.mechanism.contact_guards import (
+    AT_REST,
+    STANDS,
     STOPPED,
     events,
     faint_time,
@@ -23,9 +25,6 @@ from proofroll.truth.mechanism.contact_guards import (
     striking,
 )
 from proofroll.truth.mechanism.joint_switching import SETTLED
-
-_AT_REST = 1e-13  # m/s, rad/s: of velocities when nothing moves
-_STANDS = 1e-9  # m/s²: of accelerations then
 
 
 class ContactTree:
@@ -178,9 +177,9 @@ class ContactTree:
     def _stands(self, state: Array, mode: ContactMode) -> bool:
         """True if nothing moves, and nothing will."""
         q, v = self._parts(state)
-        if np.abs(v).max() > _AT_REST or any(own.kind == "slip" for own in mode):
+        if np.abs(v).max() > AT_REST or any(own.kind == "slip" for own in mode):
             return False
-        return float(np.abs(self.dynamics.solve(q, v, mode).acceleration).max()) <= _STANDS
+        return float(np.abs(self.dynamics.solve(q, v, mode).acceleration).max()) <= STANDS
 
     def _parts(self, state: Array) -> tuple[Array, Array]:
         return state[: self._nq], state[self._nq :]
