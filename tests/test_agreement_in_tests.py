@@ -369,6 +369,8 @@ def test_the_command(proofroll: Proofroll, tmp_path: Path) -> None:
     assert found["compared"][0].keys() == set(re.findall(r"`(\w+)`", section.strip().splitlines()[-1])) - {"compared"}
     assert proofroll("run", "pendulum", "--engine", "projection", "--until", "0.1", "--out", str(own))[0] == 0
     assert proofroll("judge", str(own), "--scene", "pendulum")[0] == 0
+    for either in ((str(own), "pendulum"), ("pendulum", str(own))):
+        assert proofroll("judge", *either)[0] == 0
     code, _, err = proofroll("judge", str(own), "--scene", "pendulum", "--set", "gravity=9.7")
     assert code == 2
     assert "it is a run of pendulum with other numbers" in err

@@ -10,7 +10,6 @@ import sys
 import warnings
 from functools import cache
 from importlib.metadata import EntryPoint
-from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -34,7 +33,8 @@ from proofroll.cli.stability import stability
 from proofroll.cli.tradeoff import tradeoff
 from proofroll.cli.versions import versions
 from proofroll.core.announced import broken, leave_out, loaded
-from proofroll.core.errors import InputError, Missing, ProofrollError
+from proofroll.core.errors import InputError, Missing, ProofrollError, choices
+from proofroll.running.ending import INTERRUPTS, end_at_once
 
 app = typer.Typer(
     help="Which multibody engine, formulation and time step can you trust for a scene?",
@@ -90,8 +90,12 @@ def start(
 
 
 def _told(error: typer.TyperException) -> str:
-    """Message of a usage error; with the value of a wrong number, which typer leaves out."""
+    """Message of a usage error; with the value of a wrong number, or the names there are, which typer leaves out."""
     said = str(error.format_message())
+    lacking: Any = error  # typer tells no type of one that names its parameter
+    if said.startswith("Missing ") and getattr(error, "param", None) is not None:
+        names = [item.value for item in lacking.param.shell_complete(lacking.ctx, "")]
+        return f"{said} Choose one of {choices(names)}." if names else said
     problems: list[dict[str, Any]] = getattr(error.__cause__, "errors", list)()
     option = re.search(r"'([^']+)'", said)
     if not problems or option is None:
@@ -101,13 +105,15 @@ def _told(error: typer.TyperException) -> str:
     return f"{option[1]} = {problems[0]['input']!r}: {advice(problems[0]['type'], problems[0]['msg'])}"
 
 
-def _interrupt(number: int, _: FrameType | None) -> None:
+def _interrupt(*_: object) -> None:
     """Ends all workers, so that whatever waits for one goes on, and then this process; at once when asked again."""
     if "proofroll.running.process" in sys.modules:
         from proofroll.running.process import end_all
 
         end_all()
-    signal.signal(number, lambda *_: os._exit(INTERRUPTED))
+    for each in INTERRUPTS:
+        if callable(signal.getsignal(each)):
+            signal.signal(each, end_at_once)
     raise KeyboardInterrupt
 
 

@@ -15,7 +15,11 @@ def judge(
     run: Annotated[
         Path, typer.Argument(help="File (.nc, .csv, .npz) with time [s] and the state, or variables of the truth.")
     ],
-    scene: Annotated[str, typer.Option(help="The scene, or the path of its folder.")],
+    named: Annotated[str | None, typer.Argument(metavar="SCENE", help="The scene, unless --scene has it.")] = None,
+    scene: Annotated[
+        str | None,
+        typer.Option(help="The scene, or the path of its folder.", autocompletion=options.scenes_like),
+    ] = None,
     settings: options.Set = None,
     tolerance: Annotated[
         list[str] | None, typer.Option(help="variable='1 %' of its scale, or variable='1e-3 m'; repeat.")
@@ -24,10 +28,16 @@ def judge(
     as_json: options.Json = False,
 ) -> None:
     """Hold a trajectory from anywhere against the truth of a scene; exit 1 if it differs."""
+    from proofroll.core.errors import InputError
     from proofroll.files.scene_file import load_scene
+    from proofroll.files.trajectory_file import CSV, NETCDF, STORED
     from proofroll.studies.judging import judge as judging
 
-    loaded = load_scene(scene, **options.assignments(settings))  # type: ignore[arg-type]  # text is checked there
+    if (named is None) == (scene is None):
+        raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
+    if named is not None and run.suffix not in (NETCDF, CSV, STORED) and Path(named).suffix in (NETCDF, CSV, STORED):
+        run, named = Path(named), str(run)
+    loaded = load_scene(scene or str(named), **options.assignments(settings))  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
     with options.spinner(f"the truth of {loaded.name}"):
         judged = judging.judge(run, loaded, bounds, because=because)

@@ -41,6 +41,11 @@ def engines_like(incomplete: str) -> list[str]:
     return [name for name in engine_names() if name.startswith(incomplete)]
 
 
+def runs_like(incomplete: str) -> list[str]:
+    """Names of what runs a scene: engines, and the truth."""
+    return [*engines_like(incomplete), *(["truth"] if "truth".startswith(incomplete) else [])]
+
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
 Out = Annotated[Path, typer.Option("--out", help="Folder for results; what is there is reused.")]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Run every case again, whatever is stored.")]

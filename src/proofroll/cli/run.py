@@ -20,7 +20,7 @@ def run(
         str,
         typer.Option(
             help="truth, or name[key=value,…], e.g. mujoco[formulation=chart,dt=1e-4].",
-            autocompletion=options.engines_like,
+            autocompletion=options.runs_like,
         ),
     ],
     settings: options.Set = None,

@@ -139,6 +139,7 @@ class Comparison:
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
         left_out: how many combinations have been left out for that.
         budget: processor time that all cases may take together, what is beyond it being left out [s]; None: any.
+        spent: those of them that asking the engines has taken [s].
     """
 
     name: str
@@ -157,6 +158,7 @@ class Comparison:
     brief: dict[str, list[float]] = field(default_factory=dict)
     left_out: int = 0
     budget: float | None = None
+    spent: float = 0.0
 
     def briefly(self) -> Comparison:
         """The comparison at the combinations that a report without names has."""

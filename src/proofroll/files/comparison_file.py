@@ -79,7 +79,7 @@ def _checked(path: Path, content: dict[str, Any]) -> Comparison:
         shown = "nothing" if given is None else given
         raise InputError(f"{where}: rows", shown, "give at least one engine; write [[rows]] before each")
     content["rows"] = [_prepared(f"{where}: rows.{index}", row) for index, row in enumerate(given)]
-    comparison = validated(Comparison, content, where, name=path.stem, bands=bands, left_out=0, budget=None)
+    comparison = validated(Comparison, content, where, name=path.stem, bands=bands, left_out=0, budget=None, spent=0.0)
     if math.prod(map(len, comparison.vary.values())) + len(comparison.points) > _MOST_POINTS:
         raise InputError(f"{where}: vary", list(comparison.vary), f"that is more than {_MOST_POINTS} points; vary less")
     for index, point in enumerate(comparison.points):

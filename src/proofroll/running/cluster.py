@@ -11,6 +11,7 @@ import dataclasses
 import logging
 import os
 import re
+import sys
 import threading
 import time
 import uuid
@@ -100,7 +101,13 @@ class Cluster:
             while self._has_room() and (case := take(engine)) is not None:
                 engine = case.engine.name
                 content = dataclasses.asdict(case) | {"timed": False}
-                future = self._submit(self._task, (content, _files(case)), case.key)
+                try:
+                    files = _files(case)
+                except OSError as error:  # of this case alone, and not of the scheduler
+                    said = InputError("scene", case.scene, f"{error.filename} cannot be read: {error.strerror}")
+                    arrived(case, partial(_raise, said))
+                    continue
+                future = self._submit(self._task, (content, files), case.key)
                 with self._room:
                     self._sent[future] = case, arrived
                 future.add_done_callback(partial(self._come, failed))
@@ -196,7 +203,7 @@ class Cluster:
             else:
                 said = f"each of {error.allowed_failures + 1} workers of the cluster that ran it was lost"
                 ((_, case, arrived),) = sent
-                arrived(case, lambda _: _raise(WorkerDied(Status.CRASHED, said)))
+                arrived(case, partial(_raise, WorkerDied(Status.CRASHED, said)))
             return
         for (_, case, arrived), (content, data) in zip(sent, answers, strict=True):
             arrived(case, partial(_made, content, data))
@@ -212,7 +219,7 @@ class Cluster:
         return ProofrollError(f"the workers of {self.address} cannot run a case ({type(error).__name__}: {text})")
 
 
-def _raise(error: Exception) -> Result:
+def _raise(error: Exception, _: Path) -> Result:
     raise error
 
 
@@ -245,7 +252,9 @@ def _connected(address: str) -> tuple[Any, Any]:
     for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
         logging.getLogger(name).disabled = True  # what matters of it is said in our own line
     # The tracker of multiprocessing unblocks the signal where it begins, so it must be there already.
+    sys.warnoptions.append("ignore")  # inherited by it: what was not given back is no news where all ends at once
     resource_tracker.ensure_running()
+    sys.warnoptions.pop()
     try:
         if not local:
             return Client(address, timeout=_PATIENCE, set_as_default=False), None

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 
 from proofroll.running.memory import descendants
 
+# Signals by which a command is ended from outside: Ctrl-C, a time limit, the end of the terminal.
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 # How often a process looks for its parent [s]; a look costs some microseconds.
 _TICK = 0.25
 
@@ -21,20 +23,33 @@ def interrupt_held() -> Iterator[None]:
     """Ctrl-C waits until this is left, and processes that begin here never see it: who began them ends them.
 
     The mask is for what begins here. It does not keep another thread from taking the signal, for which Python then
-    interrupts the main thread; so that waits, too.
+    interrupts the main thread; so that waits, too, as do other signals that are handled. A second one ends at once.
     """
     waiting: list[int] = []
+
+    def wait(number: int, _: object) -> None:
+        if waiting:
+            end_at_once()
+        waiting.append(number)
+
     main = threading.current_thread() is threading.main_thread()
-    before = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number)) if main else None
+    handled = [number for number in INTERRUPTS if main and callable(signal.getsignal(number))]
+    before = {number: signal.signal(number, wait) for number in handled}
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-        if main:
-            signal.signal(signal.SIGINT, before)
-    if waiting:
-        signal.raise_signal(signal.SIGINT)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    for held in waiting:
+        signal.raise_signal(held)
+
+
+def end_at_once(*_: object) -> None:
+    """Handler of a second interrupt: ends this process with a line; what it started ends with it."""
+    os.write(2, b"proofroll: interrupted again, ended at once; cases that were finished and stored will be reused\n")
+    os._exit(130)
 
 
 def end_with(parent: int) -> None:

@@ -46,6 +46,8 @@ _DRAUGHTS = 64
 _LONGEST_ANSWER = 1 << 22
 
 _living: set[Worker] = set()
+_counting = threading.Lock()
+_used_by_workers = 0.0
 
 
 class WorkerDied(ProofrollError):  # noqa: N818 -- a fact about the worker, turned into a row of the report
@@ -60,6 +62,18 @@ def end_all() -> None:
     """Sends every worker of this process, and what it started, its end; for a signal handler, so it waits for none."""
     for worker in list(_living):
         worker.shoot()
+
+
+def processor_seconds() -> float:
+    """Processor time of this process and of all its workers, as far as these have answered [s]."""
+    return time.process_time() + _used_by_workers
+
+
+def _count(worker: Worker, used: float) -> None:
+    global _used_by_workers  # noqa: PLW0603 -- like the time of this process, which is its own as well
+    with _counting:
+        _used_by_workers += max(0.0, used - worker.used)
+        worker.used = max(used, worker.used)
 
 
 def safe_environment() -> dict[str, str]:
@@ -81,6 +95,7 @@ class Worker:
 
     Attributes:
         waited: wall seconds for the last answer; for the first one from the start of the process [s].
+        used: processor time of the process until its last answer [s].
     """
 
     def __init__(self, memory: float | None = None, python: Path | None = None) -> None:
@@ -113,6 +128,7 @@ class Worker:
             os.close(log)
             os.close(life)
         _living.add(self)
+        self.used = 0.0
         self._pending = b""
         self._said = b""
         self._asked = 0
@@ -139,6 +155,7 @@ class Worker:
         with contextlib.suppress(ValueError):
             answer = json.loads(line)
             if isinstance(answer, dict) and answer.pop("number", None) == self._asked:
+                _count(self, answer.pop("used", 0.0))
                 return answer
         self.kill()
         raise WorkerDied(Status.CRASHED, "the engine wrote into the answers of its process, which was ended")

@@ -173,7 +173,7 @@ class Runner:
                 return case, case.time_limit
             if limit := budget.begin(case.key, self.jobs):
                 return case, min(case.time_limit, limit)
-            budget.end(case.key, 0.0)
+            budget.end(case.key)
             arrived.put((case, Result(Status.LEFT_OUT, budget.sentence)))
         return None
 
@@ -195,7 +195,7 @@ class Runner:
                     except (InputError, Missing, WorkerDied) as error:  # another interpreter, gone since it was asked
                         status = error.status if isinstance(error, WorkerDied) else Status.MISSING
                         if waiting.budget:
-                            waiting.budget.end(case.key, None)
+                            waiting.budget.end(case.key)
                         arrived.put((case, ended(case, status, error)))
                         continue
                     self._busy.add(worker)
@@ -267,17 +267,15 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
     """Result of a case; a budget learns its cost, and a case that would cost more is left out."""
     if budget is None:
         return _ask(worker, case, limit, out)
-    seconds = None
+    before = worker.used
     try:
-        result = _ask(worker, case, limit, out)
-        seconds = sum(result.processor.values()) or None
-        return result
+        return _ask(worker, case, limit, out)
     except WorkerDied as error:
         if error.status is Status.TIMEOUT and limit < case.time_limit:
             raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
         raise
     finally:
-        budget.end(case.key, seconds)
+        budget.end(case.key, lost=worker.used == before)
 
 
 def ended(case: Case, status: Status, error: ProofrollError) -> Result:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import threading
 import time
 
+from proofroll.running.process import processor_seconds
+
 # Part of the seconds that cases get; the rest is for reading and judging what came of them.
 _OF_CASES = 0.9
 # A case with less time than it takes to start a process is not begun [s].
@@ -19,11 +21,12 @@ class TimeBudget:
 
     Args:
         seconds: of processor time, that of this process included [s].
+        spent: those of them that asking the engines has taken already [s].
     """
 
-    def __init__(self, seconds: float) -> None:
+    def __init__(self, seconds: float, spent: float = 0.0) -> None:
         self.seconds = seconds
-        self._own, self._others = time.process_time(), 0.0
+        self._start, self._lost = processor_seconds() - spent, 0.0
         self._begun: dict[str, float] = {}
         self._unfinished = 0
         self._lock = threading.Lock()
@@ -42,14 +45,14 @@ class TimeBudget:
         """Seconds that a case may take beside at most ``abreast`` - 1 others; 0: it is not to be begun."""
         with self._lock:
             now = time.monotonic()
-            used = self._others + time.process_time() - self._own + sum(now - begun for begun in self._begun.values())
+            used = processor_seconds() - self._start + self._lost + sum(now - begun for begun in self._begun.values())
             share = (_OF_CASES * self.seconds - used) / max(1, min(abreast, self._unfinished))
             self._begun[case] = now
             return share if share > _LEAST else 0.0
 
-    def end(self, case: str, seconds: float | None) -> None:
-        """A case has ended, after so many seconds of its processor; None: as long as it was under way."""
+    def end(self, case: str, *, lost: bool = False) -> None:
+        """A case has ended; one that was lost told no processor time, and counts as long as it was under way."""
         with self._lock:
             begun = self._begun.pop(case)
-            self._others += time.monotonic() - begun if seconds is None else seconds
+            self._lost += time.monotonic() - begun if lost else 0.0
             self._unfinished -= 1

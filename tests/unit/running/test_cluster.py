@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -24,7 +25,7 @@ from robot_templates import urdf
 from proofroll.ball_studies.regimes import regime_map
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, scene_folder
 from proofroll.files.trajectory_file import read
 from proofroll.running import cluster
 from proofroll.running.case import Case, EngineFacts, Status
@@ -229,6 +230,23 @@ def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
         assert runner.run(cases).keys() == {case.key for case in cases}
 
 
+def test_a_scene_that_cannot_be_read(
+    dask: DaskCluster, shared: Cluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is refused with its reason, as at home; the cluster goes on with the others."""
+    dask.one_worker()
+    folder = tmp_path / "my_plane"
+    shutil.copytree(data_folder("models") / "inclined_plane", folder)
+    lost, sound = case("oracle", 1.5, str(folder)), case("oracle")
+    (folder / "scene.toml").unlink()
+    (folder / "scene.toml").symlink_to("scene.toml")  # cannot be read, by the superuser either
+    monkeypatch.setattr(cluster, "scene_folder", lambda name: folder if name == str(folder) else scene_folder(name))
+    found = Runner(Store(tmp_path / "store"), cluster=shared).run([lost, sound])
+    assert found[sound.key].status is Status.DONE
+    assert found[lost.key].status is Status.REFUSED
+    assert re.search(r"scene.toml cannot be read: Too many", found[lost.key].message)
+
+
 def test_a_scheduler_that_ends(dask: DaskCluster, shared: Cluster, tmp_path: Path, room: Path) -> None:
     """One line says so; what was finished is stored, and the next run makes the rest alone."""
     dask.one_worker()
@@ -253,12 +271,16 @@ def test_a_scheduler_that_ends(dask: DaskCluster, shared: Cluster, tmp_path: Pat
 
 
 def test_an_address_that_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is no address, and where nothing answers, is one line."""
+    """What is no address, and where nothing answers, is one line; the tracker of processes says nothing."""
+    told: list[list[str]] = []
+    monkeypatch.setattr(cluster.resource_tracker, "ensure_running", lambda: told.append([*sys.warnoptions]))
     monkeypatch.setattr(cluster, "_PATIENCE", 1.0)
     with pytest.raises(InputError, match="give the address of a Dask scheduler"):
         Cluster("nowhere")
     with pytest.raises(InputError, match="no Dask scheduler answers there"):
         Cluster("tcp://127.0.0.1:1")
+    assert [options[-1] for options in told] == ["ignore"]
+    assert sys.warnoptions[-1:] != ["ignore"]
 
 
 def test_ctrl_c(tmp_path: Path, room: Path) -> None:

@@ -55,7 +55,21 @@ import os, subprocess, sys
 life, held = os.pipe()
 subprocess.run([sys.executable, *sys.argv[1:], str(life)], pass_fds=[life], start_new_session=True)
 """
+ENDED_AT_ONCE = "proofroll: interrupted again, ended at once; cases that were finished and stored will be reused\n"
 PARENT = "import subprocess, sys; subprocess.run([sys.executable, *sys.argv[1:]])"
+
+
+def test_a_time_limit_waits_until_processes_have_begun() -> None:
+    """So does a signal from outside; a second one ends the command at once, with one line."""
+    program = (
+        "import signal, sys\nfrom proofroll.running.ending import interrupt_held\n"
+        "signal.signal(signal.SIGTERM, lambda *_: sys.exit('handled'))\n"
+        "with interrupt_held():\n for _ in range(int(sys.argv[1])): signal.raise_signal(signal.SIGTERM)\n"
+        " print('begun', flush=True)\n"
+    )
+    for times, expected in ((1, (1, "begun\n", "handled\n")), (2, (130, "", ENDED_AT_ONCE))):
+        ended = subprocess.run([sys.executable, "-c", program, str(times)], capture_output=True, text=True, check=False)
+        assert (ended.returncode, ended.stdout, ended.stderr) == expected
 
 
 def test_an_interrupt_waits_until_processes_have_begun() -> None:

@@ -16,7 +16,7 @@ import pytest
 from proofroll.core.errors import ProofrollError
 from proofroll.running import process
 from proofroll.running.case import Status
-from proofroll.running.process import Worker, WorkerDied, end_all
+from proofroll.running.process import Worker, WorkerDied, end_all, processor_seconds
 from proofroll_drill.processes import alive
 
 # Where a worker stands is read from /proc; without it memory is not watched either.
@@ -202,6 +202,20 @@ def test_all_workers_can_be_ended_at_once(pretend: Pretend) -> None:
         threads[1].join(0.05)
     assert [error.status for error in found] == [Status.CRASHED] * 2
     assert process._living <= others
+
+
+def test_processor_time_of_workers_counts(pretend: Pretend) -> None:
+    """Each answer says what the process has used so far, of which only what is new is added."""
+    pretend("""
+        for used in (2.0, 5.0):
+            answer(json.dumps({"number": first["number"], "used": used}).encode() + b"\\n")
+            first = json.loads(sys.stdin.readline())
+    """)
+    before, own = processor_seconds(), time.process_time()
+    with Worker() as worker:
+        assert worker.ask({"do": "describe"}, 60.0) == {}
+        assert worker.ask({"do": "describe"}, 60.0) == {}
+    assert processor_seconds() - before == pytest.approx(5.0 + time.process_time() - own, abs=1e-2)
 
 
 def test_a_worker_volunteers_and_reads_nothing() -> None:

@@ -13,13 +13,15 @@ from proofroll.running.case import Case, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.running.time_budget import TimeBudget
+from proofroll.studies.comparison.default_comparison import compared
+from proofroll.studies.comparison.planning import plan
 
 
 def test_shares_are_never_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     """However cases overlap, each taking all that it may, together they take no more than there is."""
     now = 0.0
     monkeypatch.setattr("proofroll.running.time_budget.time.monotonic", lambda: now)
-    monkeypatch.setattr("proofroll.running.time_budget.time.process_time", lambda: 0.0)
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: 0.0)
     budget = TimeBudget(100.0)
     for _ in range(9):
         budget.wait()
@@ -27,24 +29,27 @@ def test_shares_are_never_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> 
     now, used = 20.0, 0.0
     second = budget.begin("b", 3)
     now = first
-    budget.end("a", None)
+    budget.end("a", lost=True)
     used += first
     third = budget.begin("c", 3)
     now += second - (first - 20.0)
-    budget.end("b", None)
+    budget.end("b", lost=True)
     used += second
     fourth = budget.begin("d", 3)
     assert used + third + fourth <= 100
     assert min(first, second, third, fourth) > 1
 
 
-def test_what_a_case_did_not_take_is_for_others() -> None:
+def test_what_a_case_did_not_take_is_for_others(monkeypatch: pytest.MonkeyPatch) -> None:
     """The processor time of a case counts, not its share; the last one may have all that is left."""
+    used = 7.0
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: used)
     budget = TimeBudget(100.0)
     for name in ("a", "b"):
         budget.wait()
         assert budget.begin(name, 1) > 85
-        budget.end(name, 1.0)
+        used += 1.0
+        budget.end(name)
     budget.wait()
     assert 80 < budget.begin("c", 8) <= 88
 
@@ -63,3 +68,14 @@ def test_cases_beyond_the_budget_are_left_out(
     second = runner.run([quick, dataclasses.replace(quick, until=0.2)], budget=budget)
     assert {result.status for result in second.values()} == {Status.LEFT_OUT}
     assert {result.status for result in runner.run([quick], budget=TimeBudget(60.0)).values()} == {Status.DONE}
+
+
+def test_asking_the_engines_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Processor time in which workers said what engines are is part of a budget, before any case has begun."""
+    clock = iter(range(1000))
+    for module in ("default_comparison", "planning"):
+        monkeypatch.setattr(f"proofroll.studies.comparison.{module}.processor_seconds", lambda: float(next(clock)))
+    assert plan(compared("inclined_plane", {})).comparison.spent == 2.0
+    budget = TimeBudget(100.0, 50.0)
+    budget.wait()
+    assert budget.begin("a", 1) <= 40

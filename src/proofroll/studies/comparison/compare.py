@@ -91,7 +91,7 @@ def run_plan(
     seconds = planned.comparison.budget
     if seconds is None:
         return runner.run(planned.cases, progress)
-    budget = TimeBudget(seconds)
+    budget = TimeBudget(seconds, planned.comparison.spent)
     found: dict[str, Result] = {}
     for cases in planned.stages:
         found |= runner.run(cases, progress, budget)

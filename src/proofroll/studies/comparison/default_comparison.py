@@ -16,6 +16,7 @@ from proofroll.core.verdict import Verdict
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.running.asking import described, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
+from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.stability.axes import Axis, AxisTerm
 
@@ -39,6 +40,7 @@ def compared(
     Raises:
         InputError: there is no such scene, a parameter makes no sense, or no installed engine can represent it.
     """
+    before = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
     duration = file.duration or _UNTIL
     every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
@@ -57,6 +59,7 @@ def compared(
         bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene, every))},
         rows=rows,
         budget=budget,
+        spent=processor_seconds() - before,
     )
 
 

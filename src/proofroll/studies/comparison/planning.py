@@ -18,6 +18,7 @@ from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
+from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
 from proofroll.studies.step_factors import USUAL, fitting, unfit
@@ -73,6 +74,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     Raises:
         InputError: an engine or setting that does not exist.
     """
+    before = processor_seconds()
     chosen = list(dict.fromkeys(engines))
     numbered = [
         (i, row) for i, row in enumerate(comparison.rows) if not chosen or parse_engine(row.engine).name in chosen
@@ -107,7 +109,8 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
                 for factor, rung in ladder_facts.items()
             }
             runs.append(Planned(row, point, facts.on(scene.requires), ladder))
-    return Plan(comparison, truths, runs)
+    spent = comparison.spent + processor_seconds() - before
+    return Plan(replace(comparison, spent=spent), truths, runs)
 
 
 def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:
