@@ -79,7 +79,7 @@ BAD = {
     "output is a folder": (with_option("--out", "/tmp"), 2, ["--out = '/tmp'", "folder"]),
     "unknown option": ([*RUN, "--colour", "red"], 2, ["--colour"]),
     "unknown command": (["simulate"], 2, ["simulate"]),
-    "no engine": (["run", "sphere_in_cylinder"], 2, ["--engine", "Choose one of", "mujoco", "truth."]),
+    "no engine": (["run", "sphere_in_cylinder"], 2, ["--engine", "Choose one of truth, "]),
     "no scene to judge": (["judge", "run.csv"], 2, ["scene = ", "proofroll judge FILE --scene SCENE"]),
     "no scene": (["run", "--engine", "truth"], 2, ["Missing argument", "scene"]),
     "engine not installed": (with_option("--engine", "absent"), 3, ["absent is not installed here", "pip install"]),

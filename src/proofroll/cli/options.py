@@ -43,7 +43,7 @@ def engines_like(incomplete: str) -> list[str]:
 
 def runs_like(incomplete: str) -> list[str]:
     """Names of what runs a scene: engines, and the truth."""
-    return [*engines_like(incomplete), *(["truth"] if "truth".startswith(incomplete) else [])]
+    return [*(["truth"] if "truth".startswith(incomplete) else []), *engines_like(incomplete)]
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document on standard output, nothing else.")]
