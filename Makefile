@@ -7,7 +7,7 @@ OUT ?= out
 # A worker process that finds no bytecode compiles the package anew, which is a quarter of its start.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install report tradeoff test check format readme docs gallery engines clean
+.PHONY: install report tradeoff test drills check format readme docs gallery engines clean
 
 install: $(VENV)/.installed
 
@@ -29,6 +29,10 @@ tradeoff: install
 
 test: install
 	$(BIN)/python -m pytest -n 2
+
+# The tests that take tens of seconds each, which `make test` leaves out (the mark `drill`).
+drills: install
+	$(BIN)/python -m pytest -n 2 -m drill
 
 check: install
 	$(BIN)/ruff check .

@@ -25,7 +25,10 @@ class Deaf(Single):
     provides: ClassVar[Mapping[str, frozenset[str]]] = {name: LAWS | can for name, can in Single.provides.items()}
 
 
-@pytest.mark.parametrize("law", ["damping", "torque", "armature", "friction", *DRIVES])
+@pytest.mark.parametrize(
+    "law",
+    ["damping", "armature", *(pytest.param(law, marks=pytest.mark.drill) for law in ["torque", "friction", *DRIVES])],
+)
 def test_a_law_that_is_left_out_is_noticed(law: str) -> None:
     """An engine that says it has a law, and moves without it, fails the checks of its motion."""
     ending = f"[rk4-matched-double_pendulum-{law}]"

@@ -47,6 +47,7 @@ def truths(kind: Arithmetic, folder: Path) -> Path:
     return folder
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 def test_numbers_of_the_truth_hang_on_no_processor(tmp_path: Path) -> None:
     """Numbers of the truth differ under other kernels and instructions by round-off, within their error bars."""

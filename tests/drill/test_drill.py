@@ -41,6 +41,7 @@ TRIED = {
 }  # fmt: skip
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_fault_is_contained() -> None:

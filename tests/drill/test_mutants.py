@@ -32,6 +32,7 @@ def _drilled() -> dict[str, object]:
     return dict(json.loads(done.stdout))
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_mutant_is_detected_and_most_are_named() -> None:

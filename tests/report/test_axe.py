@@ -36,7 +36,10 @@ def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visi
         assert grave(opened) == []
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (900, "dark"), (400, "light")])
+@pytest.mark.parametrize(
+    ("width", "scheme"),
+    [(1400, "light"), *(pytest.param(*look, marks=pytest.mark.drill) for look in [(900, "dark"), (400, "light")])],
+)
 def test_axe_finds_nothing_of_weight(report_page: Path, visit: Visiting, width: int, scheme: str) -> None:
     """No violation that is serious or moderate, folded, unfolded and with tables that sort; a planted one is found."""
     with visit(report_page, viewport={"width": width, "height": 900}) as opened:

@@ -14,7 +14,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.truth.crossing import first_rise
+from proofroll.truth.crossing import first_rise, stays_negative
 
 State = FloatArray
 ModeT = TypeVar("ModeT")
@@ -238,7 +238,8 @@ def _first(
         return known[time]
 
     found: tuple[float, int] | None = None
-    for number in range(len(at(start))):
+    below = stays_negative(lambda times: np.array([at(float(t)) for t in times]), start, end)
+    for number in np.flatnonzero(np.logical_not(below)).tolist():
         rise = first_rise(lambda times, k=number: np.array([at(float(t))[k] for t in times]), start, end)  # type: ignore[misc]  # mypy cannot type a default
         if rise is not None and (found is None or rise < found[0]):
             found = rise, number

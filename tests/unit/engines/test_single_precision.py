@@ -184,6 +184,7 @@ def test_a_comparison_tells_precision_and_floor(
     assert "f32)" in out
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("single")
 def test_a_tradeoff_tells_the_best_step(command_line: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     """The study names the best step and the floor, fits no order through it, and advice knows both."""

@@ -206,7 +206,7 @@ def by_itself(mass: float, motor: Actuator, spring: float, target: Formula, unti
     return float(y[0]), times
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.drill) for seed in range(1, 4))])
 def test_servos_with_limits_agree_with_another_solver(seed: int) -> None:
     """With random numbers and a target of time, place and switches are those of a plain solver with events."""
     random = np.random.default_rng(seed)

@@ -19,6 +19,7 @@ def motion(scene: str, times: list[float], **parameters: float):
     return truth_of(load_scene(scene, **parameters).elements[0].mechanism, np.array(times))  # type: ignore[attr-defined]
 
 
+@pytest.mark.drill
 def test_a_spring_that_rubs_loses_four_parts_of_friction_a_swing() -> None:
     """Half swings last pi sqrt(m/k), end at (-1)^n (1 - 0.06 n), and the mass rests where the spring is too weak."""
     found = motion("spring_friction", [0.0, 1.0, 2.0], start=0.3)
@@ -79,6 +80,7 @@ def test_friction_that_holds_does_not_creep() -> None:
     assert found.events == ()
 
 
+@pytest.mark.drill
 def test_two_joints_that_feel_each_other_stick_and_slip_alike_in_both_routes() -> None:
     """A double pendulum with friction in both hinges has the same modes by complementarity and by trial."""
     inertia = ((1 / 12, 0, 0), (0, 1e-3, 0), (0, 0, 1 / 12))

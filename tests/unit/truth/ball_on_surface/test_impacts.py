@@ -35,6 +35,7 @@ def test_infinitely_many_bounces(e: float, height: float) -> None:
     assert settles.time_low <= rests <= settles.time_high
 
 
+@pytest.mark.drill
 @settings(max_examples=10, deadline=None)
 @given(
     e=st.floats(0.05, 0.97),

@@ -71,6 +71,7 @@ def test_a_start_from_rest(engine: str, f: float, acceleration: float) -> None:
     np.testing.assert_allclose(way, 0.5 * acceleration * found["time"].to_numpy() ** 2, rtol=0, atol=1e-10)
 
 
+@pytest.mark.drill
 def test_less_and_less_to_and_fro() -> None:
     """A ball that slips to a stop and back infinitely often in a finite time comes to rest at the end of that time."""
     f, mu, v = 3e-3, 0.08, 0.5

@@ -254,6 +254,7 @@ def test_disagreement_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
 EPS = float(np.finfo(float).eps)
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 @pytest.mark.parametrize(("factor", "known"), [(1.0, ["slip"]), (12 / 7, [])])
 def test_between_two_regimes_the_answer_is_ill_posed(factor: float, known: list[str]) -> None:

@@ -278,6 +278,7 @@ def test_where_the_compiled_route_is_not_taken(monkeypatch: pytest.MonkeyPatch) 
     assert truth(load_scene("sphere_in_cylinder"), np.array([0.0, 0.1])).attrs["second_route"].endswith("DOP853")
 
 
+@pytest.mark.drill
 @needs_heyoka
 def test_the_truth_of_ten_thousand_oscillations() -> None:
     """There is one, to a thousandth of the range of z: constraints that nothing holds drift by that in the world."""

@@ -66,6 +66,7 @@ def test_a_sled_turns_about_a_foot_and_rests() -> None:
     assert found.record.v_WB[2] == pytest.approx(0.0, abs=1e-15)
 
 
+@pytest.mark.drill
 def test_a_sled_on_a_slope_turns_about_a_foot_and_rests() -> None:
     """Where the slope unloads a foot, times and place of rest are the laboratory's, too."""
     found = motion("sled_on_slope", [0.0, 0.95])
@@ -74,6 +75,7 @@ def test_a_sled_on_a_slope_turns_about_a_foot_and_rests() -> None:
     assert found.record.p_WB[1, 0, :2] == pytest.approx([0.3727448404, 0.308618949299], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_sphere_with_its_mass_off_its_centre_slides_and_rolls() -> None:
     """It rolls from the laboratory's time on, and is where that found it; so is the force."""
     found = motion("eccentric_sphere", [0.0, 2.0])
@@ -119,6 +121,7 @@ def test_a_block_rocks_with_housners_ratio() -> None:
     assert after / before == pytest.approx(0.793103448276, abs=1e-9)
 
 
+@pytest.mark.drill
 def test_a_spinning_ball_bounces() -> None:
     """Two impacts slide and the third sticks: the closed form of a thrown ball."""
     found = motion("spinning_bounce", [0.0, 1.5])
@@ -132,7 +135,12 @@ def test_a_spinning_ball_bounces() -> None:
     ("friction", "v1", "w1"),
     [
         (0.1, [0.953280499599, 0.652941904749, 0.335761070770], [3.826906440106, -16.309174821204, 25.276725182747]),
-        (0.5, [0.839862857143, 0.511113142857, 0.253103238095], [1.910857142857, -10.280838095238, 17.562057142857]),
+        pytest.param(
+            0.5,
+            [0.839862857143, 0.511113142857, 0.253103238095],
+            [1.910857142857, -10.280838095238, 17.562057142857],
+            marks=pytest.mark.drill,
+        ),
     ],
 )
 def test_two_spheres_hit(friction: float, v1: list[float], w1: list[float]) -> None:
@@ -165,8 +173,11 @@ def as_bodies(name: str, friction: float, tilt: float, **parameters: float) -> t
 @pytest.mark.parametrize(
     ("name", "friction", "tilt", "until", "parameters"),
     [
-        ("slide_to_roll", 0.2, 0.0, 1.0, {"cross_speed": 0.7, "back_spin": 30.0, "mu_static": 0.2}),
-        ("inclined_plane", 10.0, 0.35, 1.0, {}),
+        pytest.param(
+            "slide_to_roll", 0.2, 0.0, 1.0, {"cross_speed": 0.7, "back_spin": 30.0, "mu_static": 0.2},
+            marks=pytest.mark.drill,
+        ),
+        pytest.param("inclined_plane", 10.0, 0.35, 1.0, {}, marks=pytest.mark.drill),
         (
             "bouncing_ball",
             0.1,
