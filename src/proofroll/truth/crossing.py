@@ -25,7 +25,8 @@ def stays_negative(function: Callable[[FloatArray], FloatArray], start: float, e
 
     Args:
         function: of times, shape (times, functions).
-        start, end: of the step.
+        start: of the step.
+        end: of the step.
     """
     coefficients = _OF_FEW @ function((end + start) / 2 + (end - start) / 2 * _FEW)
     sizes = np.abs(coefficients)
