@@ -67,6 +67,7 @@ class Stretch(Generic[ModeT]):
         first: the state at the start.
         last: the state at the end, before anything changes there.
         guard: number of the guard that ended it; None: the end of time.
+        visited: time [s] and state at the start of each step, where they were kept.
     """
 
     start: float
@@ -75,6 +76,7 @@ class Stretch(Generic[ModeT]):
     first: State
     last: State
     guard: int | None
+    visited: Sequence[tuple[float, State]] = ()
 
 
 @dataclass(frozen=True)
@@ -177,6 +179,7 @@ def walked(
     corrected: Callable[[State], State],
     first_step: float | None = None,
     noise: FloatArray | None = None,
+    visited: list[tuple[float, State]] | None = None,
 ) -> tuple[float, State, int | None]:
     """Integrate by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
 
@@ -190,6 +193,7 @@ def walked(
         corrected: puts a state back on its constraints; applied after every step.
         first_step: [s], of the order of the leg before: rebounds get shorter and shorter. None: by the rates.
         noise: round-off of the guards, by which they must rise above zero to be seen, shape (guards,); None: none.
+        visited: takes time and state at the start of each step, for :func:`between`.
 
     Returns:
         Time [s], state there, and number of the guard; None: the end of time.
@@ -204,6 +208,8 @@ def walked(
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
     while solver.status == "running":
         before, begun = solver.y.copy(), solver.t
+        if visited is not None:
+            visited.append((begun, before))
         message = solver.step()
         if message is not None or not np.isfinite(solver.y).all():
             raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
@@ -270,10 +276,26 @@ def _refined(
     return time, number
 
 
+def between(
+    rates: Rates,
+    visited: Sequence[tuple[float, State]],
+    times: FloatArray,
+    tolerance: FloatArray,
+    corrected: Callable[[State], State],
+) -> FloatArray:
+    """States at rising times [s], each from the start of the step that holds it, shape (times, state)."""
+    starts = np.searchsorted([begun for begun, _ in visited], times, side="right") - 1
+    steps = [visited[max(int(k), 0)] for k in starts]
+    found = [_integrated(rates, y, at, float(t), tolerance) for t, (at, y) in zip(times, steps, strict=True)]
+    return np.array([corrected(state) for state in found])
+
+
 def _integrated(rates: Rates, state: State, start: float, end: float, tolerance: FloatArray) -> State:
+    """The state at the end of a part of a step, which takes one step unless its error is too large."""
     if not end > start:
         return state
     solver = _solver(rates, start, state, end, tolerance)
+    solver.h_abs = end - start
     while solver.status == "running":
         if message := solver.step():
             raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message}")

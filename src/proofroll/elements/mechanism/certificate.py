@@ -90,8 +90,8 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     compare("mobility", "1", element.analysis.mobility, built.mobility, 1.0)
     compare("error of the mass matrix", "1", 0.0, built.mass_matrix_error, 1.0)
     compare("position", "m", start.p_WB[0], sample.p_WB, size)
-    compare("velocity", "m/s", start.v_WB[0], sample.v_WB, element._speed)
-    compare("spin", "rad/s", start.w_WB[0], sample.w_WB, element._speed / size)
+    compare("velocity", "m/s", start.v_WB[0], sample.v_WB, element.speed)
+    compare("spin", "rad/s", start.w_WB[0], sample.w_WB, element.speed / size)
     if sample.q_WB is not None:
         turned = np.reshape(sample.q_WB, start.q_WB[0].shape)
         signs = np.sign(np.sum(turned * start.q_WB[0], axis=-1, keepdims=True))

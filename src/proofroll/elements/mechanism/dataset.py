@@ -12,7 +12,13 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
 from proofroll.core.turns import doubt
-from proofroll.elements.mechanism.contacts.observables import followed, given_forces
+from proofroll.elements.mechanism.contacts.observables import (
+    RESIDUALS,
+    followed,
+    given_forces,
+    normal_forces,
+    residuals,
+)
 from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.named_forces import lengths, named_forces, taken
 from proofroll.elements.mechanism.placed import TURN, Placed
@@ -98,8 +104,9 @@ def columns(
     world axes, NaN with a reason in the attribute ``absent``; ``forces``, ``torques``: the
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
     [N, N m] along coordinates; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
-    ``slip.<pair>`` [m/s]; ``energy`` [J], ``drift`` [m], and ``energy_error`` [J], or ``energy_change`` [J] of what is
-    driven or damped.
+    ``slip.<pair>`` [m/s], and what the forces leave of Coulomb's law, see
+    :data:`~proofroll.elements.mechanism.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
+    ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
     """
     mechanism, determinate = element.mechanism, element.analysis.determinate
     placed = replace(placed, q_WB=_continuous(placed.q_WB, element.start.q_WB[0]))
@@ -137,7 +144,7 @@ def columns(
             meaning = f"determinate components of the {kind}s on children"
             put(f"{kind}s", values[:, known], unit, meaning, f"{kind}_component")
     if mechanism.contacts:
-        _put_contacts(placed, pressed, put)
+        _put_contacts(element, placed, pressed, put)
     for values, item in zip(named.T, named_forces(mechanism), strict=True):
         put(item.name, values, str(item.unit), item.meaning, absent=UNSAID if np.all(np.isnan(values)) else "")
     energy = placed.energy()
@@ -151,8 +158,8 @@ def columns(
     return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 
 
-def _put_contacts(placed: Placed, pressed: FloatArray, put: Callable[..., None]) -> None:
-    """Gaps, slip and forces of contacts, each by its name and all together."""
+def _put_contacts(element: MechanismElement, placed: Placed, pressed: FloatArray, put: Callable[..., None]) -> None:
+    """Gaps, slip and forces of contacts, each by its name and all together, and what forces leave of Coulomb's law."""
     found = followed(placed)
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
@@ -164,9 +171,13 @@ def _put_contacts(placed: Placed, pressed: FloatArray, put: Callable[..., None])
         put(f"slip.{contact.name}", found.slip[:, index], "m/s", f"speed of slip of {contact.name}")
     put("gaps", found.gap, "m", "distances between what may touch", "contact")
     put("slips", found.slip, "m/s", "speeds of slip of what may touch", "contact")
-    normal = np.sum(pressed * found.normal, axis=-1)
-    put("normal_forces", normal, "N", "normal forces between what may touch", "contact")
+    put("normal_forces", normal_forces(found, pressed), "N", "normal forces between what may touch", "contact")
     put("contact_forces", pressed, "N", "forces between what may touch", "contact", "xyz")
+    friction = np.array([contact.friction for contact in placed.mechanism.contacts])
+    left = residuals(found, pressed, friction, element.force, element.speed)
+    put("unpressed", left["unpressed"], "1", "share of samples so far without a normal force", "contact")
+    for name, unit, meaning in RESIDUALS:
+        put(name, left[name], unit, meaning, "contact")
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:

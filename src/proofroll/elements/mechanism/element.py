@@ -19,7 +19,7 @@ from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
-from proofroll.elements.mechanism.contacts.observables import contact_observables
+from proofroll.elements.mechanism.contacts.observables import RESIDUALS, contact_observables
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
@@ -159,17 +159,17 @@ class MechanismElement:
         return float(min(fast, PART * self.natural_time if loaded or not spin else np.inf))
 
     @cached_property
-    def _speed(self) -> float:
+    def speed(self) -> float:
         """Largest speed at the start, or that of falling by its size, or of crossing it in its time [m/s]."""
         moving = max(float(np.max(np.abs(self.start.v_WB))), float(np.max(np.abs(self.start.w_WB))) * self.length)
         fall = float(np.sqrt(self.length * np.linalg.norm(self.mechanism.gravity)))
         return max(moving, fall) or self.length / self.natural_time
 
     @property
-    def _force(self) -> float:
+    def force(self) -> float:
         """Weight, or what turns its mass at its speed [N]."""
         mass = sum(body.mass for body in self.mechanism.bodies)
-        return mass * max(float(np.linalg.norm(self.mechanism.gravity)), self._speed**2 / self.length)
+        return mass * max(float(np.linalg.norm(self.mechanism.gravity)), self.speed**2 / self.length)
 
     @cached_property
     def conservative(self) -> bool:
@@ -184,7 +184,7 @@ class MechanismElement:
     @cached_property
     def observables(self) -> tuple[Observable, ...]:
         """See the protocol."""
-        a, force = _LEAST * self.length, _LEAST * self._force
+        a, force = _LEAST * self.length, _LEAST * self.force
         what = "tracked points" if self.mechanism.points else "origins of the bodies' frames"
         found = [Observable("positions", "m", f"the {what}", Role.MOTION, floor=a, headline=True, decides=True)]
         found += [
@@ -199,7 +199,7 @@ class MechanismElement:
                 found.append(
                     Observable(f"q.{joint.name}", unit, f"coordinate of {joint.name}", Role.MOTION, floor=floor)
                 )
-        speed = _LEAST * self._speed
+        speed = _LEAST * self.speed
         found += [
             Observable(
                 "v_WB", "m/s", "velocities of the origins of the bodies' frames", Role.MOTION,
@@ -256,7 +256,7 @@ class MechanismElement:
         motion = self._solution.motion
         rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
         acceleration = (motion.J @ rates + motion.bias)[:-1]
-        scale = max(float(np.max(np.abs(acceleration[:, :3]))), self._speed**2 / self.length)
+        scale = max(float(np.max(np.abs(acceleration[:, :3]))), self.speed**2 / self.length)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
 
     @cached_property
@@ -310,11 +310,14 @@ class MechanismElement:
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
-        natural = {"attitudes": 1.0, "energy_error": self._force * self.length, "drift": self.length}
+        natural = {"attitudes": 1.0, "energy_error": self.force * self.length, "drift": self.length, "unpressed": 1.0}
+        natural |= {
+            name: {"m": self.length, "m/s": self.speed, "N": self.force, "1": 1.0}[unit] for name, unit, _ in RESIDUALS
+        }
         sizes = {}
         for item in self.observables:
             values = truth[item.name].to_numpy() if item.name in truth else np.zeros(1)
-            if item.role == Role.REACTION:
+            if item.role == Role.REACTION and item.name not in natural:
                 sizes[item.name] = float(np.nanmax(np.abs(values)))
             else:
                 sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
@@ -329,12 +332,12 @@ class MechanismElement:
         shown = [Sign(OPENED, dataset["drift"].to_numpy() > OPEN * self.length)]
         if self.conservative:
             energy = dataset["energy"].to_numpy()
-            shown.append(Sign(ENERGY_GAIN, energy - energy[0] > GAIN * self._force * self.length))
+            shown.append(Sign(ENERGY_GAIN, energy - energy[0] > GAIN * self.force * self.length))
         return shown
 
     def failure_program(self, failed: FailedRun, engine: str | None) -> str:
         """See :class:`proofroll.core.element_abilities.WritesPrograms`."""
-        gain = GAIN * self._force * self.length if self.conservative else 0.0
+        gain = GAIN * self.force * self.length if self.conservative else 0.0
         return program(self, failed, engine, gain, OPEN * self.length)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's

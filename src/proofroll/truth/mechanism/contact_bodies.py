@@ -19,9 +19,8 @@ from proofroll.elements.mechanism.contacts.acting import (
     acting,
 )
 from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
-from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
-from proofroll.truth.hybrid import Stretch, Transition, walked
+from proofroll.truth.hybrid import Stretch, Transition, between, walked
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
@@ -71,7 +70,7 @@ class ContactBodies:
         if self._stands(state, mode):
             return Stretch(time, until, mode, state, state, None)
         start, begun = self._kicked(time, state, mode)
-        guards = guards_of(self.contacts, mode)
+        guards, visited = guards_of(self.contacts, mode), list[tuple[float, Array]]()
         end, last, guard = walked(
             lambda _, y: self.equations.rate(y, mode),
             begun,
@@ -82,6 +81,7 @@ class ContactBodies:
             corrected=lambda y: self.equations.eliminated(y, mode),
             first_step=self._span,
             noise=noise_of(guards, self._size),
+            visited=visited,
         )
         if guard is not None and guards[guard].kind == "still":
             k = guards[guard].contact
@@ -89,7 +89,7 @@ class ContactBodies:
             rest = faint_time(mode[k], at.touching[k], self.equations.accelerated(at, mode).slide[k])
             last, end = last + rest * self.equations.rate(last, mode), end + rest
         self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard)
+        return Stretch(time, end, mode, state, last, guard, visited)
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
@@ -104,13 +104,12 @@ class ContactBodies:
 
     def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
         """See the protocol."""
-        if self._stands(leg.first, leg.mode):
+        if not leg.visited:
             return np.array([leg.first for _ in times])
-        start, begun = self._kicked(leg.start, leg.first, leg.mode)
-        spans, tolerance = np.maximum(times - begun, 0.0), float(self._tolerance[0])
         rate, corrected = self.equations.rate, self.equations.eliminated
-        states = integrated(lambda _, y: rate(y, leg.mode), start, spans, tolerance, lambda y: corrected(y, leg.mode))
-        return np.array(list(states))
+        return between(
+            lambda _, y: rate(y, leg.mode), leg.visited, times, self._tolerance, lambda y: corrected(y, leg.mode)
+        )
 
     def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""

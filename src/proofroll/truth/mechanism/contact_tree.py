@@ -9,9 +9,8 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.hybrid import Stretch, Transition, walked
+from proofroll.truth.hybrid import Stretch, Transition, between, walked
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
     STANDS,
@@ -48,7 +47,7 @@ class ContactTree:
         if self._stands(state, mode):
             return Stretch(time, until, mode, state, state, None)
         start, begun = self._kicked(time, state, mode)
-        guards = guards_of(self.contacts, mode)
+        guards, visited = guards_of(self.contacts, mode), list[tuple[float, Array]]()
         end, last, guard = walked(
             lambda _, y: self.dynamics.rate(y, mode),
             begun,
@@ -59,6 +58,7 @@ class ContactTree:
             corrected=lambda y: self.dynamics.eliminated(y, mode),
             first_step=self._span,
             noise=noise_of(guards, self._size),
+            visited=visited,
         )
         if guard is not None and guards[guard].kind == "still":
             k = guards[guard].contact
@@ -66,7 +66,7 @@ class ContactTree:
             rest = faint_time(mode[k], found.state.touching[k], found.slide_rate[k])
             last, end = last + rest * self.dynamics.rate(last, mode), end + rest
         self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard)
+        return Stretch(time, end, mode, state, last, guard, visited)
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
@@ -80,19 +80,11 @@ class ContactTree:
 
     def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
         """See the protocol."""
-        if self._stands(leg.first, leg.mode):
+        if not leg.visited:
             return np.array([leg.first for _ in times])
-        start, begun = self._kicked(leg.start, leg.first, leg.mode)
-        return np.array(
-            list(
-                integrated(
-                    lambda _, y: self.dynamics.rate(y, leg.mode),
-                    start,
-                    np.maximum(times - begun, 0.0),
-                    float(self._tolerance[0]),
-                    lambda y: self.dynamics.eliminated(y, leg.mode),
-                )
-            )
+        rate, corrected = self.dynamics.rate, self.dynamics.eliminated
+        return between(
+            lambda _, y: rate(y, leg.mode), leg.visited, times, self._tolerance, lambda y: corrected(y, leg.mode)
         )
 
     def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:

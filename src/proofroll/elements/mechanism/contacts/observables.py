@@ -18,6 +18,20 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism.sampling import MechanismSample
 
 
+# Coulomb's law held against the forces that a run reports, zero where they keep it.
+RESIDUALS = (
+    ("penetration", "m", "depth to which shapes overlap"),
+    ("contact_pull", "N", "normal forces that pull"),
+    ("cone_excess", "N", "friction beyond its coefficient times the normal force"),
+    ("friction_direction", "1", "1 + T·u/(μN|u|): friction that is less than its bound or not against the slip u"),
+    ("hop_speed", "m/s", "speed along the normal of what presses"),
+    ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
+)
+# Parts of a mechanism's weight and speed below which nothing presses and nothing slides; softened contacts creep.
+_PRESSES, _SLIDES = 1e-6, 1e-2
+_AXIS = 1e-12  # component of a unit normal that is none
+
+
 class Followed(NamedTuple):
     """All contacts along a motion.
 
@@ -25,18 +39,20 @@ class Followed(NamedTuple):
         gap: [m], shape (time, contacts).
         slip: speed along the surfaces [m/s], shape (time, contacts).
         normal: unit vectors from b to a, shape (time, contacts, 3).
+        slide: velocity of a against b where they touch [m/s], shape (time, contacts, 3).
     """
 
     gap: FloatArray
     slip: FloatArray
     normal: FloatArray
+    slide: FloatArray
 
 
 def followed(placed: Placed) -> Followed:
     """Gaps, speeds of slip and normals of all contacts at all times."""
     mechanism = placed.mechanism
     shape = (len(placed.time), len(mechanism.contacts))
-    gap, slip, normal = np.zeros(shape), np.zeros(shape), np.zeros((*shape, 3))
+    gap, slip, normal, slide = np.zeros(shape), np.zeros(shape), np.zeros((*shape, 3)), np.zeros((*shape, 3))
     still = np.zeros((len(placed.time), 3))
 
     def moving(body: str, k: int) -> Moving:
@@ -49,7 +65,8 @@ def followed(placed: Placed) -> Followed:
             found = touch(contact, moving(contact.body_a, k), moving(contact.body_b, k))
             across = found.slide - found.normal * (found.normal @ found.slide)
             gap[k, c], slip[k, c], normal[k, c] = found.gap, np.linalg.norm(across), found.normal
-    return Followed(gap, slip, normal)
+            slide[k, c] = found.slide
+    return Followed(gap, slip, normal, slide)
 
 
 def contact_observables(mechanism: Mechanism, length: float, speed: float, force: float) -> Iterator[Observable]:
@@ -62,6 +79,68 @@ def contact_observables(mechanism: Mechanism, length: float, speed: float, force
     yield Observable("normal_forces", "N", meaning, Role.REACTION, floor=force, headline=True, column=True)
     meaning = "forces between what may touch, where they are determinate all the time"
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, asked_for=False)
+    meaning = "share of the samples so far in which what may touch does not press"
+    yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
+    floors = {"m": length, "m/s": speed, "N": force, "1": 1.0}
+    for name, unit, meaning in RESIDUALS:
+        yield Observable(name, unit, meaning, Role.RESIDUAL, floor=floors[unit], asked_for=False, hangs_on_events=False)
+
+
+def residuals(
+    found: Followed, pressed: FloatArray, friction: FloatArray, weight: float, speed: float
+) -> dict[str, FloatArray]:
+    """Each of ``RESIDUALS``, and ``unpressed``, shape (time, contacts); NaN of contacts without a force.
+
+    Args:
+        found: the contacts along the motion.
+        pressed: forces on their first bodies [N], shape (time, contacts, 3); NaN where not determinate.
+        friction: their coefficients, shape (contacts,).
+        weight: of the mechanism [N].
+        speed: by which the natural map weighs a slip against the weight [m/s].
+    """
+    n, u_n = found.normal, np.sum(found.normal * found.slide, axis=-1)
+    said, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
+    N = normal_forces(found, pressed)
+    u = found.slide - n * u_n[..., None]
+    T = np.where(said[..., None], pressed - N[..., None] * n, 0.0)
+    presses = np.asarray(_PRESSES * weight < N)
+    t = np.linalg.norm(T, axis=-1)
+    bound = friction * np.where(presses, N, 0.0)
+    slides = np.asarray(presses & said & (found.slip > _SLIDES * speed) & (friction > 0))
+    against = np.sum(T * u, axis=-1) / np.where(slides, bound * found.slip, 1.0)
+    # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
+    r = weight / speed
+    pushed, pulled = N - r * (u_n + friction * found.slip), T - r * u
+    length = np.linalg.norm(pulled, axis=-1)
+    kept, holds = _onto_cone(pushed, length, friction)
+    across = pulled * (holds / np.where(length > 0, length, 1.0))[..., None] - T
+    off = np.maximum(np.abs(kept - N), np.linalg.norm(across, axis=-1))
+    values = {
+        "penetration": np.maximum(-found.gap, 0.0),
+        "contact_pull": np.maximum(-N, 0.0),
+        "cone_excess": np.maximum(t - bound, 0.0),
+        "friction_direction": np.where(slides, 1.0 + against, 0.0),
+        "hop_speed": np.where(presses, np.abs(u_n), 0.0),
+        "natural_map": np.where(presses, np.where(said, off, 0.0), t),
+    }
+    after = np.arange(len(N))[:, None]
+    values["unpressed"] = np.cumsum(np.where(after > 0, np.logical_not(presses), 0), axis=0) / np.maximum(after, 1)
+    own = {"penetration"}
+    return {name: value if name in own else np.where(given, value, np.nan) for name, value in values.items()}
+
+
+def normal_forces(found: Followed, pressed: FloatArray) -> FloatArray:
+    """Normal force of each contact [N], shape (time, contacts); a component across the normal may be unknown."""
+    along = np.abs(found.normal) > _AXIS
+    return np.asarray(np.sum(np.where(along, pressed, 0.0) * found.normal, axis=-1))
+
+
+def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Nearest normal force and friction of the cone T ≤ μN to given ones [N]."""
+    within, beyond = friction * N >= T, -friction * T >= N
+    pressed = (N + friction * T) / (1 + friction**2)
+    kept = np.where(within, N, np.where(beyond, 0.0, pressed))
+    return kept, np.where(within, T, np.where(beyond, 0.0, friction * pressed))
 
 
 def given_forces(mechanism: Mechanism, samples: Sequence[MechanismSample]) -> FloatArray:

@@ -1,0 +1,43 @@
+"""Stretches between switches: guards, and states within a stretch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from proofroll.core.arrays import FloatArray
+from proofroll.truth.hybrid import between, walked
+
+TOLERANCE = np.full(2, 1e-13)
+
+
+def swing(_: float, y: FloatArray) -> FloatArray:
+    """Rates of a unit oscillator."""
+    return np.array([y[1], -y[0]])
+
+
+def kept(y: FloatArray) -> FloatArray:
+    """The state as it is."""
+    return y
+
+
+@pytest.mark.parametrize("below", [1e-3, 1e-6, 1e-9])
+def test_a_crest_within_a_step_is_seen(below: float) -> None:
+    """A guard that rises above zero only under the crest of its swing ends the stretch there."""
+
+    def crest(y: FloatArray) -> FloatArray:
+        return np.array([y[0] - 1.0 + below])
+
+    time, _, guard = walked(swing, 0.0, np.array([0.0, 1.0]), 3.0, tolerance=TOLERANCE, guards=crest, corrected=kept)
+    assert guard == 0
+    assert time == pytest.approx(np.arcsin(1.0 - below), abs=1e-6 * np.sqrt(below))
+
+
+def test_states_within_a_stretch_follow_from_its_steps() -> None:
+    """Any time of a stretch is reached from the step that holds it, as accurately as its end."""
+    visited: list[tuple[float, FloatArray]] = []
+    start = np.array([0.0, 1.0])
+    walked(swing, 0.0, start, 3.0, tolerance=TOLERANCE, guards=lambda _: np.zeros(0), corrected=kept, visited=visited)
+    times = np.array([0.0, 0.4, 1.7, 3.0])
+    found = between(swing, visited, times, TOLERANCE, kept)
+    assert found[:, 0] == pytest.approx(np.sin(times), abs=1e-12)
