@@ -13,7 +13,7 @@ from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
 from proofroll.conformance.apart import run_apart
-from proofroll.conformance.subject import Subject, UnlikeSceneError, explained, lacking, scenes, truth_scenes
+from proofroll.conformance.subject import Subject, UnlikeSceneError, checked_on, explained, scenes, truth_scenes
 
 # One per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
@@ -169,7 +169,7 @@ def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
                 yield f"{check.__name__}[{formulation}-{preset}]", partial(_on_first, first, check)
             for own_scenes, of_found in ((scenes(), _OF_SCENES), (truth_scenes(), _OF_TRUTHS)):
                 for (name, scene), check in itertools.product(own_scenes.items(), of_found):
-                    if lacking(engine, formulation, scene):
+                    if not checked_on(engine, formulation, scene):
                         continue  # refused before it is built; that something is left `provides_for_some_scene` holds
                     subject = Subject(engine, settings, scene)
                     yield f"{check.__name__}[{formulation}-{preset}-{name}]", partial(check, subject)
@@ -178,6 +178,8 @@ def runs(engine: Any) -> Iterator[tuple[str, Callable[[], None]]]:
 def _first(engine: Any, settings: Any) -> Subject | None:
     """The engine on the most demanding scene that it builds with these settings."""
     for scene in scenes().values():
+        if not checked_on(engine, settings.formulation, scene):
+            continue
         subject = Subject(engine, settings, scene)
         with suppress(SkipTest):
             subject.build()

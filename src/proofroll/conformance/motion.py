@@ -14,7 +14,7 @@ from unittest import SkipTest
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proofroll.conformance.subject import Subject, bits, lacking, require, scenes, truth_scenes
+from proofroll.conformance.subject import Subject, bits, checked_on, require, scenes, truth_scenes
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS
 from proofroll.core.engine import precision_of
@@ -118,7 +118,7 @@ def _other(subject: Subject) -> Subject:
     """The engine on a scene that differs from the subject's, also in its numbers where there is such a one."""
     for scene in [*truth_scenes().values(), *scenes().values()]:
         other = replace(subject, scene=scene)
-        if scene.digest != subject.scene.digest and not lacking(subject.engine, subject.settings.formulation, scene):
+        if scene.digest != subject.scene.digest and checked_on(subject.engine, subject.settings.formulation, scene):
             with suppress(SkipTest):
                 other.build()
                 return other

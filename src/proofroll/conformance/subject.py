@@ -17,6 +17,7 @@ from proofroll.core.certificate import ROUNDINGS, certify
 from proofroll.core.dataset import from_samples
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.engine import EPSILON, Sample, precision_of
+from proofroll.core.engine_abilities import MadeFor, offered
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.multi_element import build
 from proofroll.core.plugins import load_element_kinds
@@ -47,6 +48,12 @@ def lacking(engine: Any, formulation: str, scene: Scene) -> frozenset[str]:
     """Capabilities that the scene requires and the formulation does not provide."""
     provides = engine.provides.get(formulation, ()) if isinstance(engine.provides, Mapping) else ()
     return scene.requires - frozenset(provides)
+
+
+def checked_on(engine: Any, formulation: str, scene: Scene) -> bool:
+    """True if the formulation provides what the scene requires, and is offered for it."""
+    purposes = engine.made_for if isinstance(engine, MadeFor) else {}
+    return not lacking(engine, formulation, scene) and offered(formulation, scene.requires, purposes)
 
 
 def require(condition: object, message: str) -> None:

@@ -189,6 +189,24 @@ class SaysWhyNot(Protocol):
     lacking: ClassVar[Mapping[str, Mapping[str, str]]]
 
 
+@runtime_checkable
+class MadeFor(Protocol):
+    """Ability of an engine with formulations that are offered for some scenes alone.
+
+    Without what it is made for such a formulation is the same model as another one; asked for by name it builds it.
+
+    Attributes:
+        made_for: formulation -> capabilities; a scene has to require one of them.
+    """
+
+    made_for: ClassVar[Mapping[str, frozenset[str]]]
+
+
+def offered(formulation: str, requires: Collection[str], made_for: Mapping[str, Collection[str]]) -> bool:
+    """True if a scene that requires this is one that the formulation is made for (:class:`MadeFor`)."""
+    return formulation not in made_for or not set(requires).isdisjoint(made_for[formulation])
+
+
 def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
     """Compares what a scene requires with what a formulation provides.
 
@@ -198,7 +216,12 @@ def require_provided(engine: Any, formulation: str, scene: Scene) -> None:
     reasons = engine.lacking.get(formulation, {}) if isinstance(engine, SaysWhyNot) else {}
     missing = sorted(scene.requires - engine.provides[formulation])
     if missing:
-        able = [name for name, given in engine.provides.items() if scene.requires <= given]
+        purposes = engine.made_for if isinstance(engine, MadeFor) else {}
+        able = [
+            name
+            for name, given in engine.provides.items()
+            if scene.requires <= given and offered(name, scene.requires, purposes)
+        ]
         instead = (
             f"choose formulation={' or '.join(able)}" if able else f"no formulation of {engine.name} has all of that"
         )

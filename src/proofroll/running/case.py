@@ -54,6 +54,7 @@ class EngineDescription:
         inherent: formulation -> what is always in its model -> why.
         defaults: its default values.
         oldest: version from which on its adapter supports it; empty: not declared.
+        made_for: formulation -> what a scene has to require one of for it to be offered, sorted; none: any scene.
     """
 
     name: str
@@ -67,6 +68,7 @@ class EngineDescription:
     inherent: dict[str, dict[str, str]]
     defaults: dict[str, Any]
     oldest: str = ""
+    made_for: dict[str, list[str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ ASIDE = frozenset(
 
 def describe(engine: str) -> dict[str, Any]:
     """Description of an engine, with the rungs of its formulations on the ladder of models."""
-    from proofroll.core.engine_abilities import CannotLeaveOut, SupportsFrom, TellsDefaults, TellsLevels
+    from proofroll.core.engine_abilities import CannotLeaveOut, MadeFor, SupportsFrom, TellsDefaults, TellsLevels
     from proofroll.running.loading import load
 
     kind = load(engine)
@@ -61,6 +61,7 @@ def describe(engine: str) -> dict[str, Any]:
         inherent={key: dict(terms) for key, terms in inherent},
         defaults=plain(dict(kind.defaults())) if isinstance(kind, TellsDefaults) else {},
         oldest=kind.oldest if isinstance(kind, SupportsFrom) else "",
+        made_for={key: sorted(names) for key, names in kind.made_for.items()} if isinstance(kind, MadeFor) else {},
     )
     return dataclasses.asdict(description)
 

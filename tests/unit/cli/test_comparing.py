@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from mixed_scene import BALL_AND_PENDULUM
@@ -62,11 +63,9 @@ def test_why_nobody_can_is_said_engine_by_engine(
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
     assert "no installed engine has revolute joints" in err
-    rods_alone = {"rods": ["revolute joints"]}
-    monkeypatch.setattr(
-        "proofroll.studies.comparison.default_comparison._provided",
-        lambda _: [("jointed", rods_alone), ("rolling", {"ball": ["rolling without slip"]})],
-    )
+    provided = {"jointed": {"rods": ["revolute joints"]}, "rolling": {"ball": ["rolling without slip"]}}
+    engines = [SimpleNamespace(name=name, provides=provides, made_for={}) for name, provides in provided.items()]
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._installed", lambda _: engines)
     code, _, err = command_line("compare", str(mixed))
     assert code == 2
     said = "jointed has no formulation for ball (rolling without slip); rolling has no formulation for mechanism"

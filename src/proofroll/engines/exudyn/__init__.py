@@ -20,6 +20,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, ROLLS, BallCapability, RollingBall
+from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.exudyn import redundant, spheres, tree
 from proofroll.engines.exudyn.carrier import Carrier
@@ -70,6 +71,7 @@ class Exudyn:
         "spheres": spheres.PROVIDES,
         "tree": tree.PROVIDES,
     }
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"spheres": frozenset({MechanismCapability.CONTACT})}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "generic": {
             BallCapability.ORIENTATION: "the spin of generic is a quasi-velocity, the rate of no orientation",

@@ -16,6 +16,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import mechanism, mechanism_geoms
 from proofroll.engines.mujoco.chart import Chart
@@ -56,6 +57,7 @@ class Mujoco(SteppedModel):
         "joints": mechanism.PROVIDES,
         "geoms": mechanism_geoms.PROVIDES,
     }
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"geoms": frozenset({MechanismCapability.CONTACT})}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "facets": {
             BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.multi_element import each_alone, represents
 from proofroll.core.observable import Role
@@ -97,33 +98,35 @@ def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
 def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
     found = []
-    for engine, provides in _provided(workers):
-        fitting = [name for name in provides if represents(scene, name, provides)]
-        found += [f"{engine}[formulation={name}]" for name in fitting[: 1 if first else None]]
+    for told in _installed(workers):
+        fitting = [
+            name
+            for name in told.provides
+            if represents(scene, name, told.provides) and offered(name, scene.requires, told.made_for)
+        ]
+        found += [f"{told.name}[formulation={name}]" for name in fitting[: 1 if first else None]]
     return found
 
 
-def _provided(workers: Workers | None) -> Iterator[tuple[str, Mapping[str, Collection[str]]]]:
-    """Capabilities of the formulations of each installed engine."""
-    for engine, told in described(engine_names(), workers).items():
-        if isinstance(told, EngineDescription):
-            yield engine, told.provides
+def _installed(workers: Workers | None) -> list[EngineDescription]:
+    """Descriptions of the installed engines."""
+    return [told for told in described(engine_names(), workers).values() if isinstance(told, EngineDescription)]
 
 
 def _why_none(scene: Scene, workers: Workers | None) -> str:
     """Capabilities that no formulation provides; if there are none, the elements that each engine cannot build."""
-    engines = list(_provided(workers))
-    given = {item for _, provides in engines for items in provides.values() for item in items}
+    engines = _installed(workers)
+    given = {item for told in engines for items in told.provides.values() for item in items}
     if lacking := scene.requires - given:
         return f"no installed engine has {', '.join(sorted(lacking))}"
     said = []
-    for engine, provides in engines:
+    for told in engines:
         none = [
             f"{alone.elements[0].name} ({', '.join(sorted(alone.requires))})"
             for alone in each_alone(scene)
-            if not any(alone.requires <= set(items) for items in provides.values())
+            if not any(alone.requires <= set(items) for items in told.provides.values())
         ]
-        said.append(f"{engine} has no formulation for {' and '.join(none) or 'all elements of one kind at once'}")
+        said.append(f"{told.name} has no formulation for {' and '.join(none) or 'all elements of one kind at once'}")
     return f"no installed engine can represent all of the scene: {'; '.join(said)}"
 
 

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.dataset import part
-from proofroll.core.engine_abilities import Level
+from proofroll.core.engine_abilities import Level, offered
 from proofroll.core.errors import ProofrollError
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
@@ -92,7 +92,8 @@ def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: f
             if isinstance(told, ProofrollError):
                 continue
             for formulation, presets in told.presets.items():
-                if told.levels.get(formulation) != level or not requires & set(told.provides[formulation]):
+                fits = requires & set(told.provides[formulation]) and offered(formulation, requires, told.made_for)
+                if told.levels.get(formulation) != level or not fits:
                     continue
                 preset = "matched" if "matched" in presets else next(iter(presets))
                 model = LadderModel(told.name, {"formulation": formulation, "preset": preset})

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.engine import whole_steps
+from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
 from proofroll.running.asking import described, resolve, resolve_with_truth
@@ -82,7 +83,9 @@ def _chosen(
     for formulation, presets in described.presets.items():
         if spec.options.get("formulation", formulation) != formulation:
             continue
-        if requires and not requires & set(described.provides[formulation]):
+        known = not requires or requires & set(described.provides[formulation])
+        fits = "formulation" in spec.options or offered(formulation, requires, described.made_for)
+        if not known or not fits:
             foreign = True
             continue
         for preset in presets:

@@ -9,8 +9,10 @@ import pytest
 from proofroll.core.comparison import Row
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import load_scene
 from proofroll.studies.comparison import default_comparison as first_look
 from proofroll.studies.comparison import planning
+from proofroll.studies.comparison.default_comparison import able
 
 
 def test_a_wrong_setting_is_found_before_anything_runs(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -60,3 +62,11 @@ def test_a_first_look_takes_the_step_that_a_scene_asks_for() -> None:
     engines = [row.engine for row in first_look.compared("andrews_squeezer", {}).rows]
     assert "exudyn[formulation=redundant,dt=0.0001]" in engines
     assert "projection[formulation=dependent]" in engines
+
+
+def test_a_formulation_is_offered_for_what_it_is_made_for() -> None:
+    """Formulations of contact are in a first look at bodies that touch, and not where another is the same model."""
+    touching, swinging = (able(load_scene(name)) for name in ("sled", "double_pendulum"))
+    assert {"mujoco[formulation=geoms]", "exudyn[formulation=spheres]"} <= set(touching)
+    assert not {"mujoco[formulation=geoms]", "exudyn[formulation=spheres]"} & set(swinging)
+    assert "mujoco[formulation=joints]" in swinging
