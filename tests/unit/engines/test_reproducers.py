@@ -152,15 +152,26 @@ def test_a_mechanism_moves_as_in_the_adapter(formulation: str, options: dict[str
     assert opened < 1e-14  # 2e-12 without
 
 
-@pytest.mark.parametrize("name", ["stop", "spring_friction"])
-def test_a_program_has_friction_and_stops_of_joints(name: str) -> None:
-    """Exudyn's law along a coordinate is part of the program, though it tells no energy."""
+@pytest.mark.parametrize("name", ["stop", "spring_friction", "arm_pd", "gear_pair"])
+def test_a_program_has_the_laws_of_joints(name: str) -> None:
+    """Exudyn's laws along a coordinate, couplings and rotors are part of the program."""
     kind, scene = kind_of("exudyn"), load_scene(name)
     settings = resolve_settings(kind, {"formulation": "redundant", "preset": "tuned"})
     ((places, _, _),) = program("exudyn", settings, scene)["run"]([0.6])
     adapter = kind.build(scene, settings)
     adapter.advance(0.6)
-    np.testing.assert_allclose(places, adapter.sample().p_WB, rtol=0, atol=1e-9)
+    sample, mechanism = adapter.sample(), scene.elements[0].mechanism
+    turned = Rotation.from_quat(sample.q_WB, scalar_first=True)
+    followed = [(mechanism.body_index[point.body], point.position) for point in mechanism.points] or [(0, np.zeros(3))]
+    expected = [sample.p_WB[body] + turned[body].apply(position) for body, position in followed]
+    np.testing.assert_allclose(places, expected, rtol=0, atol=1e-9)
+
+
+def test_a_function_is_in_no_program() -> None:
+    """An effort with a limit is a function of Python's in Exudyn, and the program that would lack it is refused."""
+    kind = kind_of("exudyn")
+    with pytest.raises(Refused, match="are functions"):
+        kind.reproducer(load_scene("saturated_servo"), resolve_settings(kind, {"formulation": "redundant"}))
 
 
 @pytest.mark.parametrize(

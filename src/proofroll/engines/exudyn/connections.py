@@ -13,7 +13,7 @@ import numpy as np
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.model import JointOrLoop
 from proofroll.elements.mechanism.rotations import Array, cross
-from proofroll.engines.exudyn.native import Output, exu, items
+from proofroll.engines.exudyn.native import Output, data_node, exu, items
 
 # What Exudyn's joints hold between two frames: three translations and three rotations, in the axes of the first.
 _HELD = {
@@ -58,15 +58,36 @@ def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], 
 
 
 class Connections:
-    """Connects the bodies of a system, by name, the world among them; Exudyn has their reference at ``com``."""
+    """Connects the bodies of a system, by name, the world among them.
 
-    def __init__(self, system: Any, bodies: Mapping[str, Any], com: Mapping[str, Array]) -> None:
-        self._system, self._bodies, self._com = system, bodies, com
+    Exudyn has their reference at ``com``, and their axes as ``turns`` turn ours.
+    """
+
+    def __init__(
+        self, system: Any, bodies: Mapping[str, Any], com: Mapping[str, Array], turns: Mapping[str, Array]
+    ) -> None:
+        self._system, self._bodies, self._com, self._turns = system, bodies, com, turns
 
     def marker(self, body: str, position: Any, axes: Array) -> Any:
         """A marker on a body, at a place in its frame and with the axes of a joint."""
-        place = exu.HT(rotation=axes, translation=np.array(position) - self._com[body])
+        place = exu.HT(rotation=self._turns[body] @ axes, translation=self._local(body, position))
         return self._system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._bodies[body], localHT=place))
+
+    def _local(self, body: str, position: Any) -> Array:
+        return np.asarray(self._turns[body] @ (np.array(position) - self._com[body]))
+
+    def coordinate(self, joint: Joint) -> Any:
+        """A marker of the coordinate of a joint; the angle of one is zero where Exudyn's axes of both bodies agree."""
+        between: dict[str, Any] = {
+            "bodyNumbers": [self._bodies[joint.parent], self._bodies[joint.child]],
+            "localPosition0": self._local(joint.parent, joint.position),
+            "localPosition1": self._local(joint.child, joint.child_position),
+            "axis0": self._turns[joint.parent] @ joint.parent_frame[:, 2],
+        }
+        if joint.kind == "prismatic":
+            return self._system.AddMarker(items.MarkerBodiesRelativeTranslationCoordinate(**between))
+        node = data_node(self._system, joint.q0[0])  # it counts whole turns
+        return self._system.AddMarker(items.MarkerBodiesRelativeRotationCoordinate(nodeNumber=node, **between))
 
     def connect(self, between: JointOrLoop, joint: Joint | None, *, flat: bool) -> Connected:
         """A joint with its own spring, damper and drive, or a loop; ``flat`` in a planar mechanism."""
@@ -100,8 +121,7 @@ class Connections:
                 markerNumbers=markers, force=-joint.constant_drive, axisMarker0=[0.0, 0.0, 1.0], **law
             )
         else:  # its torque acts against the angle, as the spring's does; the node counts whole turns
-            turns = items.NodeGenericData(initialCoordinates=[joint.q0[0]], numberOfDataCoordinates=1)
-            node = self._system.AddNode(turns)
+            node = data_node(self._system, joint.q0[0])
             made = items.ObjectConnectorTorsionalSpringDamper(
                 nodeNumber=node, torque=-joint.constant_drive, **law, markerNumbers=markers
             )
@@ -137,5 +157,6 @@ class Connections:
 
     def body(self, name: str, output: Any, at: Array) -> Array:
         """A quantity at a place of a body, from its centre of mass."""
-        quantity = self._system.GetObjectOutputBody(self._bodies[name], output, at, exu.ConfigurationType.Current)
-        return np.array(quantity)
+        turn, now = self._turns[name], exu.ConfigurationType.Current
+        quantity = np.array(self._system.GetObjectOutputBody(self._bodies[name], output, turn @ at, now))
+        return (quantity.reshape(3, 3) @ turn).ravel() if output == Output.RotationMatrix else quantity

@@ -1,89 +1,167 @@
-"""Dry friction and stops of joints by Exudyn's own law along a coordinate, ``CoordinateSpringDamperExt``.
+"""Laws along coordinates of joints: dry friction and stops, actuators, drives in time, couplings, armature.
 
-Friction holds by a bristle, a spring and damper that slips at the friction's force; a stop is a spring and damper. Both
-have the stiffness and damping that stop the joint's child within a step, so that what they give way by goes with the
-step: neither is part of the scene.
+Friction and stops are Exudyn's ``CoordinateSpringDamperExt``. Friction holds by a bristle, a spring and damper that
+slips at the friction's force; a stop is a spring and damper. Both have what stops the joint's child
+within a step, so that what they give way by goes with the step: neither is part of the scene. A servo with a constant
+target and no limit is a ``CoordinateSpringDamper``; any other effort is a user function of one, evaluated at every
+iterate. A coupling is an ``ObjectConnectorCoordinate``, and so is what holds a rotor, the armature, to its joint.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from proofroll.elements.mechanism import Body, Joint, Mechanism
-from proofroll.elements.mechanism.named_forces import on_joint
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.named_forces import lengths, on_joint
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.engines.exudyn.native import Output, items
+from proofroll.elements.mechanism.signal import value_at, varies
+from proofroll.engines.exudyn.native import Output, add_renamed, data_node, items
 
 
 class JointLaw(NamedTuple):
-    """Exudyn's object for the friction and stops of a joint, and the number of that joint."""
+    """Exudyn's object, the number of a joint that it pushes, and that push over the force that Exudyn tells.
+
+    ``field`` and ``place`` are where a sample has that push; those of a drive in time and of armature are in none.
+    """
 
     item: Any
     number: int
+    factor: float = -1.0
+    field: str = ""
+    place: int = 0
 
 
-def add_laws(system: Any, mechanism: Mechanism, bodies: Any, com: Any, dt: float) -> list[JointLaw]:
-    """The laws of all joints that have dry friction or stops; ``dt`` is the step [s]."""
-    by_name = {body.name: body for body in mechanism.bodies}
-    return [
-        JointLaw(_add(system, joint, by_name[joint.child], bodies, com, dt), number)
-        for number, joint in enumerate(mechanism.joints)
-        if joint.friction or joint.limits
-    ]
+class JointLaws:
+    """The laws of a mechanism, added to a system."""
 
+    def __init__(self, system: Any, mechanism: Mechanism, coordinate: Callable[[Joint], Any], dt: float) -> None:
+        """``coordinate`` makes Exudyn's marker of a joint's coordinate; ``dt`` is the step [s]."""
+        self._system, self._mechanism, self._new_coordinate, self._dt = system, mechanism, coordinate, dt
+        self._coordinates: dict[str, Any] = {}
+        self._ground: Any = None
+        self._laws: list[JointLaw] = []
+        by_name = {body.name: body for body in mechanism.bodies}
+        for joint in mechanism.joints:
+            if joint.friction or joint.limits:
+                self._add(self._holding(joint, by_name[joint.child]), joint.name, field="joint")
+            if varies(joint.torque):
+                self._add(self._pushing(joint.name, _drive(joint)), joint.name)
+            if joint.armature:
+                self._add(self._rotor(joint), joint.name, factor=1.0)
+        for place, actuator in enumerate(mechanism.actuators):
+            self._add(self._acting(actuator), actuator.joint, field="effort", place=place)
+        for place, coupling in enumerate(mechanism.couplings):
+            markers = [self._coordinate(name) for name in (coupling.joint_b, coupling.joint_a)]
+            item = self._coupled(markers, coupling.ratio, coupling.offset)
+            self._add(item, coupling.joint_b, factor=1.0, field="coupling", place=place)
+            self._add(item, coupling.joint_a, factor=-coupling.ratio)
 
-def _add(system: Any, joint: Joint, child: Body, bodies: Any, com: Any, dt: float) -> Any:
-    def data(*values: float) -> Any:
-        node = items.NodeGenericData(initialCoordinates=list(values), numberOfDataCoordinates=len(values))
-        return system.AddNode(node)
+    def _add(self, item: Any, joint: str, **others: Any) -> None:
+        self._laws.append(JointLaw(item, self._mechanism.joint_index[joint], **others))
 
-    between: dict[str, Any] = {
-        "bodyNumbers": [bodies[joint.parent], bodies[joint.child]],
-        "localPosition0": np.array(joint.position) - com[joint.parent],
-        "localPosition1": np.array(joint.child_position) - com[joint.child],
-        "axis0": joint.parent_frame[:, 2],
-    }
-    if joint.kind == "prismatic":
-        coordinate = items.MarkerBodiesRelativeTranslationCoordinate(**between)
-    else:  # the node counts whole turns
-        coordinate = items.MarkerBodiesRelativeRotationCoordinate(nodeNumber=data(joint.q0[0]), **between)
-    ground = items.MarkerNodeCoordinate(nodeNumber=system.AddNode(items.NodePointGround()), coordinate=0)
-    inertia, law = _inertia(joint, child), dict[str, Any]()
-    if joint.friction:
-        law["dynamicFrictionForce"] = joint.friction
-        law["stickingStiffness"], law["stickingDamping"] = inertia / dt**2, 2 * inertia / dt
-    if joint.limits:
-        law |= {"useLimitStops": True, "limitStopsLower": joint.limits[0], "limitStopsUpper": joint.limits[1]}
-        law["limitStopsStiffness"], law["limitStopsDamping"] = inertia / dt**2, 2 * inertia / dt
-    return system.AddObject(
-        items.ObjectConnectorCoordinateSpringDamperExt(
-            markerNumbers=[system.AddMarker(ground), system.AddMarker(coordinate)],
-            nodeNumber=data(1.0 if joint.friction else 0.0, 0.0, 0.0),  # 1: the bristle is at rest
-            **law,
+    def _coordinate(self, name: str) -> Any:
+        """Marker of the coordinate of a joint."""
+        if name not in self._coordinates:
+            joint = self._mechanism.joints[self._mechanism.joint_index[name]]
+            self._coordinates[name] = self._new_coordinate(joint)
+        return self._coordinates[name]
+
+    def _ends(self, joint: str) -> list[Any]:
+        """Markers of the ground and of the coordinate of a joint."""
+        if self._ground is None:
+            node = self._system.AddNode(items.NodePointGround())
+            self._ground = self._system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+        return [self._ground, self._coordinate(joint)]
+
+    def _holding(self, joint: Joint, child: Body) -> Any:
+        inertia, law = _inertia(joint, child), dict[str, Any]()
+        if joint.friction:
+            law["dynamicFrictionForce"] = joint.friction
+            law["stickingStiffness"], law["stickingDamping"] = inertia / self._dt**2, 2 * inertia / self._dt
+        if joint.limits:
+            law |= {"useLimitStops": True, "limitStopsLower": joint.limits[0], "limitStopsUpper": joint.limits[1]}
+            law["limitStopsStiffness"], law["limitStopsDamping"] = inertia / self._dt**2, 2 * inertia / self._dt
+        return self._system.AddObject(
+            items.ObjectConnectorCoordinateSpringDamperExt(
+                markerNumbers=self._ends(joint.name),
+                nodeNumber=data_node(
+                    self._system, 1.0 if joint.friction else 0.0, 0.0, 0.0
+                ),  # 1: the bristle is at rest
+                **law,
+            )
         )
-    )
+
+    def _pushing(self, joint: str, push: Callable[[float, float, float], float]) -> Any:
+        """Exudyn's object for a push on a joint's coordinate, a function of time, coordinate and rate."""
+
+        def pull(system: Any, t: float, item: int, q: float, v: float, *law: float) -> float:  # noqa: ARG001 -- Exudyn's signature
+            return -push(t, q, v)
+
+        return self._system.AddObject(
+            items.ObjectConnectorCoordinateSpringDamper(markerNumbers=self._ends(joint), springForceUserFunction=pull)
+        )
+
+    def _acting(self, actuator: Actuator) -> Any:
+        """Exudyn's object for an actuator."""
+        if actuator.kind != "position" or actuator.limit is not None or varies(actuator.target):
+            return self._pushing(actuator.joint, actuator.effort)
+        n = actuator.gear
+        return self._system.AddObject(
+            items.ObjectConnectorCoordinateSpringDamper(
+                markerNumbers=self._ends(actuator.joint),
+                stiffness=n * n * actuator.kp,
+                damping=n * n * actuator.kd,
+                offset=value_at(actuator.target, 0.0) / n,
+            )
+        )
+
+    def _coupled(self, markers: list[Any], ratio: float, offset: float) -> Any:
+        """The first coordinate is ``ratio`` times the second, plus ``offset``."""
+        made = items.ObjectConnectorCoordinate(markerNumbers=markers, offset=-offset)
+        return add_renamed(self._system, made, ratio, "factor1", "factorValue1")
+
+    def _rotor(self, joint: Joint) -> Any:
+        """A rotor with the joint's armature, which follows its coordinate."""
+        system = self._system
+        node = system.AddNode(items.Node1D(initialCoordinates=[joint.q0[0]], initialVelocities=[joint.v0[0]]))
+        if joint.kind == "prismatic":
+            add_renamed(system, items.ObjectMass1D(nodeNumber=node), joint.armature, "mass", "physicsMass")
+        else:
+            made = items.ObjectRotationalMass1D(nodeNumber=node)
+            add_renamed(system, made, joint.armature, "inertia", "physicsInertia")
+        marker = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
+        return self._coupled([self._coordinate(joint.name), marker], 1.0, 0.0)
+
+    def pushes(self) -> list[tuple[JointLaw, float]]:
+        """The laws, and what each pushes its joint with along the coordinate [N, N m]."""
+        told = [self._system.GetObjectOutput(law.item, Output.Force) for law in self._laws]
+        return [(law, law.factor * float(np.ravel(force)[0])) for law, force in zip(self._laws, told, strict=True)]
+
+    def named(self, pushes: list[tuple[JointLaw, float]]) -> dict[str, Array]:
+        """Named forces of a sample."""
+        found = {name: np.full(count, np.nan) for name, count in lengths(self._mechanism).items()}
+        for law, push in pushes:
+            if law.field == "joint":
+                joint = self._mechanism.joints[law.number]
+                parts = on_joint(bool(joint.limits), joint.friction, push)
+                found["friction"][law.number], found["stop"][law.number] = parts
+            elif law.field:
+                found[law.field][law.place] = push
+        return found if pushes else {}
+
+
+def _drive(joint: Joint) -> Callable[[float, float, float], float]:
+    return lambda t, _q, _v: float(value_at(joint.torque, t))
 
 
 def _inertia(joint: Joint, child: Body) -> float:
-    """Inertia of the child alone against the joint's coordinate [kg, kg m²]."""
+    """Inertia of the child alone against the joint's coordinate, with its armature [kg, kg m²]."""
     if joint.kind == "prismatic":
-        return child.mass
+        return child.mass + joint.armature
     axis = joint.child_frame[:, 2]
     arm = np.cross(axis, np.array(child.com) - joint.child_position)
-    return float(axis @ np.asarray(child.inertia) @ axis + child.mass * arm @ arm)
-
-
-def along_joints(system: Any, mechanism: Mechanism, laws: list[JointLaw]) -> dict[str, Array]:
-    """Forces of dry friction and of stops along the coordinates of joints."""
-    found = np.full((2, len(mechanism.joints)), np.nan)
-    for law in laws:
-        joint = mechanism.joints[law.number]
-        found[:, law.number] = on_joint(bool(joint.limits), joint.friction, force_of(system, law))
-    return {"friction": found[0], "stop": found[1]}
-
-
-def force_of(system: Any, law: JointLaw) -> float:
-    """Force along the coordinate on the child [N, N m]."""
-    return -float(np.ravel(system.GetObjectOutput(law.item, Output.Force))[0])
+    return float(axis @ np.asarray(child.inertia) @ axis + child.mass * arm @ arm) + joint.armature

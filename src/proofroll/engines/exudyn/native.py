@@ -44,6 +44,18 @@ def new_settings(*, dependent: bool, explicit: Any = None) -> Any:
     return settings
 
 
+def data_node(system: Any, *values: float) -> Any:
+    """A node that keeps numbers from step to step."""
+    node = items.NodeGenericData(initialCoordinates=list(values), numberOfDataCoordinates=len(values))
+    return system.AddNode(node)
+
+
+def add_renamed(system: Any, item: Any, value: float, *names: str) -> Any:
+    """Adds an object whose parameter has one of these names, by the version of Exudyn."""
+    setattr(item, next(name for name in names if hasattr(item, name)), value)
+    return system.AddObject(item)
+
+
 def add_rigid_body(system: Any, mass: float, inertia: Sequence[float], node: Any) -> Any:
     """A rigid body on a node: mass [kg], moments and products xx, yy, zz, yz, xz, xy about the node [kg m²]."""
     made = items.ObjectRigidBody(nodeNumber=node)

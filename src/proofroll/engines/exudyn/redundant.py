@@ -25,17 +25,20 @@ from proofroll.elements.mechanism.sampling import (
     mechanism_of,
     unsaid,
 )
+from proofroll.elements.mechanism.signal import varies
 from proofroll.engines.exudyn.connections import Connections, add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration, initial_matrices
-from proofroll.engines.exudyn.joint_laws import add_laws, along_joints, force_of
+from proofroll.engines.exudyn.joint_laws import JointLaws
 from proofroll.engines.exudyn.native import Output, add_rigid_body, exu, items, rigid_body
 from proofroll.engines.exudyn.settings import ExudynSettings
 
-_SWITCHING = {MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS}
-PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _SWITCHING | {MechanismCapability.REDUNDANT})
+_OF_JOINTS = {
+    MechanismCapability[name]
+    for name in ("JOINT_FRICTION", "STOPS", "ACTUATORS", "SATURATION", "SIGNALS", "COUPLINGS", "ARMATURE")
+}
+PROVIDES = frozenset(ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS | {MechanismCapability.REDUNDANT})
 LACKING: Mapping[str, str] = {
     MechanismCapability.REBOUNDS: "its stops are springs with dampers, which have no coefficient of restitution",
-    MechanismCapability.ARMATURE: "Exudyn's joints between bodies have no inertia of their own",
 }
 
 
@@ -62,15 +65,16 @@ class Redundant(ExudynModel):
         super().__init__()
         self.bodies: dict[str, Any] = {WORLD: self.system.CreateGround()}
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
+        self._turns = _turns(mechanism)
         self._add_bodies()
-        self._connections = Connections(self.system, self.bodies, self._com)
+        self._connections = Connections(self.system, self.bodies, self._com, self._turns)
         flat = is_planar(mechanism)
         self._joints = [
             self._connections.connect(between, joint, flat=flat)
             for between, joint in zip_longest(mechanism.connections, mechanism.joints)  # loops follow the joints
         ]
         add_springs(self.system, mechanism, self.marker)
-        self._laws = add_laws(self.system, mechanism, self.bodies, self._com, settings.dt)
+        self._laws = JointLaws(self.system, mechanism, self._connections.coordinate, settings.dt)
         self._add_contacts(mechanism, settings)
         self.system.Assemble()
         self._rows = self._constraint_rows(settings)
@@ -84,15 +88,16 @@ class Redundant(ExudynModel):
     def _add_bodies(self) -> None:
         system, motion = self.system, Tree(self._mechanism).at(*self._mechanism.start())
         for number, body in enumerate(self._mechanism.bodies):
-            R, w = motion.R_WB[number], motion.w_WB[number]
-            arm, q = R @ self._com[body.name], to_quaternion(R)
+            turn, w = self._turns[body.name], motion.w_WB[number]
+            R = motion.R_WB[number] @ turn.T
+            arm, q = motion.R_WB[number] @ self._com[body.name], to_quaternion(R)
             node = system.AddNode(
                 items.NodeRigidBodyEP(
                     referenceCoordinates=[*(motion.p_WB[number] + arm), *q],
                     initialVelocities=[*(motion.v_WB[number] + np.cross(w, arm)), *quaternion_rate(q, R.T @ w)],
                 )
             )
-            (xx, xy, xz), (_, yy, yz), (_, _, zz) = body.inertia
+            (xx, xy, xz), (_, yy, yz), (_, _, zz) = turn @ np.array(body.inertia) @ turn.T
             made = add_rigid_body(system, body.mass, [xx, yy, zz, yz, xz, xy], node)
             self.bodies[body.name] = made
             marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=made))
@@ -118,10 +123,10 @@ class Redundant(ExudynModel):
         force, torque = unsaid(self._mechanism)
         for number, made in enumerate(self._joints):
             force[number], torque[number] = self._connections.reaction(made)
-        for law in self._laws:
-            made, joint = self._joints[law.number], self._mechanism.joints[law.number]
-            along = force_of(self.system, law) * self._connections.axes(made)[0][:, 2]
-            (force if joint.kind == "prismatic" else torque)[law.number] += along
+        pushes = self._laws.pushes()
+        for law, push in pushes:
+            along = push * self._connections.axes(self._joints[law.number])[0][:, 2]
+            (force if self._mechanism.joints[law.number].kind == "prismatic" else torque)[law.number] += along
         return MechanismSample(
             p_WB=self._over_bodies(Output.Position),
             v_WB=self._over_bodies(Output.Velocity),
@@ -129,13 +134,14 @@ class Redundant(ExudynModel):
             q_WB=np.array([to_quaternion(R.reshape(3, 3)) for R in self._over_bodies(Output.RotationMatrix)]),
             joint_force=force,
             joint_torque=torque,
-            **(along_joints(self.system, self._mechanism, self._laws) if self._laws else {}),
+            **self._laws.named(pushes),
         )
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         system, bodies = self.system, self._mechanism.bodies
         data = [rigid_body(system, self.bodies[body.name]) for body in bodies]
+        turns = [self._turns[body.name] for body in bodies]
         joints = self._joints[: len(self._mechanism.joints)]
         axes = np.full((len(joints), 3), np.nan)
         for number, (joint, made) in enumerate(zip(self._mechanism.joints, joints, strict=True)):
@@ -152,7 +158,7 @@ class Redundant(ExudynModel):
         return MechanismBuilt(
             mass=np.array([item["mass"] for item in data]),
             com=to_com + np.array([item["centerOfMass"] for item in data]),
-            inertia=np.array([_matrix(item["inertia"]) for item in data]),
+            inertia=np.array([T.T @ _matrix(item["inertia"]) @ T for item, T in zip(data, turns, strict=True)]),
             joint_position=np.array(
                 [
                     system.GetMarkerOutput(made.markers[1], Output.Position, exu.ConfigurationType.Current)
@@ -168,6 +174,20 @@ class Redundant(ExudynModel):
             angular_acceleration=self._over_bodies(Output.AngularAcceleration),
             regularised=dict.fromkeys(("acceleration", "angular_acceleration"), _DIFFERENCED),
         )
+
+
+def _turns(mechanism: Mechanism) -> dict[str, Array]:
+    """Rotation of each body's axes into Exudyn's.
+
+    Where a joint has a law along its coordinate, they are those of the world at q = 0: the coordinate that Exudyn
+    measures is the angle between the axes of two bodies.
+    """
+    found = {WORLD: np.eye(3)} | {body.name: np.eye(3) for body in mechanism.bodies}
+    laws = any(joint.friction or joint.limits or joint.armature or varies(joint.torque) for joint in mechanism.joints)
+    if laws or mechanism.actuators or mechanism.couplings:
+        for joint in mechanism.joints:  # parents first
+            found[joint.child] = found[joint.parent] @ joint.parent_frame @ joint.child_frame.T
+    return found
 
 
 def _matrix(six: Any) -> Array:

@@ -12,21 +12,24 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism import WORLD
+from proofroll.elements.mechanism import WORLD, Joint
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.engines.exudyn.connections import add_springs
 from proofroll.engines.exudyn.integration import ExudynModel, Integration
+from proofroll.engines.exudyn.joint_laws import JointLaws
 from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, items
 from proofroll.engines.exudyn.settings import ExudynSettings
 
 _KNOWN = {MechanismCapability.REVOLUTE, MechanismCapability.PRISMATIC}
-PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES)
+_DRIVES = {MechanismCapability.ACTUATORS, MechanismCapability.SATURATION, MechanismCapability.SIGNALS}
+PROVIDES: frozenset[str] = frozenset(_KNOWN | FORCES | _DRIVES)
 LACKING: Mapping[str, str] = {
     **dict.fromkeys(ALL_JOINTS - _KNOWN, "a joint of Exudyn's kinematic tree has exactly one coordinate"),
     **dict.fromkeys(ALL_LOOPS, "Exudyn's explicit integrators take no constraints"),
     MechanismCapability.JOINT_FRICTION: "this model has no friction in joints",
+    MechanismCapability.COUPLINGS: "Exudyn's explicit integrators take no constraints",
     MechanismCapability.ARMATURE: "Exudyn's kinematic tree has no inertia of drives",
 }
 _TYPES = {"revolute": exu.JointType.RevoluteZ, "prismatic": exu.JointType.PrismaticZ}
@@ -49,6 +52,7 @@ class KinematicTree(ExudynModel):
         self._tree = self._add_tree()
         self._ground = self.system.CreateGround()
         add_springs(self.system, mechanism, self.marker)
+        self._laws = JointLaws(self.system, mechanism, self._coordinate, settings.dt)
         origins = [(self._link[body.name], self._in_link(body.name, np.zeros(3))) for body in mechanism.bodies]
         self._sensors = {name: self._add_sensors(name, origins) for name in _READ}
         on_joints = [(number, [0.0, 0.0, 0.0]) for number in range(len(mechanism.joints))]
@@ -83,6 +87,11 @@ class KinematicTree(ExudynModel):
             jointDControlVector=[joint.damping for joint in joints],
             jointPositionOffsetVector=[joint.rest for joint in joints],
         )
+
+    def _coordinate(self, joint: Joint) -> Any:
+        """A marker of a joint's coordinate."""
+        node, number = self.system.GetObject(self._tree)["nodeNumber"], self._mechanism.joint_index[joint.name]
+        return self.system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=number))
 
     def _in_link(self, body: str, position: Array) -> list[float]:
         R, p = self._frames[body]
@@ -127,6 +136,7 @@ class KinematicTree(ExudynModel):
             v_WB=self._read(self._sensors["Velocity"]),
             w_WB=self._read(self._sensors["AngularVelocity"]),
             q_WB=np.array([to_quaternion(R) for R in bodies]),
+            **self._laws.named(self._laws.pushes()),
         )
 
     def built(self) -> MechanismBuilt:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.engines.exudyn.native import exu
 from proofroll.engines.exudyn.reproducer.text import RUN, solver_source
@@ -46,7 +47,10 @@ def seen():
         if kind == "RigidBody":
             weight = item["mass"] * np.array(GRAVITY)
             energy += told(number, "KineticEnergy") - weight @ told(number, "Position")
-        elif kind.startswith("Connector") and not kind.endswith("Ext"):  # friction and stops tell no energy
+        elif kind.endswith("Mass1D"):
+            rate = mbs.GetNodeOutput(item["nodeNumber"], exu.OutputVariableType.Coordinates_t)
+            energy += (item.get("mass") or item.get("inertia")) * float(np.ravel(rate)[0]) ** 2 / 2
+        elif kind.startswith("Connector") and kind.endswith("Damper"):  # friction, stops, couplings tell no energy
             energy += told(number, "PotentialEnergy")
         elif kind.startswith("Joint"):
             held = np.array(item.get("constrainedAxes", [1, 1, 1])[:3])
@@ -87,8 +91,16 @@ def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
 
 
 def _essential(item: dict[str, Any]) -> dict[str, Any]:
-    """Item of Exudyn without drawing, name, functions (there are none) and entries listed twice."""
+    """Item of Exudyn without drawing, name and entries listed twice.
+
+    Raises:
+        Refused: it has a function, as the effort of an actuator is.
+    """
+    if any(isinstance(value, dict) and "function" in value for value in item.values()):
+        raise Refused("efforts that change in time or have a limit are functions, which programs do not hold yet")
     twice = {"jointHTs", "referenceHT", "referenceRotation"} | ({"localPosition"} if "localHT" in item else set())
+    if "Relative" in item.get("markerType", "") and "nodeNumber" in item:
+        item = item | {"markerType": "BodiesRelativeRotationCoordinate"}  # Exudyn 1.13 lists it as one of translation
     return {
         key: value
         for key, value in item.items()
