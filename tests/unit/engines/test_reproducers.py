@@ -152,11 +152,14 @@ def test_a_mechanism_moves_as_in_the_adapter(formulation: str, options: dict[str
     assert opened < 1e-14  # 2e-12 without
 
 
-@pytest.mark.parametrize("name", ["stop", "spring_friction", "arm_pd", "gear_pair"])
-def test_a_program_has_the_laws_of_joints(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "preset"),
+    [("stop", "tuned"), ("spring_friction", "tuned"), ("arm_pd", "matched"), ("gear_pair", "matched")],
+)
+def test_a_program_has_the_laws_of_joints(name: str, preset: str) -> None:
     """Exudyn's laws along a coordinate, couplings and rotors are part of the program."""
     kind, scene = kind_of("exudyn"), load_scene(name)
-    settings = resolve_settings(kind, {"formulation": "redundant", "preset": "tuned"})
+    settings = resolve_settings(kind, {"formulation": "redundant", "preset": preset})
     ((places, _, _),) = program("exudyn", settings, scene)["run"]([0.6])
     adapter = kind.build(scene, settings)
     adapter.advance(0.6)
