@@ -40,10 +40,11 @@ window.reading = (() => {
     document.querySelectorAll("details").forEach((fold) => { fold.open = false; });
     for (const link of links.values()) {
       link.click();
-      const target = document.getElementById(link.hash.slice(1));
-      const seen = () => target.checkVisibility() && (!target.matches("details") || target.open);
-      for (let tries = 0; target && !seen() && tries < 50; ++tries) await pause(0);
-      if (!target || !seen()) found.push(link.hash);
+      const there = () => document.getElementById(link.hash.slice(1));
+      const seen = () => there()?.checkVisibility() && (!there().matches("details") || there().open);
+      for (let tries = 0; !seen() && tries < 50; ++tries) await pause(0);
+      if (!seen()) found.push(link.hash);
+      const target = there();
       for (let fold = target?.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = false;
     }
     return found;

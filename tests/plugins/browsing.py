@@ -34,8 +34,9 @@ class Visit:
     messages: list[str] = field(default_factory=list)
 
     def unfold(self) -> None:
-        """Opens every ``<details>``."""
-        self.page.evaluate("document.querySelectorAll('details').forEach((fold) => { fold.open = true; })")
+        """Opens every ``<details>``, as a reader does."""
+        self.page.locator("#unfold").click()
+        self.wait("!document.querySelector('[data-fold], details:not([open])')")
 
     def wait(self, condition: str) -> None:
         """Until an expression is true.

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import Drawn, Visit, launched, visiting
+from folded import whole
 from invented import figures_part, further, regimes_part
 
 from proofroll.ball_studies.report.onsets import RunSlips, TrueSlips
@@ -169,14 +170,14 @@ class Elements(HTMLParser):
 
 @pytest.fixture(scope="session")
 def parse() -> Callable[[str], Elements]:
-    """Reads HTML as a browser does; the same page once."""
-    return lru_cache(maxsize=4)(Elements)
+    """Reads HTML as a browser does that has opened every fold; the same page once."""
+    return lru_cache(maxsize=4)(lambda html: Elements(whole(html)))
 
 
 @pytest.fixture(scope="session")
 def html(written: tuple[dict[str, Any], Path]) -> str:
-    """The written page."""
-    return (written[1] / "report.html").read_text(encoding="utf-8")
+    """The written page, with its folds opened."""
+    return whole((written[1] / "report.html").read_text(encoding="utf-8"))
 
 
 @pytest.fixture(scope="session")

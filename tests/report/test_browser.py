@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from browsing import UNDRAWN, Drawn, Visit
@@ -77,6 +79,33 @@ def test_links_lead_to_evidence_that_opens(report_page: Path, visit: Visiting) -
         assert seen.page.evaluate("reading.lost()") == []
         seen.page.evaluate("document.querySelector('main').insertAdjacentHTML('beforeend', '<a href=\"#no\">x</a>')")
         assert seen.page.evaluate("reading.lost()") == ["#no"]
+        assert seen.messages == []
+
+
+def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Path, visit: Visiting) -> None:
+    """Of two comparisons the second is a heading until it is opened; then its tables sort, and hidden engines are so.
+
+    Until everything is opened the page has few elements; before it is printed all but the single runs are there.
+    """
+    first = everything.content.comparisons[0]
+    content = replace(everything.content, comparisons=[first, replace(first, name="again", title="Again")])
+    both = replace(everything, content=content, curves=2 * everything.curves).write(tmp_path / "report.html")
+    count = "document.querySelectorAll('*').length"
+    with visit(both, before=UNDRAWN) as seen:
+        few = seen.page.evaluate(count)
+        assert seen.page.locator("#c1 table").count() == 0
+        seen.page.get_by_role("checkbox", name="alpha").uncheck()
+        seen.page.locator("#c1 > details > summary").press("Enter")
+        seen.wait("document.querySelectorAll('#c1 table').length > 3")
+        assert seen.page.locator("#c1 [data-engine='alpha']").count() > 0
+        assert seen.page.locator("#c1 [data-engine='alpha']:visible").count() == 0
+    with visit(both, before=UNDRAWN) as seen:
+        seen.page.evaluate("stored('folds').then(() => dispatchEvent(new Event('beforeprint')))")
+        assert seen.page.locator("[data-fold]:not(.run > *)").count() == 0
+        assert seen.page.locator("#c1 .matrix").count() == 2
+        assert seen.page.locator(".run > [data-fold]").count() == 16
+        seen.unfold()
+        assert seen.page.evaluate(count) > 1.5 * few
         assert seen.messages == []
 
 

@@ -83,7 +83,7 @@ def test_an_engine_is_hidden_on_the_whole_page(seen: Visit) -> None:
 def test_cells_lead_to_their_evidence(seen: Visit) -> None:
     """Each link of the matrix has its target on the page."""
     there: list[bool] = seen.page.evaluate(
-        "[...document.querySelectorAll('#choice a')].map((a) => document.getElementById(a.hash.slice(1)) !== null)"
+        "Promise.all([...document.querySelectorAll('#choice a')].map(async (a) => !!await folds.find(a.hash.slice(1))))"
     )
     assert there
     assert all(there)

@@ -10,6 +10,7 @@ from typing import Any
 
 import plotly.offline
 import pytest
+from folded import texts, whole
 from poison import Poison
 
 import proofroll.report.page.html
@@ -78,6 +79,17 @@ def test_every_row_and_every_run_appears(written: tuple[dict[str, Any], Path], h
     assert "it is coarse" in elements.text
 
 
+def test_what_is_folded_is_kept_apart(written: tuple[dict[str, Any], Path], html: str) -> None:
+    """Of each closed fold the page has a place alone; its text lies compressed, and put back nothing is missing."""
+    page = (written[1] / "report.html").read_text(encoding="utf-8")
+    kept = texts(page)
+    assert (page + "".join(kept)).count("<div data-fold=") == len(kept)
+    assert 'aria-label="Certificate of' not in page
+    assert html.count('aria-label="Certificate of') == 6
+    assert page.count("<tr") < html.count("<tr") / 2
+    assert len(page) < len(html)
+
+
 def test_cells_can_be_read_without_colour(html: str) -> None:
     """Each cell has a sign for the eye and a word for a screen reader."""
     for verdict, sign in (("agrees", "✓"), ("differs", "✗")):
@@ -116,7 +128,9 @@ def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, 
     runs = [dataclasses.replace(first, judgements=lost), *outcome.runs[1:]]
     content = write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
     assert plain(content)["comparisons"][0]["runs"][0]["judgements"][0]["error"] is None
-    assert "∞" in (tmp_path / "report.html").read_text(encoding="utf-8").rpartition('<script type="text/plain"')[0]
+    assert (
+        "∞" in whole((tmp_path / "report.html").read_text(encoding="utf-8")).rpartition('<script type="text/plain"')[0]
+    )
 
 
 def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> None:
@@ -207,7 +221,7 @@ def test_where_runs_were_made_is_told(made: tuple[Outcome, Store], html: str, tm
     ]
     runs = [run for run in outcome.runs if run.row.engine != "beta"] + away
     write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
-    shown = (tmp_path / "report.html").read_text(encoding="utf-8")
+    shown = whole((tmp_path / "report.html").read_text(encoding="utf-8"))
     line = "Made on machines of a cluster: 2 on node&lt;7&gt;. No speed is measured there."
     assert f"<dt>Elsewhere</dt><dd>An invented comparison: {line}</dd>" in shown
     assert shown.count("<dt>Ran on</dt><dd>node&lt;7&gt;, a machine of a cluster") == len(away) == 2
@@ -224,7 +238,7 @@ def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Out
     found = content.comparisons[0].evidence.findings
     assert found.answer.startswith("Of 1 engine setting, 1 gives no result somewhere")
     assert found.recommendation == []
-    assert "gamma is not installed here" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "gamma is not installed here" in whole((tmp_path / "report.html").read_text(encoding="utf-8"))
 
 
 def test_no_engine_and_no_scene_is_named_in_the_code_of_the_report() -> None:

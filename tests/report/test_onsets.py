@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from folded import whole
 
 from proofroll.ball_studies.report.onset_tables import bracket, clock, conditioning, slip_table
 from proofroll.ball_studies.report.onsets import CURVE, mark
@@ -173,7 +174,7 @@ def test_first_slips_are_marked_on_the_needed_friction(content: ReportContent, s
 
 def test_page_shows_ill_posed_points_without_colour(content: ReportContent, slipping: Any, parse: Any) -> None:
     """A sign and a word for the verdict, its meaning in the legend, and no blame for other events."""
-    html = shown(content, slipping)
+    html = whole(shown(content, slipping))
     text = " ".join(parse(html).text.split())
     assert '<span aria-hidden="true">?</span><span class="vh">ill-posed</span>' in html
     assert '<b class="v ill-posed">? ill-posed here</b>' in html

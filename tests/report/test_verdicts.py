@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from folded import whole
 from rich.console import Console
 
 from proofroll.core.convergence import Limit, richardson
@@ -127,7 +128,7 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
     assert "; 1 refuses the scene or a case of it" in three_sentences([content], {})[0]
-    text = page(report_content([with_runs(made[0], {number: [refused]})], made[1], ""), [[]], {}, None)
+    text = whole(page(report_content([with_runs(made[0], {number: [refused]})], made[1], ""), [[]], {}, None))
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import json
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,28 @@ def rendered(templates: jinja2.Environment, name: str, **said: Any) -> str:
 def packed(content: bytes) -> str:
     """Bytes as text that ``templates/unpack.js`` reads: gzip in base64, so no markup; always the same of the same."""
     return base64.b64encode(gzip.compress(content, compresslevel=9, mtime=0)).decode("ascii")
+
+
+def folded(html: str) -> str:
+    """A page whose closed folds (``<details>``) are built when they are opened.
+
+    What follows the summary of each is moved into the element with the id ``folds``, compressed; ``templates/page.js``
+    puts it back. A fold within a fold is one of its own. Browsers so read, place and paint what is open alone.
+    """
+    texts: list[str] = []
+    levels: list[list[str]] = [[]]
+    closed: list[bool] = []
+    for piece in re.split(r"(<details\b[^>]*>|</summary>|</details>)", html):
+        if piece == "</details>" and closed.pop():
+            texts.append("".join(levels.pop()))
+            levels[-1].append(f'<div data-fold="{len(texts) - 1}"></div>')
+        levels[-1].append(piece)
+        if piece.startswith("<details"):
+            closed.append(not piece.endswith(" open>"))
+        elif piece == "</summary>" and closed[-1]:
+            levels.append([])
+    kept = packed(json.dumps(texts, ensure_ascii=False).encode("utf-8", "replace"))
+    return "".join(levels[0]).replace('id="folds">', f'id="folds">{kept}', 1)
 
 
 def element(text: str, prefix: str) -> str:

@@ -19,7 +19,7 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page.choice import DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
-from proofroll.report.pages import environment, packed, rendered
+from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.running.case import told_hosts
@@ -54,7 +54,7 @@ def page(
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }
-    return rendered(
+    whole = rendered(
         templates(),
         "page.html",
         content=content,
@@ -68,6 +68,7 @@ def page(
         plotly=_plotly(),
         datatables=_datatables(),
     )
+    return folded(whole)
 
 
 def choice_of(content: ReportContent) -> ChoiceMatrix:

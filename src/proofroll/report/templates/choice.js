@@ -37,11 +37,13 @@
   slider.addEventListener("input", show);
   form.addEventListener("change", (event) => {
     if (event.target === forces) show();
-    if (event.target.name === "engine") {
-      const off = new Set([...form.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.value));
-      document.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", off.has(part.dataset.engine)));
-    }
+    if (event.target.name === "engine") hide(document);
   });
+  function hide(within) {
+    const off = new Set([...form.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.value));
+    within.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", off.has(part.dataset.engine)));
+  }
+  everywhere(hide);
   form.addEventListener("submit", (event) => event.preventDefault());
 
   table.addEventListener("click", (event) => {

@@ -137,7 +137,10 @@
   const watcher = new IntersectionObserver((entries) => {
     for (const entry of entries) if (entry.isIntersecting) { watcher.unobserve(entry.target); draw(entry.target); }
   }, { rootMargin: "200px" });
-  document.querySelectorAll("figure[data-o]").forEach((figure) => watcher.observe(figure));
+  everywhere((part) => {
+    part.querySelectorAll("figure[data-o]").forEach((figure) => watcher.observe(figure));
+    [...hidden.keys()].forEach(show);
+  });
 
   // Once one figure has been drawn, what the others need is here and they can be drawn before the page is printed.
   addEventListener("beforeprint", () => {

@@ -2,13 +2,65 @@
 // Text that the page keeps until it is needed, e.g. the curves.
 const stored = unpack;
 
+// Does something with the page, and with each part that is built later.
+function everywhere(action) {
+  action(document);
+  document.addEventListener("built", (event) => action(event.target));
+}
+
+// What is folded is built when it is opened: until then it is a text, which other folds may be part of.
+const folds = (() => {
+  const button = document.getElementById("unfold");
+  const place = (number) => document.querySelector(`[data-fold="${number}"]`);
+  let texts = null;
+  const ready = async () => (texts ??= JSON.parse(await stored("folds")));
+
+  function build(empty) {
+    const fold = empty.parentElement, made = document.createElement("template");
+    made.innerHTML = texts[empty.dataset.fold];
+    empty.replaceWith(made.content);
+    fold.dispatchEvent(new Event("built", { bubbles: true }));
+  }
+  function every(which) {
+    for (let empty = document.querySelector(which); empty; empty = document.querySelector(which)) build(empty);
+  }
+  // The element with an id, built with all that it lies in.
+  async function find(id) {
+    if (document.getElementById(id)) return document.getElementById(id);
+    await ready();
+    const holding = (word) => texts.findIndex((text) => text.includes(word));
+    const chain = [holding(` id="${id}"`)];
+    while (chain[0] >= 0 && !place(chain[0])) chain.unshift(holding(`data-fold="${chain[0]}"`));
+    if (chain[0] >= 0) chain.forEach((number) => build(place(number)));
+    return document.getElementById(id);
+  }
+  document.addEventListener("toggle", async ({ target }) => {
+    const empty = () => target.open && target.querySelector(":scope > [data-fold]");
+    if (!empty()) return;
+    await ready();
+    if (empty()) build(empty());
+  }, true);
+  // For a search in the browser, or to read and print all of it.
+  button.hidden = false;
+  button.addEventListener("click", async () => {
+    await ready();
+    every("[data-fold]");
+    document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
+  });
+  // Paper has what is folded, but not each run; a browser that prints does not wait, so the texts are there before.
+  addEventListener("beforeprint", () => { if (texts) every("[data-fold]:not(.run > *)"); });
+  addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
+  return { find };
+})();
+
 // A link to evidence opens what it lies in.
 (() => {
-  function reveal() {
+  async function reveal() {
     document.querySelectorAll(".target").forEach((element) => element.classList.remove("target"));
-    const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const target = location.hash && (await folds.find(decodeURIComponent(location.hash.slice(1))));
     if (!target) return;
     for (let fold = target.closest("details"); fold; fold = fold.parentElement.closest("details")) fold.open = true;
+    for (const fold of target.querySelectorAll(":scope > details:only-of-type")) fold.open = true;
     target.classList.add("target");
     target.scrollIntoView();
   }
@@ -40,9 +92,10 @@ const stored = unpack;
 
 // A table says so while there are rows below those that it shows.
 (() => {
-  const regions = [...document.querySelectorAll(".scroll")];
   const look = (region) => region.classList.toggle("more", region.scrollTop + region.clientHeight < region.scrollHeight - 4);
-  regions.forEach((region) => region.addEventListener("scroll", () => look(region), { passive: true }));
   const sizes = new ResizeObserver((changes) => changes.forEach((change) => look(change.target)));
-  regions.forEach((region) => sizes.observe(region));
+  everywhere((part) => part.querySelectorAll(".scroll").forEach((region) => {
+    region.addEventListener("scroll", () => look(region), { passive: true });
+    sizes.observe(region);
+  }));
 })();

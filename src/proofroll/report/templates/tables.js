@@ -82,5 +82,5 @@
     near.unobserve(entry.target);
     enliven(entry.target);
   }), { rootMargin: "400px" });
-  document.querySelectorAll(".scroll > table").forEach((table) => { if (regular(table) && !few(table)) near.observe(table); });
+  everywhere((part) => part.querySelectorAll(".scroll > table").forEach((table) => { if (regular(table) && !few(table)) near.observe(table); }));
 })();
