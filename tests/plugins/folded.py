@@ -11,7 +11,7 @@ _PLACE = re.compile(r'<div data-fold="(\d+)"></div>')
 
 
 def texts(html: str) -> list[str]:
-    """What the folds of a page hold."""
+    """Texts of the folds of a page."""
     found = re.search(r'<script type="text/plain" id="folds">([^<]*)</script>', html)
     return json.loads(gzip.decompress(base64.b64decode(found[1]))) if found else []
 

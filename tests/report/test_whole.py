@@ -76,13 +76,14 @@ def test_sections_answer_in_order(written_page: str, parse: Any) -> None:
     assert {"stability0-0", "stability0-1"} <= links, "each cell of the map leads to its boundary"
 
 
-def test_the_diagram_is_inline_and_keeps_to_itself(report: Report, written_page: str) -> None:
-    """The diagram of the trade-off is an element whose ids are its own and which names no address."""
-    picture = report.pictures["tradeoffs0-diagram"]
-    assert picture.startswith("<svg")
-    assert "http" not in picture
-    assert 'id="tradeoffs0-' in picture
-    assert picture in written_page
+def test_error_against_cost_is_drawn_where_runs_allow_it(report: Report, written_page: str) -> None:
+    """The trade-off and the comparison have pictures, of all their engines, and a choice of their quantities."""
+    found = report.content.precision
+    assert set(found) == {"speed0", "c0"}
+    assert {curve.engine for curve in found["c0"].curves} == {"alpha", "beta"}
+    for section, picture in found.items():
+        part = written_page[written_page.index(f'data-precision="{section}"') :]
+        assert part[: part.index("</select>")].count("<option") == len(picture.quantities)
 
 
 def test_exactly_three_sentences_from_the_data(report: Report) -> None:

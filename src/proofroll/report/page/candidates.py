@@ -86,7 +86,7 @@ def _candidate(
     costs = [lines[0].cost for lines in at.values() if lines]
     cost = None if None in costs else max((item for item in costs if item is not None), default=None)
     clean = all(lines[0].clean for lines in at.values() if lines)
-    errors = {place: (_largest(lines, "motion"), _largest(lines, "reaction")) for place, lines in judged.items()}
+    errors = {place: (largest(lines, "motion"), largest(lines, "reaction")) for place, lines in judged.items()}
     blame, message = _blame(judged)
     if judged:
         furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
@@ -108,7 +108,7 @@ def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
     return None, ""
 
 
-def _largest(lines: Sequence[TableLine], role: str) -> float | None:
+def largest(lines: Sequence[TableLine], role: str) -> float | None:
     """Largest relative error of what is shown of a role."""
     return max((line.relative for line in _shown(lines, role)), default=None)
 

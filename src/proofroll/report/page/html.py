@@ -51,6 +51,7 @@ def page(
         replay: as the comparisons' kind of element gives it; None: the page has none.
     """
     drawn = {
+        "precision": content.precision,
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
         "points": [_marked(*pair) for pair in zip(content.comparisons, curves, strict=True)],
     }

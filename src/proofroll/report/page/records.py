@@ -7,6 +7,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cached_property
 from typing import Any
 
 import proofroll
@@ -18,7 +19,8 @@ from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.sentences import Findings, findings
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
-from proofroll.report.long_table import LongTable
+from proofroll.report.long_table import LongTable, TableLine
+from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.page.summary import three_sentences
 from proofroll.report.parts import PartEntry, part_kinds
@@ -123,6 +125,17 @@ class ReportContent:
     def further(self) -> list[PartEntry]:
         """The entries of all further studies."""
         return [item for kind in part_kinds() for item in self.entries.get(kind.key, ())]
+
+    @cached_property
+    def precision(self) -> dict[str, WorkPrecision]:
+        """Work–precision pictures by the id of the section that they belong to, of studies whose runs allow them."""
+        sections = {item.name: f"c{number}" for number, item in enumerate(self.comparisons)}
+        sections |= {item.name: f"speed{number}" for number, item in enumerate(self.entries.get("tradeoffs", ()))}
+        lines: dict[str, list[TableLine]] = {name: [] for name in sections}
+        for line in self.table.lines:
+            lines.get(line.study, []).append(line)
+        found = {section: work_precision(lines[name]) for name, section in sections.items()}
+        return {section: item for section, item in found.items() if item is not None}
 
 
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> ReportContent:

@@ -149,5 +149,5 @@ const picture = (() => {
 
   const span = ({ time }) => [time[0], time[time.length - 1]];
 
-  return { traces, layout, visible, span };
+  return { traces, layout, visible, span, literal };
 })();

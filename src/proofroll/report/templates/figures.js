@@ -1,5 +1,5 @@
 // Figures: drawn when they come into view, linked within a section, switched by the legend, repainted and printed.
-(() => {
+const plots = (() => {
   const drawn = new Map();     // figure -> its plotly element
   const hidden = new Map();    // comparison -> rows that are switched off
   const cursors = new Map();   // section's figures -> the sample that the keyboard is at
@@ -42,8 +42,10 @@
     element.on("plotly_unhover", () => { if (!siblings(figure).some((other) => other.matches(":hover"))) linkHover(figure, null); });
   }
 
+  const ready = () => (loading ??= load());
+
   async function draw(figure) {
-    await (loading ??= load());
+    await ready();
     place(figure);
   }
 
@@ -154,4 +156,5 @@
     redraw();
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
+  return { ready, paint };
 })();

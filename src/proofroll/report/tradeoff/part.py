@@ -11,10 +11,8 @@ from proofroll.core.comparison import Tolerance
 from proofroll.core.number_format import counted
 from proofroll.core.verdict import LimitFinding
 from proofroll.files.json_data import MERGED
-from proofroll.report.comparison.work_precision import svg
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import TableLine
-from proofroll.report.pages import element
 from proofroll.report.parts import Part, PartEntry, Tell, held
 from proofroll.report.tradeoff import tables as tradeoff_tables
 from proofroll.report.tradeoff.tables import default_quantities
@@ -143,11 +141,6 @@ class TradeoffPart(Part):
                 if name in study.quantities
             ] or [TableLine(**run)]
         return found
-
-    def pictures(self, prefix: str) -> dict[str, str]:
-        """The work-precision diagram."""
-        assert self.study is not None  # it was made
-        return {"diagram": element(svg(self.study, default_quantities(self.study)), prefix)}
 
 
 def _limit(budget: CurveBudget) -> str:

@@ -8,6 +8,7 @@ from itertools import product
 from typing import Any
 
 import pytest
+from table_lines import ARM, FINER, FORCE, LINE, line
 
 from proofroll.core.verdict import Verdict
 from proofroll.report.long_table import TableLine
@@ -18,27 +19,6 @@ STUDIES = {
     "chain": ChoiceStudy("A chain", "c1", [""]),
     "ball": ChoiceStudy("A ball", "c2", [""]),
 }
-LINE = TableLine(
-    study="arm", group="trees", scene="arm", place="", row=0, engine="alpha", version="1", formulation="joints",
-    preset="default", setting="default", precision="double", own_equations=False, resolution="dt", step=1e-3,
-    status="done", message="", verdict="agrees", limit="within tolerance", quantity="x", unit="m", role="motion",
-    headline=True, error=5e-4, truth_error_bar=1e-12, tolerance=1e-2, scale=1.0, order=2.0, cost=0.01, cost_low=None,
-    cost_high=None, clean=True,
-)  # fmt: skip
-
-
-def line(**changes: Any) -> TableLine:
-    """A line of the table."""
-    return replace(LINE, **changes)
-
-
-FORCE = line(quantity="F", unit="N", role="reaction", error=3e-2, scale=1.0)
-FINER = [line(step=2.5e-4, error=3e-5, cost=0.04, clean=False, verdict=""), replace(FORCE, step=2.5e-4, error=2e-3)]
-TUNED = [
-    line(row=1, preset="tuned", setting="tuned", error=2e-7, cost=0.2),
-    line(row=1, preset="tuned", setting="tuned", quantity="F", role="reaction", error=1e-6, cost=0.2),
-]
-ARM = [LINE, FORCE, *FINER, *TUNED]
 
 
 def at(

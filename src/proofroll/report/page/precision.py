@@ -1,0 +1,100 @@
+"""Error against cost of every run of a study: the points of its work–precision pictures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from proofroll.core.verdict import Verdict
+from proofroll.report.labels import step, symbol
+from proofroll.report.long_table import TableLine
+from proofroll.report.page.candidates import largest
+
+# A picture of fewer points says nothing that a table does not.
+_FEWEST = 2
+_UNJUDGED = {Verdict.ILL_POSED, Verdict.NOT_JUDGED}
+_SEVERITY = {str(item): number for number, item in enumerate(Verdict)}
+
+
+class PrecisionPoint(NamedTuple):
+    """One step of a curve, over all places of its study at which it was run.
+
+    Attributes:
+        step: for a person.
+        cost: wall seconds per simulated second at the slowest place.
+        clean: the cost is that of clean runs.
+        verdict: the worst; empty: a step of a ladder, which has none of its own.
+        errors: largest error of each quantity of the picture, in parts of its size; None: not reported, or not finite.
+    """
+
+    step: str
+    cost: float
+    clean: bool
+    verdict: str
+    errors: list[float | None]
+
+
+@dataclass(frozen=True)
+class PrecisionCurve:
+    """A setting with its steps, the coarsest first; ``own``: it solves equations derived for the scene."""
+
+    engine: str
+    formulation: str
+    name: str
+    own: bool
+    points: list[PrecisionPoint]
+
+
+@dataclass(frozen=True)
+class WorkPrecision:
+    """Curves of a study, and the names of the quantities that their errors are of."""
+
+    quantities: list[str]
+    curves: list[PrecisionCurve]
+
+
+def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
+    """The pictures of one study from its lines of the long table; None: too few of its runs were timed and judged."""
+    judged = [line for line in lines if line.verdict not in _UNJUDGED]
+    named = list(dict.fromkeys(line.quantity for line in judged if line.scale))
+    groups = [role for role in ("motion", "reaction") if any(line.role == role and line.scale for line in judged)]
+    curves: dict[tuple[str, str, str, str], list[TableLine]] = {}
+    for line in judged:
+        curves.setdefault((line.engine, line.formulation, line.setting, line.resolution), []).append(line)
+    found = [_curve(own, groups, named) for own in curves.values()]
+    found = [curve for curve in found if curve.points]
+    if sum(len(curve.points) for curve in found) < _FEWEST:
+        return None
+    titles = {"motion": "motion (largest of all coordinates)", "reaction": "forces (largest of all reactions)"}
+    return WorkPrecision([*(titles[role] for role in groups), *map(symbol, named)], found)
+
+
+def _curve(lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str]) -> PrecisionCurve:
+    first = lines[0]
+    steps = sorted({line.step for line in lines}, key=lambda value: -(value or 0.0))
+    points = [_point([line for line in lines if line.step == value], groups, named) for value in steps]
+    name = " ".join(filter(None, (first.formulation, first.setting))) or first.engine
+    kept = [point for point in points if point is not None and any(item is not None for item in point.errors)]
+    return PrecisionCurve(first.engine, first.formulation, name, first.own_equations, kept)
+
+
+def _point(lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str]) -> PrecisionPoint | None:
+    costs = [line.cost for line in lines if line.cost is not None]
+    if len(costs) < len(lines) or any(line.status != "done" for line in lines):
+        return None
+    errors = [largest(lines, role) for role in groups]
+    errors += [max((line.relative for line in lines if line.quantity == name), default=None) for name in named]
+    verdict = max((line.verdict for line in lines if line.verdict), key=lambda x: _SEVERITY.get(x, 0), default="")
+    return PrecisionPoint(
+        step(lines[0].resolution or None, lines[0].step),
+        _short(max(costs)),
+        all(line.clean for line in lines),
+        verdict,
+        [None if item is None else _short(item) if math.isfinite(item) else 1e300 for item in errors],
+    )
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.3g}")

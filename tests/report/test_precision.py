@@ -1,0 +1,74 @@
+"""Work–precision pictures in a browser."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browsing import Visit
+
+Visiting = Callable[..., AbstractContextManager[Visit]]
+PICTURE = "document.querySelector('[data-precision=c0] .canvas')"
+TRACES = f"{PICTURE}.data.filter((trace) => trace.name && trace.name !== 'choice')"
+
+
+@pytest.fixture(scope="module")
+def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
+    """The page with the pictures of its comparison drawn."""
+    with visit(report_page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.page.locator("[data-precision=c0]").scroll_into_view_if_needed()
+        opened.wait(f"({PICTURE}.data ?? []).length > 0")
+        yield opened
+
+
+def test_each_engine_has_a_panel_with_the_others_in_grey(seen: Visit) -> None:
+    """Two engines, two panels that zoom together; what is said of a point is setting, step, error, cost and verdict."""
+    panels = seen.page.evaluate(f"{PICTURE}.layout.annotations.map(({{ text }}) => text)")
+    assert panels == ["<b>alpha</b>", "<b>beta</b>"]
+    assert seen.page.evaluate(f"{PICTURE}.layout.xaxis2.matches") == "x"
+    assert [trace["name"] for trace in seen.page.evaluate(TRACES)] == ["fine matched", "fine default", "only"]
+    told = seen.page.evaluate(f"{TRACES}[1].hovertemplate[0]")
+    for words in ("alpha fine default", "dt 1e-3 s", "error 0.001 of the size: does not hold 1e-4", "cost", "differs"):
+        assert words in told
+    assert seen.page.evaluate(f"{PICTURE}.data.filter((trace) => trace.name === 'choice').length") == 1
+    assert seen.messages == []
+
+
+def test_quantity_tolerance_and_engines_are_chosen(seen: Visit) -> None:
+    """An engine without forces has no panel of them; a coarser tolerance rings another; hidden engines are left out."""
+    ring = f"{PICTURE}.data.find((trace) => trace.name === 'choice').x[0]"
+    before = seen.page.evaluate(ring)
+    slider = seen.page.locator("#tolerance")
+    slider.press("Home")
+    seen.wait(f"{ring} !== {before}")
+    assert seen.page.evaluate(ring) < before
+    seen.page.locator("[data-precision=c0] select").select_option(label="forces (largest of all reactions)")
+    seen.wait(f"{PICTURE}.layout.annotations.length === 1")
+    seen.page.locator("[data-precision=c0] select").select_option(index=0)
+    seen.page.get_by_role("checkbox", name="alpha").uncheck()
+    seen.wait(f"{TRACES}.length === 1")
+    seen.page.get_by_role("checkbox", name="alpha").check()
+    seen.wait(f"{TRACES}.length === 3")
+
+
+def test_an_error_beyond_all_size_is_cut_and_marked(everything: Any, tmp_path: Path, visit: Visiting) -> None:
+    """A run that flew off to 1e30 stands at the top as a triangle; the axis ends there, and the truth is told."""
+    table = everything.content.table
+    wild = [
+        replace(line, error=1e30) if line.preset == "default" and line.study == "invented" else line
+        for line in table.lines
+    ]
+    content = replace(everything.content, table=replace(table, lines=wild))
+    page = replace(everything, content=content).write(tmp_path / "report.html")
+    with visit(page, viewport={"width": 1280, "height": 900}) as opened:
+        opened.page.locator("[data-precision=c0]").scroll_into_view_if_needed()
+        opened.wait(f"({PICTURE}.data ?? []).length > 0")
+        trace = opened.page.evaluate(f"{TRACES}.find(({{ name }}) => name === 'fine default')")
+        assert trace["y"] == [1]
+        assert trace["marker"]["symbol"] == ["triangle-up"]
+        assert "e+3" in trace["hovertemplate"][0]
+        assert opened.page.evaluate(f"{PICTURE}.layout.yaxis.range[1]") < 1
