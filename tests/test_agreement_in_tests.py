@@ -17,6 +17,7 @@ from tiny import Tiny
 
 import proofroll
 from proofroll.core.errors import InputError
+from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
@@ -405,3 +406,13 @@ def test_what_is_no_engine(given: object) -> None:
     """A class or a thing without the methods of an engine is told what it lacks."""
     with pytest.raises(InputError, match=r"give a name, or a class that has name, .*build, advance, sample, built too"):
         build(load_scene("pendulum"), given)
+
+
+def test_the_orientation_of_a_ball_that_nobody_asked_for() -> None:
+    """An orientation that an engine gives of a ball is judged, whether the scene asks for it or not."""
+    scene = load_scene("inclined_plane")
+    true = truth(scene.fully_asked, np.linspace(0.0, 0.2, 11))
+    state = {name: true[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "q_WB")}
+    assert proofroll.judge(state, scene).agrees
+    frozen = proofroll.judge(state | {"q_WB": state["q_WB"][:1].repeat(11, axis=0)}, scene)
+    assert [item.judgement.observable for item in frozen.compared if not item.agrees] == ["q_WB"]

@@ -56,7 +56,7 @@ _PLACES, _FIRST, _MODEL = (
     ("first steps",),
     ("differs from the scene", "does not say"),
 )
-_V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitudes is")
+_V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes is")
 _FORCES, _EVENTS = ("N is", "F3 is", "forces is"), ("event_times is", "first_slip is", "event_order is", "creep is")
 _TURNED = ("rolls", *MECHANISMS)
 _STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")

@@ -103,6 +103,17 @@ def test_velocities_of_mechanisms_are_judged(name: str) -> None:
     assert [item.judgement.observable for item in found.compared if not item.agrees] == [name]
 
 
+def test_a_first_look_judges_the_orientation_that_a_scene_asks_for() -> None:
+    """Quaternions of a ball that are frozen between samples agree nowhere, and are judged where they were asked for."""
+    scene = load_scene("sphere_in_cylinder", asks=("orientation",))
+    bounds = first_look.bounds(scene, EVERY)
+    assert bounds.keys() - first_look.bounds(load_scene("sphere_in_cylinder"), EVERY).keys() == {"attitude"}
+    frozen = lying("projection", lambda right: replace(right, q_WB=np.array([1.0, 0, 0, 0])))
+    found = judge(simulate(scene, frozen, until=UNTIL, every=EVERY), scene, {"attitude": "1 %"})
+    assert not found.agrees
+    assert found.compared[0].judgement.reason.endswith("between them")
+
+
 COMPARISONS = sorted((Path(__file__).parents[3] / "comparisons").rglob("*.toml"))
 JUDGES_PLACES = [path for path in COMPARISONS if '\npositions = "' in path.read_text(encoding="utf-8")]
 

@@ -80,6 +80,7 @@ def columns(
     put("w_WB", w_WB, "rad/s", "angular velocity in the world", "xyz")
     if q_WB is not None:
         put("q_WB", q_WB, "1", "orientation, quaternion scalar first", "wxyz")
+        put("attitude", q_WB, "1", "quaternion of the ball", "wxyz")
     for index, (name, unit) in enumerate(zip(surface.coordinates, surface.units, strict=True)):
         put(name, u[:, index], unit, f"surface coordinate {name}")
         period = surface.periods[index]

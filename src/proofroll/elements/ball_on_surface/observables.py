@@ -65,6 +65,15 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
 
     return (
         *coordinates,
+        Observable(
+            "attitude",
+            "1",
+            "quaternion of the ball, of either sign",
+            Role.MOTION,
+            floor=1.0,
+            asked_for=False,
+            asked_as="orientation",
+        ),
         Observable("N", "N", "normal force", Role.REACTION, floor=force, headline=True, column=True),
         Observable("F2", "N", "friction on the ball along e2", Role.REACTION, floor=force, headline=True),
         Observable("F3", "N", "friction on the ball along e3", Role.REACTION, floor=force, headline=True, column=True),
@@ -96,12 +105,14 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
 def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """All observables that a run allows, by name; what the engine cannot say is absent.
 
-    Coordinates of the surface as they are; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [1] without time 0, where
-    the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s], ``force_audit`` [N] and
-    ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is not zero; ``creep`` [m]
-    is, the way slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball never slips.
+    Coordinates of the surface as they are, and ``attitude`` [1]; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [1]
+    without time 0, where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s],
+    ``force_audit`` [N] and ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is
+    not zero; ``creep`` [m] is, the way slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball
+    never slips.
     """
-    curves = {name: dataset[name].to_numpy() for name in body.surface.coordinates}
+    names = [*body.surface.coordinates, *({"attitude"} & set(dataset))]
+    curves = {name: dataset[name].to_numpy() for name in names}
     if "N" in dataset:
         curves |= {name: dataset[name].to_numpy()[1:] for name in ("N", "F2", "F3", "needed_friction")}
     curves["gap"] = dataset["gap"].to_numpy()
@@ -148,7 +159,7 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     sizes["needed_friction"] = float(np.max(friction[np.isfinite(friction)], initial=0.0))
     sizes |= dict.fromkeys(("slip", "rate_audit"), speed)
     height = float(np.ptp(truth["gap"].to_numpy())) if body.flies else body.ball.radius
-    return sizes | {"energy_balance": kinetic, "gap": height, "creep": body.ball.radius}
+    return sizes | {"attitude": 1.0, "energy_balance": kinetic, "gap": height, "creep": body.ball.radius}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

@@ -86,7 +86,7 @@ def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
     all_of = {key: item for key, item in scene.observables.items() if item.role is Role.MOTION}
     moves = {key: item for key, item in all_of.items() if item.headline}
     moves = moves or {scene.deciding: scene.observable(scene.deciding)}
-    moves |= {key: item for key, item in all_of.items() if item.watched}
+    moves |= {key: item for key, item in all_of.items() if item.watched or item.asked_as in scene.asks}
     found = {
         key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
         for key, item in moves.items()

@@ -148,7 +148,8 @@ def judge(
     given = read_run(run, scene)
     dataset = given.dataset
     between = dataset[BETWEEN].to_numpy() if BETWEEN in dataset else np.zeros(0)
-    reference = Reference.of(scene, _truth(scene, dataset["time"].to_numpy(), between))
+    asked = scene.fully_asked if "q_WB" in {str(name).partition(".")[0] for name in dataset.data_vars} else scene
+    reference = Reference.of(scene, _truth(asked, dataset["time"].to_numpy(), between))
     given.require_units(reference.dataset)
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run

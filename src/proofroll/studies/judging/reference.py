@@ -102,6 +102,10 @@ class Reference:
             own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
             if "event_kind" in own or "event_kind" in true:
                 curves[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
+        for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:
+            values = curves.pop(name)
+            if name in self.curves:  # the truth of a scene that asks for it
+                curves[name] = turned_alike(values, self.curves[name])
         both = (dataset, self.dataset)
         sure = {name: on_turns_of(self.curves.get(name), values, name, both) for name, values in curves.items()}
         return {name: values for name, values in sure.items() if values is not None}

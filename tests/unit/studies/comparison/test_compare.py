@@ -7,9 +7,11 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 import xarray as xr
 from hostile import ENTRY_POINTS
+from scipy.spatial.transform import Rotation
 
 from proofroll.cli.comparing import exit_code
 from proofroll.core.certificate import Line
@@ -74,7 +76,7 @@ def judged(
     for row in comparison.rows:
         for point in comparison.variations(row):
             scene = load_scene(comparison.scene, **point)
-            dataset = truth(scene, time_grid(comparison.until, comparison.every))
+            dataset = truth(scene.fully_asked, time_grid(comparison.until, comparison.every))
             if BallCapability.BOUNDED_FRICTION in scene.requires:
                 dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
             facts = dataclasses.replace(FACTS, name=row.engine)
@@ -98,6 +100,24 @@ def the_truth(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
 def off(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
     """An engine whose ball is a millimetre too high."""
     return dataset.assign(z=dataset["z"] + 1e-3)
+
+
+@pytest.mark.parametrize(("angle", "agrees"), [(0.0, True), (1e-4, True), (0.1, False)])
+def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agrees: bool) -> None:
+    """A ball that is right but for its orientation differs; a quaternion's sign, any at each sample, says nothing."""
+
+    def turned(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        q = Rotation.from_quat(dataset["q_WB"].to_numpy(), scalar_first=True) * Rotation.from_rotvec([0, angle, 0])
+        signs = np.where(np.arange(dataset.sizes["time"]) % 3, -1.0, 1.0)[:, None]
+        said = (("time", "wxyz"), signs * q.as_quat(scalar_first=True))
+        return dataset.assign(q_WB=said, attitude=said)
+
+    (run,) = judged(tmp_path, claim([ROW], [4.0], TIGHT | {"attitude": Tolerance(1e-3, False, "1")}), turned).runs
+    assert {j.observable: j.verdict is Verdict.AGREES for j in run.judgements} == {
+        "gamma": True,
+        "z": True,
+        "attitude": agrees,
+    }
 
 
 def test_a_claim_that_holds(tmp_path: Path) -> None:
