@@ -416,3 +416,22 @@ def test_the_orientation_of_a_ball_that_nobody_asked_for() -> None:
     assert proofroll.judge(state, scene).agrees
     frozen = proofroll.judge(state | {"q_WB": state["q_WB"][:1].repeat(11, axis=0)}, scene)
     assert [item.judgement.observable for item in frozen.compared if not item.agrees] == ["q_WB"]
+
+
+@pytest.mark.parametrize("name", ["stop", "pendulum_friction"])
+def test_a_mechanism_that_switches_is_judged(name: str) -> None:
+    """A run of a mechanism whose truth has events is judged, though no run of a mechanism tells any."""
+    found = proofroll.judge(proofroll.simulate(name, "projection", until=0.5, every=0.05), name)
+    assert found.agrees, found
+
+
+@pytest.mark.parametrize(("sticks", "agrees"), [(None, True), (1, False), (0, False)])
+def test_a_file_says_whether_the_ball_sticks(sticks: int | None, agrees: bool) -> None:
+    """Somebody's samples that always stick, or never, differ from a ball that begins to slip; its own do not."""
+    scene = load_scene("sphere_in_cylinder", mu_static=0.2, mu_kinetic=0.15)
+    true = truth(scene, np.linspace(0.0, 0.4, 41))
+    state = {name: true[name].to_numpy() for name in ("time", "p_WB", "v_WB", "w_WB", "sticking")}
+    if sticks is not None:
+        state["sticking"] = np.full(41, sticks)
+    for tolerance in (None, {"z": "1 %"}):
+        assert proofroll.judge(state, scene, tolerance).agrees is agrees

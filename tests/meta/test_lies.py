@@ -114,14 +114,17 @@ UNASKED = [
     ("rolls", "v + 7 m/s between samples", "v_WB is"),
     ("slips", "spins x 3 between samples", "w_WB is"),
     ("tree", "moments + 5 N m", "torques is"),
-    ("slips", "always sticking", "not judged: event_times, first_slip, event_order; no tolerance is given"),
+    ("slips", "always sticking", "first_slip is"),
+    ("slips", "always sticking, without events", "first_slip is"),
+    ("slips", "never sticking", "first_slip is"),
+    ("slips", "nothing", "not judged: event_times, event_order; no tolerance is given for it"),
 ]
 
 
 @pytest.mark.parametrize(("about", "name", "words"), UNASKED)
 def test_a_lie_where_nobody_says_what_is_judged(about: str, name: str, words: str) -> None:
     """Without a tolerance a lie about states or reactions is found, and events that are not judged are named."""
-    lie = next(lie for lie in table() if lie.name == name)
+    lie = next((lie for lie in table() if lie.name == name), Lie(name, (about,)))
     run = simulate(scene_of(about), liar(about, lie), until=UNTIL[about], every=EVERY)
     found = judge_run(run, scene_of(about))
     assert words in str(found)

@@ -29,6 +29,7 @@ class Observable:
             tolerance must be absolute.
         headline: whether summaries show it: the motion, and the forces that a person asks for first.
         watched: whether a first look judges it though no summary shows it.
+        always: whether it is judged where nobody gives a tolerance, too: by half of its size, events by their number.
         asked_as: what a scene asks for so that a first look judges it, as ``orientation``; empty: nothing.
         decides: whether a trade-off, a stability map and a recommendation go by it by default.
         asked_for: whether a person may ask for a recommendation by it.
@@ -47,6 +48,7 @@ class Observable:
     floor: float | None = None
     headline: bool = False
     watched: bool = False
+    always: bool = False
     asked_as: str = ""
     decides: bool = False
     asked_for: bool = True

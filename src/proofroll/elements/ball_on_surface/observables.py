@@ -60,6 +60,9 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
 
     apart = "m", "distance of the ball from the wall"
 
+    # A flight begins and ends slip unseen
+    says_slip = bool(bounded) and not body.flies
+
     def residual(name: str, unit: str, meaning: str, floor: float, **more: Any) -> Observable:
         return Observable(name, unit, meaning, Role.RESIDUAL, floor=floor, hangs_on_events=False, **more)
 
@@ -93,9 +96,16 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
             Role.MOTION if bounded or flies else Role.RESIDUAL,
             floor=speed,
         ),
-        residual("creep", "m", "way slipped while sticking", a),
+        residual("creep", "m", "way slipped while sticking", a, always=says_slip),
         Observable(
-            "first_slip", "s", "time of the first slip", Role.EVENT, column=True, absent=never, watched=bool(bounded)
+            "first_slip",
+            "s",
+            "time of the first slip",
+            Role.EVENT,
+            column=True,
+            absent=never,
+            watched=bool(bounded),
+            always=says_slip,
         ),
         Observable("event_times", "s", "times of all events", Role.EVENT, asked_for=False),
         Observable("event_order", "events", "events of another kind than the truth's", Role.EVENT, asked_for=False),
@@ -149,7 +159,8 @@ def creep(dataset: xr.Dataset) -> float:
 def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     """Size of each observable in the truth: ranges of coordinates, the largest normal force and needed friction.
 
-    The kinetic energy and the speed of the start, and the ball's radius. Floors are those of the table.
+    The kinetic energy and the speed of the start, the ball's radius, and the way that it slips. Floors are those of the
+    table.
     """
     normal, friction = float(np.max(np.abs(truth["N"].to_numpy()))), truth["needed_friction"].to_numpy()
     speed = float(np.linalg.norm(body.v0))
@@ -159,7 +170,8 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
     sizes["needed_friction"] = float(np.max(friction[np.isfinite(friction)], initial=0.0))
     sizes |= dict.fromkeys(("slip", "rate_audit"), speed)
     height = float(np.ptp(truth["gap"].to_numpy())) if body.flies else body.ball.radius
-    return sizes | {"attitude": 1.0, "energy_balance": kinetic, "gap": height, "creep": body.ball.radius}
+    slipped = max(body.ball.radius, float(np.trapezoid(truth["slip"], truth["time"])))
+    return sizes | {"attitude": 1.0, "energy_balance": kinetic, "gap": height, "creep": slipped}
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:

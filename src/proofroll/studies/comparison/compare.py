@@ -173,8 +173,9 @@ def _judgements(
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves}
+    always, given = reference.always(main), band.bounds | run.row.bound
     for name, curve in main.items():
-        tolerance = run.row.bound.get(name) or band.bounds.get(name)
+        tolerance = given.get(name) or always.get(name)
         if tolerance is None:
             continue
         true, bar = reference.true(name, curve)
@@ -198,6 +199,8 @@ def _judgements(
             magnitude=reference.magnitude(name),
             precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
         )
+        if name not in given and judgement.verdict is not Verdict.DIFFERS:
+            continue
         judgements.append(judgement)
         for factor, found in curves.items():
             if name in found:

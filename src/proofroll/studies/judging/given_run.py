@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import BETWEEN, from_samples, observe
+from proofroll.core.dataset import BETWEEN, add_events, columns_of, observe
+from proofroll.core.element_abilities import WatchesRuns
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.observable import Role
@@ -209,7 +210,12 @@ def _completed(run: xr.Dataset, scene: Scene, times: FloatArray, names: list[str
     arrays = {name: np.asarray(run[name].to_numpy(), dtype=np.float64) for name in names}
     samples = [sample_type(**{name: values[index] for name, values in arrays.items()}) for index in range(len(times))]
     try:
-        return from_samples(scene, times, samples)
+        columns = columns_of(scene, times, samples)
+        element = scene.elements[0]
+        if isinstance(element, WatchesRuns):
+            events = element.watch(scene.asks).conclude(times, samples, None).events
+            columns = columns if events is None else add_events(scene, element, columns, events)
+        return columns.dataset()
     except (ValueError, TypeError, Diverged) as error:
         shapes = ", ".join(f"{name} {values.shape}" for name, values in arrays.items())
         raise InputError("run", shapes, f"these are no states of {scene.name} ({error})") from None

@@ -137,7 +137,8 @@ def judge(
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         tolerance: by name of the observable or variable, ``"1 %"`` of its scale, ``"1e-3 m"``, or a number in its unit;
             one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,
-            of every force and moment, and of places, velocities, spins and orientations that are given.
+            of every force and moment, and of places, velocities, spins and orientations that are given; the time
+            of the first slip to the interval between samples. What says that it sticks while it slips never agrees.
         because: why that is close enough.
 
     Raises:
@@ -158,6 +159,9 @@ def judge(
     sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
     bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
+    further = {name: bound for name, bound in reference.always(observed).items() if name not in bounds}
+    found = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
+    compared += [item for item in found if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
     unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
     if tolerance is None:
@@ -220,7 +224,10 @@ def _bounds(
         raise InputError("run", ", ".join(variables), f"the truth has none of these; it has {known}")
     if given is None:
         main = [name for name in observed if _is_main(scene.observables[name])]
-        return dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
+        events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]
+        every = Tolerance(2 * reference.sampled_bar, False, "s")
+        found = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
+        return found | dict.fromkeys(events, every)
     if not isinstance(given, Mapping):
         if len(able) > 1 and scene.deciding not in able:
             raise InputError("tolerance", given, f"say of which variable: {', '.join(able)}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
@@ -95,6 +96,12 @@ class Reference:
             return next((float(time) for time in self.curves[name]), None)
         return self.sizes.get(name)
 
+    def always(self, names: Iterable[str]) -> dict[str, Tolerance]:
+        """Tolerances of those observables that are judged where nobody gives one; only what differs is told."""
+        items = {name: self.scene.observables[name] for name in names if self.scene.observables[name].always}
+        end = Tolerance(float(self.dataset["time"][-1]), False, "s")
+        return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
+
     def observed(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """The observables of an engine's trajectory of this scene."""
         curves = observe(self.scene, dataset)
@@ -102,6 +109,7 @@ class Reference:
             own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
             if "event_kind" in own or "event_kind" in true:
                 curves[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
+        curves = {name: values for name, values in curves.items() if name in self.scene.observables}
         for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:
             values = curves.pop(name)
             if name in self.curves:  # the truth of a scene that asks for it

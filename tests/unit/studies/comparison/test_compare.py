@@ -120,6 +120,22 @@ def test_the_orientation_of_a_ball_is_judged(tmp_path: Path, angle: float, agree
     }
 
 
+@pytest.mark.parametrize("events", [True, False])
+def test_what_says_that_it_sticks_while_it_slips_does_not_agree(tmp_path: Path, events: bool) -> None:
+    """A row that judges the path alone differs where the run sticks in every sample and slips, events told or not."""
+
+    def sticks(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        said = dataset.assign(sticking=dataset["sticking"] * 0 + 1)
+        return said if events else said.isel(event=slice(0))
+
+    slips = dataclasses.replace(claim([ROW], [4.0]), vary={"speed": [4.0], "mu_static": [0.2], "mu_kinetic": [0.1]})
+    (run,) = judged(tmp_path / "sticks", slips, sticks).runs
+    found = {j.observable for j in run.judgements if j.verdict is Verdict.DIFFERS}
+    assert found == {"creep"} | (set() if events else {"first_slip"})
+    (run,) = judged(tmp_path / "right", slips, the_truth).runs
+    assert {j.observable: j.verdict for j in run.judgements} == dict.fromkeys(TIGHT, Verdict.AGREES)
+
+
 def test_a_claim_that_holds(tmp_path: Path) -> None:
     """An engine that gives the truth contradicts nothing, and one that is off contradicts once, by its observable."""
     assert judged(tmp_path / "right", claim([ROW], [4.0]), the_truth).contradictions == []
