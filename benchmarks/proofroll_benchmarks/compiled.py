@@ -80,15 +80,12 @@ def _mean(run: FirstSlip, until: float) -> float:
     return (clock() - start) / count
 
 
-def numeric(
-    scene: Scene, formulation: str, equations: str, times: FloatArray, true_p: FloatArray, bound: float
-) -> Timed | None:
+def numeric(scene: Scene, formulation: str, times: FloatArray, true_p: FloatArray, bound: float) -> Timed | None:
     """The projection method in Python by DOP853, in one run without a stop but at the samples.
 
     Args:
         scene: with unbounded friction.
         formulation: of the engine ``projection``.
-        equations: ``projected`` in numpy, or ``written_out``.
         times: samples [s], shape (n,).
         true_p: position of the centre then [m], shape (n, 3).
         bound: on the error of the position [m].
@@ -98,7 +95,6 @@ def numeric(
     for elimination in (True, False):
         for rtol in _NUMERIC_TOLERANCES:
             options: dict[str, Any] = {"formulation": formulation, "rtol": rtol, "elimination": elimination}
-            options["equations"] = equations
             start = time.perf_counter()
             engine = build(scene, "projection", **options)
             spent = time.perf_counter() - start
@@ -118,8 +114,7 @@ def numeric(
 
             seconds = measure()
             if seconds < best_seconds:
-                how = "numpy" if equations == "projected" else "written out"
-                name = f"projection {formulation}, {how}"
+                name = f"projection {formulation}, numpy"
                 best, best_seconds = Timed(name, error, rtol, spent, measure), seconds
             break
     return best

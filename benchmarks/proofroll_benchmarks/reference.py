@@ -94,8 +94,7 @@ def _models(scene: Any, free: Any, times: FloatArray, true_p: FloatArray) -> dic
     formulations: tuple[Any, ...] = ("rotating_frame", "euler")
     for formulation in formulations:
         models[f"{formulation} compiled"] = compiled(scene, formulation, times, true_p, PROJECTION_BOUND)
-        for kind, equations in (("numeric", "projected"), ("written out", "written_out")):
-            models[f"{formulation} {kind}"] = numeric(free, formulation, equations, times, true_p, PROJECTION_BOUND)
+        models[f"{formulation} numeric"] = numeric(free, formulation, times, true_p, PROJECTION_BOUND)
     return {name: model for name, model in models.items() if model is not None}
 
 

@@ -1,4 +1,4 @@
-"""Steps of scipy and of Runge and Kutta, and mechanisms of revolute joints by these: plain numpy around terms.
+"""Steps of scipy and of Runge and Kutta, and Pinocchio's mechanisms of revolute joints by these.
 
 Pinocchio's model comes from the adapter's builder, since a user would make the same bodies and joints; what runs in
 time is written here.
@@ -85,28 +85,11 @@ def pinocchio_null_space(scene: Scene, settings: Any) -> Bare:
     eliminates = bool(settings.projection and rank)
 
     def run(times: FloatArray) -> FloatArray:
-        y = _rk4(rates, np.concatenate([tree.q0, tree.v0]), times, settings.dt, eliminated if eliminates else None)
+        y = rk4(rates, np.concatenate([tree.q0, tree.v0]), times, settings.dt, eliminated if eliminates else None)
         pin.framesForwardKinematics(model, data, y[:n])
         return np.array([data.oMf[frame].translation for frame in tree.body])
 
     return Bare(run, 1e-11, _SAME_STEPS)
-
-
-def projection_rows(scene: Scene, settings: Any) -> Bare:
-    """Runge and Kutta's method on bodies cut apart, with the rows of revolute joints, in numpy."""
-    if settings.integrator != "rk4":
-        raise Refused("there is a bare loop of mechanisms only with rk4")
-    from proofroll_benchmarks.bare.bodies import CutApart
-
-    mechanism = mechanism_of(scene)
-    _only_revolute(mechanism)
-    bodies = CutApart(mechanism)
-
-    def run(times: FloatArray) -> FloatArray:
-        after = bodies.eliminated if settings.eliminates else bodies.normalised
-        return bodies.origins(_rk4(bodies.rates, bodies.start, times, settings.dt, after))
-
-    return Bare(run, 1e-10, _SAME_STEPS)
 
 
 def dop853(solver: DOP853, times: FloatArray, accepted: Callable[[DOP853, float], None]) -> None:
@@ -122,13 +105,14 @@ def dop853(solver: DOP853, times: FloatArray, accepted: Callable[[DOP853, float]
             accepted(solver, t)
 
 
-def _rk4(
+def rk4(
     rates: Callable[[FloatArray], FloatArray],
     y: FloatArray,
     times: FloatArray,
     h: float,
     after: Callable[[FloatArray], FloatArray] | None,
 ) -> FloatArray:
+    """State at the last time by steps of the classical method, each followed by ``after``."""
     for interval in np.diff(times).tolist():
         for _ in range(round(interval / h)):
             k1 = rates(y)

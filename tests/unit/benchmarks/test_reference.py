@@ -48,10 +48,10 @@ def test_the_loosest_tolerance_that_holds() -> None:
 
 def test_the_numeric_model_holds_its_bound() -> None:
     """The numeric projection method is taken at a tolerance that holds the bound, and none where none does."""
-    found = numeric(FREE, "rotating_frame", "projected", TIMES, TRUE_P, 1e-9)
+    found = numeric(FREE, "rotating_frame", TIMES, TRUE_P, 1e-9)
     assert found is not None
     assert found.error <= 1e-9
-    assert numeric(FREE, "rotating_frame", "projected", TIMES, TRUE_P, 1e-20) is None
+    assert numeric(FREE, "rotating_frame", TIMES, TRUE_P, 1e-20) is None
 
 
 def test_search_takes_what_holds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

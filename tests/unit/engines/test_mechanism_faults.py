@@ -141,7 +141,6 @@ def test_a_step_that_is_far_too_long_is_told(engine, formulation):
         ("pinocchio", {"formulation": "null_space", "integrator": "semi_implicit_euler"}, "integrator"),
         ("pinocchio", {"formulation": "constraint_dynamics", "solver": "pgs"}, "solver"),
         ("projection", {"formulation": "dependent", "integrator": "taylor"}, "integrator"),
-        ("projection", {"formulation": "dependent", "equations": "projected"}, "equations"),
         ("projection", {"formulation": "dependent", "singularity": "stop"}, "singularity"),
     ],
 )

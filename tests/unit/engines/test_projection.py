@@ -13,7 +13,6 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.engines.projection import Projection
 from proofroll.engines.projection.orientation import EulerAngles
 from proofroll.engines.projection.switching import Switching
-from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, simulate
 
 CYLINDER = {"name": "sphere_in_cylinder"}
@@ -176,17 +175,3 @@ def test_step_that_does_not_divide_the_interval():
     engine = build(load("sphere_in_cylinder"), CLASSICAL[0], dt=3e-3)
     with pytest.raises(InputError, match="dt"):
         engine.advance(0.01)
-
-
-@pytest.mark.parametrize("formulation", ["euler", "rotating_frame"])
-def test_projections_in_numpy_give_the_equations_written_out(formulation: str) -> None:
-    """The projections carried out at every evaluation and their result written out are one motion to round-off."""
-    resisting = load_scene("sphere_in_cylinder", rolling_resistance=5e-4, axial_speed=0.3, radial_spin=5.0)
-    runs = [
-        simulate(resisting, "projection", formulation=formulation, equations=equations, until=0.3)
-        for equations in ("projected", "written_out")
-    ]
-    for name in ("gamma", "z", "N", "F2", "F3"):
-        np.testing.assert_allclose(runs[0][name], runs[1][name], rtol=1e-10, atol=1e-10)
-    with pytest.raises(InputError, match="equations"):
-        build(resisting, "projection", formulation=formulation, preset="tuned", equations="projected")

@@ -11,7 +11,6 @@ import proofroll
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
-from proofroll.engines.projection import uniform
 from proofroll.engines.projection.geometry import GeneralSurface, Uniform, geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, RotatingFrame
@@ -138,7 +137,6 @@ def test_rows_can_be_switched_off(seed):
 def test_without_resistance_no_moment_is_modelled(monkeypatch):
     """With f = 0 the model does not contain the moment of rolling resistance at all."""
     monkeypatch.delattr(ProjectedBall, "resistance")
-    monkeypatch.delattr(uniform.Closed, "moment")
     x = random_state(0)
     free = euler_ball(rolling_ball(proofroll.load_scene("sphere_in_cylinder")))
     assert np.all(np.isfinite(free.rates(x)))

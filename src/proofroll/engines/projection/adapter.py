@@ -60,13 +60,6 @@ class Projection:
             "takes away the slip that a step leaves (Blajer 2002); where rolling is linear with constant coefficients, "
             "as in the rotating frame, there is none",
         ),
-        Term(
-            "projections in numpy",
-            _OF_BALLS,
-            {"equations": "projected"},
-            {"equations": "written_out"},
-            "carries out the method's projections at every evaluation, as on a surface that looks different everywhere",
-        ),
     )
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "euler": {BallCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
@@ -101,8 +94,7 @@ class Projection:
         turning = [generator.kind == "rotation" for generator in body.surface.generators or ()]
         periodic = [*turning, *([False] * (2 - len(turning))), *self._orientation.periodic]
         self._angles = [index for index, whole in enumerate(periodic) if whole]
-        written_out = settings.equations == "written_out"
-        self._ball = ProjectedBall(body, geometry, self._orientation, written_out=written_out)
+        self._ball = ProjectedBall(body, geometry, self._orientation)
         self._eliminate = settings.eliminates
         self._bounded = math.isfinite(body.contact.mu_static)
         self._fixed_step = settings.dt if settings.resolution == "dt" else 0.0
@@ -186,7 +178,7 @@ class Projection:
         elif isinstance(self._motion, TaylorSeries):
             force, sticking = self._motion.force, None
         else:
-            force, sticking = self._ball.contact_force(self._ball.response_at(x)), None
+            force, sticking = self._ball.contact_force(self._ball.response(kin)), None
         return BallSample(
             p_WB=self._surface.position(x[:2]),
             v_WB=frame @ kin.v[:3],

@@ -21,9 +21,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.geometry import Geometry, Local, Uniform
-from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
-from proofroll.engines.projection.uniform import AlongAxes, Closed
-from proofroll.engines.projection.uniform_euler import Euler
+from proofroll.engines.projection.orientation import Orientation
 
 _STANDS, _NONE = np.zeros((2, 3)), np.zeros(0)
 
@@ -79,10 +77,7 @@ class ProjectedBall:
         rows: C, the active rows of the non-holonomic constraints, shape (0…2, 6).
     """
 
-    def __init__(
-        self, body: RollingBall, geometry: Geometry, orientation: Orientation, *, written_out: bool = True
-    ) -> None:
-        """The ball on a surface; ``written_out``: where that is known, without carrying out the projections."""
+    def __init__(self, body: RollingBall, geometry: Geometry, orientation: Orientation) -> None:
         m, J = body.ball.mass, body.ball.inertia
         self.mass = np.array([m, m, m, J, J, J])
         self.gravity = body.gravity
@@ -92,8 +87,6 @@ class ProjectedBall:
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
         self._surface, self._wall_rate, self._radius = body.surface, body.wall_rate, body.ball.radius
-        written_out = written_out and self._wall_rate is None
-        self._closed = _closed(body, geometry, orientation) if written_out else None
         self._tangents = geometry.at(body.u0).tangents[1:] if isinstance(geometry, Uniform) else None
 
     def kinematics(self, x: FloatArray) -> Kinematics:
@@ -167,11 +160,8 @@ class ProjectedBall:
         return Response(solution[:5], N, solution[5:])
 
     def response_at(self, x: FloatArray) -> Response:
-        """Solution of :meth:`response` at the state x, from the equations written out where they exist."""
-        if self._closed is None:
-            return self.response(self.kinematics(x))
-        solution, N = self._closed.solve(x)
-        return Response(solution[:5], N, solution[5:])
+        """Solution of :meth:`response` at the state x."""
+        return self.response(self.kinematics(x))
 
     def slip_drift(self, kin: Kinematics) -> FloatArray:
         """Ċ_nh s = -ξ [m/s²]: rate of the slip of the active rows when ṡ = 0.
@@ -192,9 +182,7 @@ class ProjectedBall:
 
     def rates(self, x: FloatArray) -> FloatArray:
         """ẋ: the angles, if there are any, follow the velocities s."""
-        if self._closed is None:
-            return self.derivative(x, self.response(self.kinematics(x)))
-        return self._closed.rates(x)
+        return self.derivative(x, self.response_at(x))
 
     def derivative(self, x: FloatArray, response: Response) -> FloatArray:
         """ẋ with the accelerations of ``response``."""
@@ -205,7 +193,7 @@ class ProjectedBall:
     def with_rows(self, rows: FloatArray) -> ProjectedBall:
         """The same ball with other active rows of the non-holonomic constraints."""
         other = copy.copy(self)
-        other.rows, other._closed = rows, None
+        other.rows = rows
         return other
 
     def violation(self, kin: Kinematics) -> FloatArray:
@@ -218,8 +206,6 @@ class ProjectedBall:
         s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄. The correction solves
         a system with the same matrix as the equations of motion.
         """
-        if self._closed is not None and slip is None:
-            return self._closed.eliminated(x)
         kin = self.kinematics(x)
         violation = self.violation(kin) - (0.0 if slip is None else slip)
         result = x.copy()
@@ -244,12 +230,3 @@ class ProjectedBall:
         if info:
             raise ArithmeticError("the equations of motion are singular")
         return np.asarray(solution)
-
-
-def _closed(body: RollingBall, geometry: Geometry, orientation: Orientation) -> Closed | None:
-    """The equations written out, or None where they are not known."""
-    if not isinstance(geometry, Uniform):
-        return None
-    if type(orientation) is RotatingFrame:  # not where the orientation is followed: its state is longer
-        return AlongAxes(body, geometry)
-    return Euler(body, geometry) if isinstance(orientation, EulerAngles) else None

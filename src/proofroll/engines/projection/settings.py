@@ -34,10 +34,8 @@ class ProjectionSettings:
             constraints are linear with constant coefficients, but round-off does, and it grows.
         singularity: what ``euler`` does near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
             ``stop``, as the paper's equations do by themselves.
-        equations: of balls ``written_out``, the result of the projections in plain numbers, where the surface looks
-            the same from every point of it, or ``projected``, with the projections carried out in numpy at every
-            evaluation, as those of mechanisms always are but where they are ``compiled`` (heyoka; trees of joints
-            without springs of their own).
+        equations: ``projected``, with the projections carried out in numpy at every evaluation, or of mechanisms
+            ``compiled`` (heyoka; trees of joints without springs of their own).
     """
 
     formulation: Literal["euler", "rotating_frame", "dependent"] = "euler"
@@ -47,17 +45,13 @@ class ProjectionSettings:
     rtol: Annotated[float, Gt(0)] = TIGHTEST
     elimination: bool | None = None
     singularity: Literal["renew", "stop"] = "renew"
-    equations: Literal["written_out", "projected", "compiled"] = "written_out"
+    equations: Literal["projected", "compiled"] = "projected"
 
     def __post_init__(self) -> None:
         refuse_first("projection", self, self._rules())
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
-        taylor, dependent, projected = (
-            self.integrator == "taylor",
-            self.formulation == "dependent",
-            self.equations == "projected",
-        )
+        taylor, dependent = self.integrator == "taylor", self.formulation == "dependent"
         tightest = library.TIGHTEST if taylor else TIGHTEST
         yield self.rtol < tightest, "rtol", f"double precision allows no less than {tightest:.3g}"
         # A setting that would be ignored is an error: a user who writes dt=1e-4 believes that it does something.
@@ -66,11 +60,8 @@ class ProjectionSettings:
         advice = f"{self.integrator} has a fixed step; set dt, or add integrator=dop853"
         yield self.resolution == "dt" and self.rtol != TIGHTEST, "rtol", advice
         yield dependent and taylor, "integrator", "dependent has rk4 and dop853"
-        yield dependent and projected, "equations", "dependent always projects; leave it out"
         advice = "only mechanisms have compiled equations; leave it out, or take integrator=taylor"
         yield self.equations == "compiled" and not dependent, "equations", advice
-        advice = "taylor compiles its own equations; leave it out, or take integrator=dop853"
-        yield taylor and projected, "equations", advice
         advice = f"{self.formulation} has no angles, hence no singularity; leave it out, or take formulation=euler"
         yield self.singularity == "stop" and self.formulation != "euler", "singularity", advice
 
