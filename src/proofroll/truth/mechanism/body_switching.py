@@ -10,10 +10,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.drives import MODES
-from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint, changes, left_by
-from proofroll.truth.hybrid import Stretch, Transition, walked
+from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.joint_switching import (
     SETTLED,
     effort_event,
@@ -23,12 +22,13 @@ from proofroll.truth.mechanism.joint_switching import (
 )
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
+from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
 
 _MOST = 6  # joints at rest together: each has up to three candidates
 _SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
 
 
-class SwitchedBodies:
+class SwitchedBodies(Stretches[Mode]):
     """The legs of a mechanism as bodies that are each alone; a state ends with the time.
 
     See :class:`proofroll.truth.hybrid.HybridRoute`.
@@ -41,9 +41,7 @@ class SwitchedBodies:
         self._motors = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
         self.motors = tuple(mechanism.actuators[k] for k in self._motors)
         self._driven = [mechanism.joint_index[motor.joint] for motor in self.motors]
-        self._tolerance = np.full(len(equations.equations.start()) + 1, tolerance)
-        self._fastest: dict[int, float] = {}
-        self._span: float | None = None
+        super().__init__(len(equations.equations.start()) + 1, tolerance)
 
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
@@ -51,35 +49,14 @@ class SwitchedBodies:
         mode, margin = self._decided(state, [False] * len(self.joints))
         return Transition(state, mode, (), margin)
 
-    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Stretch[Mode]:
-        """See the protocol."""
+    def _law(self, state: Array, mode: Mode) -> StretchLaw:
         equations = self.equations.switched(state[:-1], self.switched(mode))
-        end, last, guard = walked(
-            lambda _, y: _rate(equations, y),
-            time,
-            state,
-            until,
-            tolerance=self._tolerance,
-            guards=lambda y: self._guards(equations, y, mode),
-            corrected=lambda y: _corrected(equations, y),
-            first_step=self._span,
-            noise=noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
+        return StretchLaw(
+            lambda y: np.append(equations.rate(float(y[-1]), y[:-1]), 1.0),
+            lambda y: self._guards(equations, y, mode),
+            lambda y: np.append(equations.eliminated(y[:-1]), y[-1]),
+            noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
         )
-        self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard)
-
-    def within(self, leg: Stretch[Mode], times: FloatArray) -> FloatArray:
-        """See the protocol."""
-        equations = self.equations.switched(leg.first[:-1], self.switched(leg.mode))
-        spans = np.maximum(times - leg.start, 0.0)
-        states = integrated(
-            lambda _, y: _rate(equations, y),
-            leg.first,
-            spans,
-            float(self._tolerance[0]),
-            lambda y: _corrected(equations, y),
-        )
-        return np.array(list(states))
 
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
@@ -244,14 +221,6 @@ class SwitchedBodies:
         if best[2] and (restitution or any(joints[k].restitution for k in resting)):
             raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
         return best[1], max(best[0], 0.0)
-
-
-def _rate(equations: NumericEquations, state: Array) -> Array:
-    return np.append(equations.rate(float(state[-1]), state[:-1]), 1.0)
-
-
-def _corrected(equations: NumericEquations, state: Array) -> Array:
-    return np.append(equations.eliminated(state[:-1]), state[-1])
 
 
 def _candidates(joint: SwitchedJoint, q: float) -> Iterator[str]:

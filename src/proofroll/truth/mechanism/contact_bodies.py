@@ -7,10 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import (
-    FAINT,
     OPEN,
     Acting,
     ContactMode,
@@ -19,20 +17,16 @@ from proofroll.elements.mechanism.contacts.acting import (
     acting,
 )
 from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
+from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
-from proofroll.truth.hybrid import Stretch, Transition, between, walked
+from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
-    STANDS,
     STOPPED,
-    events,
-    faint_time,
-    guard_value,
-    guards_of,
-    noise_of,
     striking,
 )
+from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, held
 from proofroll.truth.mechanism.joint_switching import SETTLED
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
@@ -42,14 +36,12 @@ _SIDES = 180  # of the pyramid inside a cone of friction, by which balance at re
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
 
-class ContactBodies:
+class ContactBodies(ContactStretches):
     """The stretches of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
     def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
-        self.equations, self.contacts, self._size = equations, equations.contacts, size
-        self._tolerance = np.full(len(equations.equations.equations.start()), tolerance)
-        self._fastest: dict[int, float] = {}
-        self._span: float | None = None
+        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
+        self.equations = equations
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
@@ -61,80 +53,21 @@ class ContactBodies:
             shut and bool(np.linalg.norm(each.slide) <= speed)
             for shut, each in zip(closed, found.touching, strict=True)
         ]
-        state = self.equations.eliminated(state, _held(closed, still))
+        state = self.equations.eliminated(state, held(closed, still))
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)
 
-    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
-        """See the protocol."""
-        if self._stands(state, mode):
-            return Stretch(time, until, mode, state, state, None)
-        start, begun = self._kicked(time, state, mode)
-        guards, visited = guards_of(self.contacts, mode), list[tuple[float, Array]]()
-        end, last, guard = walked(
-            lambda _, y: self.equations.rate(y, mode),
-            begun,
-            start,
-            until,
-            tolerance=self._tolerance,
-            guards=lambda y: self._guards(y, mode),
-            corrected=lambda y: self.equations.eliminated(y, mode),
-            first_step=self._span,
-            noise=noise_of(guards, self._size),
-            visited=visited,
-        )
-        if guard is not None and guards[guard].kind == "still":
-            k = guards[guard].contact
-            at = self.equations.at(last)
-            rest = faint_time(mode[k], at.touching[k], self.equations.accelerated(at, mode).slide[k])
-            last, end = last + rest * self.equations.rate(last, mode), end + rest
-        self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard, visited)
+    def _torn(self, leg: Stretch[ContactMode]) -> Refused:
+        return Refused(f"friction leaves no unique motion from t = {leg.end:.6g} s on (Painlevé)")
 
-    def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
-        """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
-        at = self.equations.at(state)
-        slide = self.equations.accelerated(at, mode).slide
-        wait = 0.0
-        for k, own in enumerate(mode):
-            begins = own.kind == "slip" and own.along is None and self.equations.friction[k]
-            if begins and np.linalg.norm(across(at.touching[k])) < FAINT:
-                wait = max(wait, 2 * FAINT / float(np.linalg.norm(slide[k])))
-        return (state, time) if not wait else (state + wait * self.equations.rate(state, mode), time + wait)
-
-    def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
-        """See the protocol."""
-        if not leg.visited:
-            return np.array([leg.first for _ in times])
-        rate, corrected = self.equations.rate, self.equations.eliminated
-        return between(
-            lambda _, y: rate(y, leg.mode), leg.visited, times, self._tolerance, lambda y: corrected(y, leg.mode)
-        )
-
-    def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
-        """See the protocol."""
-        assert leg.guard is not None  # nothing changes at the end of time
-        k, kind = guards_of(self.contacts, leg.mode)[leg.guard]
-        mode, name = list(leg.mode), self.contacts[k].name
-        if kind == "tear":
-            raise Refused(f"friction leaves no unique motion from t = {leg.end:.6g} s on (Painlevé)")
-        if kind == "lift":
-            mode[k] = OPEN
-            return Transition(leg.last, tuple(mode), (("lift_off", name),))
-        if kind == "break":
-            line = leg.mode[k].along
-            if line is None:
-                raise Refused(f"{name} begins to slip where it could go in any direction of its surface")
-            pulls = self.equations.accelerated(self.equations.at(leg.last), leg.mode).force[k]
-            x, y, z = (float(component) * (-1.0 if np.dot(line, pulls) > 0 else 1.0) for component in line)
-            mode[k] = Acting("slip", (x, y, z), (x, y, z))
-            return Transition(leg.last, tuple(mode), (("slip", name),))
-        if kind == "still":
-            return self._after(leg, leg.last, [own.kind != "open" for own in mode], ())
-        return self._impact(leg, k)
+    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
+        line = mode[k].along
+        assert line is not None  # others are refused
+        pulls = self.equations.accelerated(self.equations.at(state), mode).force[k]
+        x, y, z = (float(component) * (-1.0 if np.dot(line, pulls) > 0 else 1.0) for component in line)
+        return Acting("slip", (x, y, z), (x, y, z))
 
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        """Transition of the motion by an impact."""
         state, law = leg.last, self.contacts[hit].restitution
         found = self.equations.at(state)
         speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
@@ -156,29 +89,7 @@ class ContactBodies:
         first = ("settle" if delay else "impact", self.contacts[hit].name)
         return self._after(leg, after, stays, (first,), margin, delay)
 
-    def _after(
-        self,
-        leg: Stretch[ContactMode],
-        state: Array,
-        closed: Sequence[bool],
-        happened: tuple[tuple[str, str], ...],
-        margin: float = np.inf,
-        delay: float = 0.0,
-    ) -> Transition[ContactMode]:
-        """The mode that follows from the forces, with what stopped taken to stand."""
-        found = self.equations.at(state).touching
-        still = [
-            shut and float(np.linalg.norm(across(each))) <= STOPPED for shut, each in zip(closed, found, strict=True)
-        ]
-        state = self.equations.eliminated(state, _held(closed, still))
-        mode, sure = self._decided(state, closed, still)
-        struck = {name for _, name in happened}
-        changed = events(self.contacts, leg.mode, mode, self._stands(state, mode))
-        said = (*happened, *(item for item in changed if item[1] not in struck))
-        return Transition(state, mode, said, np.inf if delay else min(margin, sure), delay)
-
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
-        """The candidate that keeps all its inequalities, and how far it is from breaking one, relative."""
         found = self.equations.at(state)
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
@@ -351,26 +262,13 @@ class ContactBodies:
         found = self.equations.at(self.equations.equations.normalised(state))
         return self.equations.applied(found, self.equations.accelerated(found, mode).force)
 
-    def _stands(self, state: Array, mode: ContactMode) -> bool:
-        """True if nothing moves, and nothing will."""
-        found = self.equations.at(state)
-        if np.abs(found.u).max() > AT_REST or any(own.kind == "slip" for own in mode):
-            return False
-        return float(np.abs(self.equations.accelerated(found, mode).moved).max()) <= STANDS
+    def _touching(self, state: Array) -> Sequence[Touching]:
+        return self.equations.at(state).touching
 
-    def _guards(self, state: Array, mode: ContactMode) -> FloatArray:
+    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
         found = self.equations.at(self.equations.equations.normalised(state))
         made = self.equations.accelerated(found, mode)
-        friction, touching = self.equations.friction, found.touching
-        guards = guards_of(self.contacts, mode)
-        return np.array([guard_value(one, mode, friction, touching, made.force, made.response) for one in guards])
-
-
-def _held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
-    """Modes of closed contacts: stick for those that stand, slip for the others."""
-    return tuple(
-        Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
-    )
+        return SolvedContacts(found.touching, found.u, made.moved, made.slide, made.force, made.response)
 
 
 def _direction(vector: Array) -> Direction:

@@ -10,10 +10,10 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.drives import MODES, Actuator
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, held_by, left_by
-from proofroll.truth.hybrid import Stretch, Transition, walked
+from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
 
 Motors = tuple[Actuator, ...]
 # Of the largest speed at which a joint hit its stop: of slower rebounds only the time is summed. They have 1e-12 of the
@@ -23,7 +23,7 @@ _NEAR = 1e-12  # relative: a coordinate this close to a stop is at it
 _DIGITS = 8  # last digits of a coordinate that are round-off
 
 
-class SwitchedTree:
+class SwitchedTree(Stretches[Mode]):
     """The legs of a mechanism in the coordinates of its tree; a state ends with the time.
 
     See :class:`proofroll.truth.hybrid.HybridRoute`.
@@ -33,9 +33,7 @@ class SwitchedTree:
         self.equations, self.joints = equations, equations.switched
         self.motors = tuple(actuator for actuator, *_ in equations.limited)
         self._nq = equations.mechanism.nq
-        self._tolerance = np.full(self._nq + equations.mechanism.nv + 1, tolerance)
-        self._fastest: dict[int, float] = {}
-        self._span: float | None = None
+        super().__init__(self._nq + equations.mechanism.nv + 1, tolerance)
 
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
@@ -43,37 +41,14 @@ class SwitchedTree:
         mode, margin = self.equations.decided(*self._parts(state), 0.0)
         return Transition(state, mode, (), margin)
 
-    def walk(self, time: float, state: Array, mode: Mode, until: float) -> Stretch[Mode]:
-        """See the protocol."""
+    def _law(self, state: Array, mode: Mode) -> StretchLaw:
         q, v = self._parts(state)
-        end, last, guard = walked(
-            lambda _, y: self._rate(y, mode),
-            time,
-            state,
-            until,
-            tolerance=self._tolerance,
-            guards=lambda y: self._guards(y, mode),
-            corrected=lambda y: self._corrected(y, mode),
-            first_step=self._span,
-            noise=noise_of(
-                self.joints, self.motors, mode, q[[joint.coordinate for joint in self.joints]], self._wanted(time, q, v)
-            ),
-        )
-        self._span = end - time if end > time else None
-        return Stretch(time, end, mode, state, last, guard)
-
-    def within(self, leg: Stretch[Mode], times: FloatArray) -> FloatArray:
-        """See the protocol."""
-        return np.array(
-            list(
-                integrated(
-                    lambda _, y: self._rate(y, leg.mode),
-                    leg.first,
-                    np.maximum(times - leg.start, 0.0),
-                    float(self._tolerance[0]),
-                    lambda y: self._corrected(y, leg.mode),
-                )
-            )
+        at_q = [joint.coordinate for joint in self.joints]
+        return StretchLaw(
+            lambda y: np.append(self.equations.rate(float(y[-1]), y[:-1], mode), 1.0),
+            lambda y: self._guards(y, mode),
+            lambda y: np.append(self.equations.eliminated(y[:-1], mode), y[-1]),
+            noise_of(self.joints, self.motors, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
         )
 
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
@@ -121,12 +96,6 @@ class SwitchedTree:
 
     def _parts(self, state: Array) -> tuple[Array, Array]:
         return state[: self._nq], state[self._nq : -1]
-
-    def _rate(self, state: Array, mode: Mode) -> Array:
-        return np.append(self.equations.rate(float(state[-1]), state[:-1], mode), 1.0)
-
-    def _corrected(self, state: Array, mode: Mode) -> Array:
-        return np.append(self.equations.eliminated(state[:-1], mode), state[-1])
 
     def _wanted(self, time: float, q: Array, v: Array) -> list[float]:
         return [float(item.wanted(time, q[at_q], v[at_v])) for item, at_q, at_v in self.equations.limited]

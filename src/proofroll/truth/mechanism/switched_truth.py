@@ -2,43 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
-from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks, varies
-from proofroll.truth.hybrid import HybridPath, Stretch, follow, least_margin, states_of
+from proofroll.truth.hybrid import follow, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.two_routes import (
-    FACTOR,
-    ROUND_OFF,
-    TwoRouteMotion,
-    check_start,
-    find_truth,
-    judged,
-    largest,
-    matched,
-)
+from proofroll.truth.mechanism.two_paths import TOLERANCE, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
 
-_TOLERANCE = 1e-14  # of each step
 _GRAZED = 1e-8  # rad, m or part by which a stop or a limit must be passed to act; more than the look ahead is wrong by
 _SCOUT = 1e-9  # of a look ahead: whether any stop is reached
-# Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
-CLOSE = 1e-9
-
-_Path = HybridPath[Stretch[Any]]
 
 
 def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
@@ -48,23 +31,26 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Refused: fewer than two routes cover the mechanism; the text says why.
     """
     times = np.asarray(times, dtype=float)
-    if mechanism.contacts:
-        if any(map(varies, mechanism.signals)) or any(actuator.limit for actuator in mechanism.actuators):
-            raise Refused("no route follows contacts together with limits of efforts or with what changes in time")
-        return contact_truth(mechanism, times)
-    equations = JointCoordinates(mechanism)
-    kinks = breaks(mechanism.signals)
-    if not (equations.switches or kinks) or mechanism.unmodelled:
-        return find_truth(mechanism, times)
-    smooth = not kinks and not any(joint.friction for joint in equations.switched)
+    if mechanism.contacts and (
+        any(map(varies, mechanism.signals)) or any(actuator.limit for actuator in mechanism.actuators)
+    ):
+        raise Refused("no route follows contacts together with limits of efforts or with what changes in time")
     try:
-        if smooth:
-            look = follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1]))
-            if not look.happenings and not any(own in {"least", "greatest"} for own in look.legs[0].mode):
-                return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
-        return _switched(mechanism, equations, times)
+        return contact_truth(mechanism, times) if mechanism.contacts else _without_contacts(mechanism, times)
     except Diverged as stopped:
         raise Refused(f"no truth to the end: {stopped}; end before it") from None
+
+
+def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
+    """Simplest truth that follows what switches on the way, if anything does."""
+    equations, kinks = JointCoordinates(mechanism), breaks(mechanism.signals)
+    if not (equations.switches or kinks) or mechanism.unmodelled:
+        return find_truth(mechanism, times)
+    if not kinks and not any(joint.friction for joint in equations.switched):
+        look = follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1]))
+        if not look.happenings and not any(own in {"least", "greatest"} for own in look.legs[0].mode):
+            return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
+    return _switched(mechanism, equations, times)
 
 
 def _unlimited(mechanism: Mechanism) -> Mechanism:
@@ -86,18 +72,12 @@ def _wider(mechanism: Mechanism) -> Mechanism:
 
 
 def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -> TwoRouteMotion:
-    found = analysed(mechanism)
-    if found.singular_start:
-        raise Refused("the start is a singular pose, where the motion may branch")
+    refuse_uncovered(mechanism)
     second = MaximalCoordinates(mechanism)
     check_start(equations, second)
-    tree, bodies = SwitchedTree(equations, _TOLERANCE), SwitchedBodies(second.lean, equations.switched, _TOLERANCE)
+    tree, bodies = SwitchedTree(equations, TOLERANCE), SwitchedBodies(second.lean, equations.switched, TOLERANCE)
     until, kinks = float(times[-1]), breaks(mechanism.signals)
-    paths: tuple[_Path, _Path] = (
-        follow(tree, until, kinks),
-        follow(bodies, until, kinks),
-    )
-    parted = _parted(*paths)
+    paths = follow(tree, until, kinks), follow(bodies, until, kinks)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
     nq = mechanism.nq
@@ -110,38 +90,6 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
     )
     modes = [bodies.switched(paths[1].legs[number].mode) for number in legs]
     two = matched(mechanism, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
-    masked = replace(one, wrench=np.where(found.determinate, one.wrench, np.nan))
-    bars, differences = {}, {}
-    other = judged(mechanism, two)
-    for field, values in judged(mechanism, masked).items():
-        difference = largest(np.where(np.isnan(values), np.nan, other[field]) - values)
-        bar = FACTOR * difference + ROUND_OFF * np.maximum.accumulate(largest(values))
-        bars[field] = np.maximum.accumulate(bar)
-        differences[field] = float(difference[times < parted].max(initial=0.0))
-    placed = masked.placed(mechanism)
-    size = np.maximum(1.0, np.maximum(largest(placed.p_WB), largest(placed.points)))
-    bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * size)
-    time, close = least_margin(paths)
-    horizon = min(parted, time if close < CLOSE else np.inf)
-    events = _events(*paths) if np.isinf(parted) else ()
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "it hangs on less than the parameters are known to which joints hold"
-    return TwoRouteMotion(masked, bars, differences, horizon, [], found.determinate, routes, None, events, reason)
-
-
-def _parted(one: _Path, two: _Path) -> float:
-    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none."""
-    for a, b in zip(one.legs, two.legs, strict=False):
-        if a.mode != b.mode:
-            return min(a.start, b.start)
-    last = min(len(one.legs), len(two.legs))
-    return np.inf if len(one.legs) == len(two.legs) else min(p.legs[last - 1].end for p in (one, two))
-
-
-def _events(one: _Path, two: _Path) -> Sequence[Event]:
-    """The changes of both routes, each with a bracket that holds both times and their round-off."""
-    found = []
-    for a, b in zip(one.happenings, two.happenings, strict=True):
-        wide = FACTOR * abs(a.time - b.time) + ROUND_OFF * a.time
-        found.append(Event(a.kind, float(a.time), float(a.time - wide), float(a.time + wide), a.name))
-    return tuple(found)
+    return two_route_motion(mechanism, paths, one, two, routes, reason)

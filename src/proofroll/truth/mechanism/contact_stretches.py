@@ -1,0 +1,188 @@
+"""Stretches of a mechanism whose bodies touch: what its two routes share, which is no equation and no decision."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.hybrid import Stretch, Transition, between
+from proofroll.truth.mechanism.contact_guards import (
+    AT_REST,
+    STANDS,
+    STOPPED,
+    ContactGuard,
+    events,
+    faint_time,
+    guard_value,
+    guards_of,
+    noise_of,
+    refuse_turning_onset,
+)
+from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
+
+
+class SolvedContacts(NamedTuple):
+    """Motion and forces at a state in a mode.
+
+    Attributes:
+        touching: of each contact.
+        velocity, acceleration: of the route's own coordinates.
+        slide_rate: rate of each slide, (contacts, 3).
+        force: on body a of each contact, (contacts, 3).
+        response: Painlevé's measure, 1 without friction.
+    """
+
+    touching: Sequence[Touching]
+    velocity: Array
+    acceleration: Array
+    slide_rate: Array
+    force: Array
+    response: float
+
+
+class _Equations(Protocol):
+    contacts: tuple[BodyContact, ...]
+    friction: Array
+
+    def rate(self, state: Array, mode: ContactMode, /) -> Array: ...
+
+    def eliminated(self, state: Array, mode: ContactMode, /) -> Array: ...
+
+
+class ContactStretches(Stretches[ContactMode]):
+    """Stretches, ends of them, and what follows. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+
+    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
+        """Takes the length of a state, the tolerance of each step, and the size of the mechanism [m]."""
+        super().__init__(length, tolerance)
+        self._given, self.contacts, self._size = equations, equations.contacts, size
+
+    @abstractmethod
+    def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
+        """Motion and forces at a state."""
+
+    @abstractmethod
+    def _touching(self, state: Array) -> Sequence[Touching]:
+        """Each contact at a state."""
+
+    @abstractmethod
+    def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
+        """Mode that follows from the forces, and how far it is from another one, relative."""
+
+    @abstractmethod
+    def _torn(self, leg: Stretch[ContactMode]) -> Exception:
+        """Refusal of a motion that is not unique from the end of a stretch on."""
+
+    @abstractmethod
+    def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
+        """A slip that begins at the bound of friction, against the force that held."""
+
+    @abstractmethod
+    def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
+        """Transition of the motion by an impact."""
+
+    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:  # noqa: ARG002 -- the equations of a mode are the same everywhere
+        guards, equations = guards_of(self.contacts, mode), self._given
+        return StretchLaw(
+            lambda y: equations.rate(y, mode),
+            lambda y: self._guards(y, mode, guards),
+            lambda y: equations.eliminated(y, mode),
+            noise_of(guards, self._size),
+        )
+
+    def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
+        found, friction = self._solved(state, mode), self._given.friction
+        return np.array(
+            [guard_value(one, mode, friction, found.touching, found.force, found.response) for one in guards]
+        )
+
+    def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
+        """See the protocol."""
+        if self._stands(state, mode):
+            return Stretch(time, until, mode, state, state, None)
+        start, begun = self._kicked(time, state, mode)
+        leg = super().walk(begun, start, mode, until)
+        end, last = leg.end, leg.last
+        if leg.guard is not None:
+            k, kind = guards_of(self.contacts, mode)[leg.guard]
+            if kind == "still":
+                found = self._solved(last, mode)
+                rest = faint_time(mode[k], found.touching[k], found.slide_rate[k])
+                end, last = end + rest, last + rest * self._given.rate(last, mode)
+        return replace(leg, start=time, first=state, end=end, last=last)
+
+    def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
+        """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
+        found, wait = self._solved(state, mode), 0.0
+        for k, own in enumerate(mode):
+            begins = own.kind == "slip" and own.along is None and self._given.friction[k]
+            if begins and np.linalg.norm(across(found.touching[k])) < FAINT:
+                wait = max(wait, 2 * FAINT / float(np.linalg.norm(found.slide_rate[k])))
+        return (state, time) if not wait else (state + wait * self._given.rate(state, mode), time + wait)
+
+    def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
+        """See the protocol."""
+        if not leg.visited:
+            return np.array([leg.first for _ in times])
+        law = self._law(leg.first, leg.mode)
+        return between(lambda _, y: law.rates(y), leg.visited, times, self._tolerance, law.corrected)
+
+    def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
+        """See the protocol."""
+        assert leg.guard is not None  # nothing changes at the end of time
+        k, kind = guards_of(self.contacts, leg.mode)[leg.guard]
+        mode, name = list(leg.mode), self.contacts[k].name
+        if kind == "tear":
+            raise self._torn(leg)
+        if kind == "lift":
+            mode[k] = OPEN
+            return Transition(leg.last, tuple(mode), (("lift_off", name),))
+        if kind == "break":
+            refuse_turning_onset(self.contacts[k], mode[k])
+            mode[k] = self._leaving(leg.last, leg.mode, k)
+            return Transition(leg.last, tuple(mode), (("slip", name),))
+        if kind == "still":
+            return self._after(leg, leg.last, [own.kind != "open" for own in mode], ())
+        return self._impact(leg, k)
+
+    def _after(
+        self,
+        leg: Stretch[ContactMode],
+        state: Array,
+        closed: Sequence[bool],
+        happened: tuple[tuple[str, str], ...],
+        margin: float = np.inf,
+        delay: float = 0.0,
+    ) -> Transition[ContactMode]:
+        """The mode that follows from the forces, with what stopped taken to stand."""
+        slips = [float(np.linalg.norm(across(each))) for each in self._touching(state)]
+        still = [shut and slip <= STOPPED for shut, slip in zip(closed, slips, strict=True)]
+        state = self._given.eliminated(state, held(closed, still))
+        mode, sure = self._decided(state, closed, still)
+        changed = events(self.contacts, leg.mode, mode, self._stands(state, mode))
+        struck = {name for _, name in happened}
+        said = (*happened, *(item for item in changed if item[1] not in struck))
+        return Transition(state, mode, said, np.inf if delay else min(margin, sure), delay)
+
+    def _stands(self, state: Array, mode: ContactMode) -> bool:
+        """True if nothing moves, and nothing will."""
+        if any(own.kind == "slip" for own in mode):
+            return False
+        found = self._solved(state, mode)
+        return float(np.abs(found.velocity).max()) <= AT_REST and float(np.abs(found.acceleration).max()) <= STANDS
+
+
+def held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+    """Modes of closed contacts: stick for those that stand, slip for the others."""
+    return tuple(
+        Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
+    )

@@ -1,0 +1,70 @@
+"""Stretches of a mechanism in one mode, as all of its routes integrate them: by DOP853 to the first guard."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.elements.mechanism.record import integrated
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.hybrid import Stretch, walked
+
+ModeT = TypeVar("ModeT")
+
+
+class StretchLaw(NamedTuple):
+    """Equations of a mode.
+
+    Attributes:
+        rates: right-hand side.
+        guards: values that are negative while the mode lasts, shape (guards,).
+        corrected: puts a state back on its constraints.
+        noise: round-off of the guards at the start, shape (guards,).
+    """
+
+    rates: Callable[[Array], Array]
+    guards: Callable[[Array], FloatArray]
+    corrected: Callable[[Array], Array]
+    noise: FloatArray
+
+
+class Stretches(ABC, Generic[ModeT]):
+    """What routes share: no equations. See :class:`proofroll.truth.hybrid.HybridRoute` for the methods."""
+
+    def __init__(self, size: int, tolerance: float) -> None:
+        """Takes the length of a state, and the tolerance of each step."""
+        self._tolerance = np.full(size, tolerance)
+        self._fastest: dict[int, float] = {}  # impact on each stop or contact, m/s or rad/s
+        self._span: float | None = None
+
+    @abstractmethod
+    def _law(self, state: Array, mode: ModeT) -> StretchLaw:
+        """Equations of a stretch that begins at a state."""
+
+    def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
+        """See the protocol."""
+        law, visited = self._law(state, mode), list[tuple[float, Array]]()
+        end, last, guard = walked(
+            lambda _, y: law.rates(y),
+            time,
+            state,
+            until,
+            tolerance=self._tolerance,
+            guards=law.guards,
+            corrected=law.corrected,
+            first_step=self._span,
+            noise=law.noise,
+            visited=visited,
+        )
+        self._span = end - time if end > time else None
+        return Stretch(time, end, mode, state, last, guard, visited)
+
+    def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
+        """See the protocol."""
+        law, spans = self._law(leg.first, leg.mode), np.maximum(times - leg.start, 0.0)
+        tolerance = float(self._tolerance[0])
+        return np.array(list(integrated(lambda _, y: law.rates(y), leg.first, spans, tolerance, law.corrected)))

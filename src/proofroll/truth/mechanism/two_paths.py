@@ -1,0 +1,99 @@
+"""The truth of a mechanism that switches, from the paths of two routes: where they part, events, error bars."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.core.events import Event
+from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.record import Record
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.hybrid import HybridPath, Stretch, least_margin
+from proofroll.truth.mechanism.two_routes import FACTOR, ROUND_OFF, TwoRouteMotion, judged, largest
+
+TOLERANCE = 1e-14  # of each step
+# Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
+_CLOSE = 1e-9
+
+Path = HybridPath[Stretch[Any]]
+
+
+def refuse_uncovered(mechanism: Mechanism) -> None:
+    """Refuses what no route follows from its start on.
+
+    Raises:
+        Refused: the mechanism has parts that no route has, or starts in a singular pose.
+    """
+    if mechanism.unmodelled:
+        raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
+    if analysed(mechanism).singular_start:
+        raise Refused("the start is a singular pose, where the motion may branch")
+
+
+def two_route_motion(
+    mechanism: Mechanism,
+    paths: tuple[Path, Path],
+    one: Record,
+    two: Record,
+    routes: tuple[str, str],
+    reason: str,
+    *,
+    kinds: Callable[[Any], Any] = lambda mode: mode,
+    pressed: tuple[Array, Array] | None = None,
+    size: float = 1.0,
+) -> TwoRouteMotion:
+    """The motion with its error bars.
+
+    Args:
+        mechanism: what moves.
+        paths: of both routes.
+        one: record of the first, which is taken to be true.
+        two: of the second, matched to it.
+        routes: their names.
+        reason: why the question is ill-posed from the horizon on, if it is.
+        kinds: part of a mode that both routes agree on.
+        pressed: forces of contacts by both routes, (times, contacts, 3).
+        size: least size of the mechanism [m].
+    """
+    parted, determinate = _parted(*paths, kinds), analysed(mechanism).determinate
+    masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
+    fields, others = judged(mechanism, masked), judged(mechanism, two)
+    if pressed is not None:
+        fields["pressed"], others["pressed"] = pressed
+    bars, differences = {}, {}
+    for field, values in fields.items():
+        difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
+        bars[field] = np.maximum.accumulate(FACTOR * difference + ROUND_OFF * np.maximum.accumulate(largest(values)))
+        differences[field] = float(difference[one.time < parted].max(initial=0.0))
+    placed = masked.placed(mechanism)
+    reach = np.maximum(size, np.maximum(largest(placed.p_WB), largest(placed.points)))
+    bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
+    time, close = least_margin(paths)
+    horizon = min(parted, time if close < _CLOSE else np.inf)
+    happened = _events(*paths) if np.isinf(parted) else ()
+    force = None if pressed is None else pressed[0]
+    return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)
+
+
+def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
+    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none."""
+    for a, b in zip(one.legs, two.legs, strict=False):
+        if kinds(a.mode) != kinds(b.mode):
+            return min(a.start, b.start)
+    last = min(len(one.legs), len(two.legs))
+    return np.inf if len(one.legs) == len(two.legs) else min(p.legs[last - 1].end for p in (one, two))
+
+
+def _events(one: Path, two: Path) -> Sequence[Event]:
+    """The changes of both routes, each with a bracket that holds both times and their round-off."""
+    found = []
+    for a, b in zip(one.happenings, two.happenings, strict=True):
+        wide = FACTOR * abs(a.time - b.time) + ROUND_OFF * a.time
+        found.append(Event(a.kind, float(a.time), float(a.time - wide), float(a.time + wide), a.name))
+    return tuple(found)
