@@ -39,18 +39,21 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
     """
     if lacking := element.lacks(samples, ()):
         raise Diverged(lacking)
-    count = len(element.bodies)
-
-    def stacked(name: str, width: int, rows: int) -> FloatArray:
-        empty = np.full((rows, width), np.nan)
-        given = [getattr(sample, name) for sample in samples]
-        return np.array([empty if value is None else np.reshape(value, (rows, width)) for value in given])
-
-    p, v, w = (stacked(name, 3, count) for name in ("p_WB", "v_WB", "w_WB"))
     wrench = np.array([[reactions(element, s, name) for name in ("joint_force", "joint_torque")] for s in samples])
-    placed = Placed(element.mechanism, times, p, v, w, stacked("q_WB", 4, count))
+    placed = placed_from(element, times, samples)
     named = np.array([_named(element, sample) for sample in samples])
     return columns(element, placed, wrench, given_forces(element.mechanism, samples), named)
+
+
+def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Placed:
+    """The motion that samples at these times [s] tell."""
+
+    def stacked(name: str, width: int) -> FloatArray:
+        return np.array([np.reshape(getattr(sample, name), (len(element.bodies), width)) for sample in samples])
+
+    return Placed(
+        element.mechanism, times, stacked("p_WB", 3), stacked("v_WB", 3), stacked("w_WB", 3), stacked("q_WB", 4)
+    )
 
 
 def _named(element: MechanismElement, sample: MechanismSample) -> FloatArray:

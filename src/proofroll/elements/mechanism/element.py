@@ -12,6 +12,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
+from proofroll.core.element_abilities import RunWatch
+from proofroll.core.events import events_of
 from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
 from proofroll.core.time_grid import EVERY
@@ -299,6 +301,8 @@ class MechanismElement:
     def observe(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
         """See the protocol; reactions that an engine gives in part only are left out."""
         found = {}
+        if self.mechanism.contacts and "event_kind" in dataset:
+            found["event_times"] = np.array([event.time for event in events_of(dataset)])
         for item in self.observables:
             if item.name not in dataset:
                 continue
@@ -316,12 +320,26 @@ class MechanismElement:
         }
         sizes = {}
         for item in self.observables:
+            if item.role == Role.EVENT:
+                continue
             values = truth[item.name].to_numpy() if item.name in truth else np.zeros(1)
             if item.role == Role.REACTION and item.name not in natural:
                 sizes[item.name] = float(np.nanmax(np.abs(values)))
             else:
                 sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
         return sizes
+
+    def watch(self, asks: Sequence[str]) -> RunWatch:  # noqa: ARG002 -- the protocol's
+        """See :class:`proofroll.core.element_abilities.WatchesRuns`."""
+        from proofroll.elements.mechanism.contacts.events import ContactWatch
+
+        return ContactWatch(self)
+
+    def common_span(
+        self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
+    ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
+        """All of each: no event of a mechanism ends a run."""
+        return truth, dict(runs)
 
     def certify(self, built: Any, sample: MechanismSample) -> list[Line]:
         """See the protocol."""

@@ -107,7 +107,7 @@ class Reference:
         curves = observe(self.scene, dataset)
         for element in self.scene.elements:
             own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
-            if "event_kind" in own or "event_kind" in true:
+            if "event_kind" in own:  # else it says nothing of events
                 curves[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
         curves = {name: values for name, values in curves.items() if name in self.scene.observables}
         for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:

@@ -80,4 +80,4 @@ class MechanismTruth:
             said.append(f"from {found.horizon:.4g} s on {found.reason}")
         if any(said):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, said))
-        return with_events(dataset, found.events) if found.events else dataset
+        return with_events(dataset, found.events) if found.events or element.mechanism.contacts else dataset

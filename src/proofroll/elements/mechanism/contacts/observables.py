@@ -9,6 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
+from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
 
@@ -28,7 +29,7 @@ RESIDUALS = (
     ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
 )
 # Parts of a mechanism's weight and speed below which nothing presses and nothing slides; softened contacts creep.
-_PRESSES, _SLIDES = 1e-6, 1e-2
+PRESSES, _SLIDES = 1e-6, 1e-2
 _AXIS = 1e-12  # component of a unit normal that is none
 
 
@@ -81,6 +82,9 @@ def contact_observables(mechanism: Mechanism, length: float, speed: float, force
     yield Observable("contact_forces", "N", meaning, Role.REACTION, floor=force, asked_for=False)
     meaning = "share of the samples so far in which what may touch does not press"
     yield Observable("unpressed", "1", meaning, Role.REACTION, floor=1.0, asked_for=False)
+    yield Observable("event_times", "s", "times of all events of contacts", Role.EVENT, asked_for=False)
+    meaning = "events of another kind than the truth's"
+    yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
     floors = {"m": length, "m/s": speed, "N": force, "1": 1.0}
     for name, unit, meaning in RESIDUALS:
         yield Observable(name, unit, meaning, Role.RESIDUAL, floor=floors[unit], asked_for=False, hangs_on_events=False)
@@ -103,7 +107,7 @@ def residuals(
     N = normal_forces(found, pressed)
     u = found.slide - n * u_n[..., None]
     T = np.where(said[..., None], pressed - N[..., None] * n, 0.0)
-    presses = np.asarray(_PRESSES * weight < N)
+    presses = np.asarray(PRESSES * weight < N)
     t = np.linalg.norm(T, axis=-1)
     bound = friction * np.where(presses, N, 0.0)
     slides = np.asarray(presses & said & (found.slip > _SLIDES * speed) & (friction > 0))

@@ -1,0 +1,108 @@
+"""Events of contacts, found between the samples of a run from its forces, gaps and slip."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.element_abilities import SeenInRun
+from proofroll.core.events import Event
+from proofroll.elements.mechanism.contacts.observables import PRESSES, Followed, followed, given_forces, normal_forces
+from proofroll.elements.mechanism.dataset import placed_from
+
+if TYPE_CHECKING:
+    from proofroll.elements.mechanism.element import MechanismElement
+    from proofroll.elements.mechanism.sampling import MechanismSample
+
+_States = NDArray[np.bool_]
+# Part of a mechanism's speed that a contact which sticks may creep with.
+_CREEPS = 1e-3
+# Part of a mechanism's size up to which a gap at the start is none.
+_CLOSED = 1e-6
+
+
+class ContactWatch:
+    """Events of all contacts of a run. See :class:`proofroll.core.element_abilities.RunWatch`.
+
+    A state of one sample alone between two of the other is none: what presses so has struck and left again, what slips
+    not has turned. Two impacts between samples are one.
+    """
+
+    def __init__(self, element: MechanismElement) -> None:
+        self._element = element
+
+    def over(self, sample: MechanismSample) -> bool:  # noqa: ARG002 -- the protocol's
+        """False: bodies may leave each other."""
+        return False
+
+    def conclude(
+        self,
+        times: FloatArray,
+        samples: Sequence[MechanismSample],
+        located: Sequence[Event] | None,  # noqa: ARG002 -- of joints, where an engine has any
+    ) -> SeenInRun:
+        """The events, or None where forces of contact are not known all the time."""
+        count, mechanism = len(samples), self._element.mechanism
+        if not mechanism.contacts or any(sample.q_WB is None for sample in samples):
+            return SeenInRun(count, None, None)
+        pressed = given_forces(mechanism, samples)
+        if count < 3 or np.isnan(pressed[1:]).any():
+            return SeenInRun(count, None, None)
+        placed = placed_from(self._element, times[:count], samples)
+        turning = np.abs(placed.w_WB).max(axis=(1, 2)) * self._element.length
+        speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
+        return SeenInRun(count, self._events(times[:count], followed(placed), pressed, speeds), None)
+
+    def _events(self, times: FloatArray, found: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Event]:
+        presses = normal_forces(found, pressed) > PRESSES * self._element.force
+        # Several engines have forces only after a first step, and a slip from rest is slow at first
+        presses[0] |= presses[1] & (found.gap[0] <= _CLOSED * self._element.length)
+        presses = _without_lone(presses)
+        slips = presses & (found.slip > _CREEPS * self._element.speed)
+        slips[0] |= presses[0] & slips[1]
+        slips = presses & _without_lone(slips)
+        stands = (speeds <= _CREEPS * self._element.speed) & ~slips.any(axis=1)
+        events = []
+        for c, contact in enumerate(self._element.mechanism.contacts):
+            u_n = np.sum(found.normal[:, c] * found.slide[:, c], axis=-1)
+            for k in range(len(times) - 1):
+                kind, at = _change(times, found, u_n, presses[:, c], slips[:, c], k, c)
+                if kind == "stick" and stands[k + 1]:
+                    kind = "rest"
+                if kind:
+                    low, high = float(times[k]), float(times[k + 1])
+                    events.append(Event(kind, min(max(at, low), high), low, high, contact.name))
+        return sorted(events, key=lambda event: event.time)
+
+
+def _without_lone(states: _States) -> _States:
+    """States along time, without those of one sample between two of the other."""
+    lone = (states[:-2] == states[2:]) & (states[1:-1] != states[2:])
+    return np.concatenate([states[:1], np.where(lone, states[2:], states[1:-1]), states[-1:]])
+
+
+def _change(
+    times: FloatArray, found: Followed, u_n: FloatArray, presses: _States, slips: _States, k: int, c: int
+) -> tuple[str, float]:
+    """Kind and time [s] of what happens to contact c after sample k; no kind: nothing."""
+    start, middle = float(times[k]), float(times[k] + times[k + 1]) / 2
+    if not presses[k]:
+        closing = float(u_n[k])
+        if presses[k + 1] or closing < 0 < u_n[k + 1]:
+            return "impact", start + float(found.gap[k, c]) / -closing if closing < 0 else middle
+        return "", start
+    if not presses[k + 1]:
+        return "lift_off", middle
+    if slips[k] and not slips[k + 1]:
+        before = float(found.slip[k - 1, c]) if k and slips[k - 1] else np.inf
+        slip, lost = float(found.slip[k, c]), before - float(found.slip[k, c])
+        whole = start + slip / lost * float(times[k] - times[k - 1]) if 0 < lost < np.inf else middle
+        return "stick", whole
+    if slips[k + 1] and not slips[k]:
+        return "slip", middle
+    turned = slips[k] and float(found.slide[k, c] @ found.slide[k + 1, c]) < 0
+    return ("turn", middle) if turned else ("", start)

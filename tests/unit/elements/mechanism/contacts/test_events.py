@@ -1,0 +1,80 @@
+"""Events of contacts, found between the samples of a run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll.core.events import Event
+from proofroll.elements.mechanism.contacts.events import ContactWatch
+from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
+from proofroll.elements.mechanism.sampling import MechanismSample
+from proofroll.files.scene_file import load_scene
+
+EVERY = 0.01
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def ball(restitution: float = 0.0) -> MechanismElement:
+    """A ball on a floor or over it."""
+    return the_mechanism(load_scene("spinning_bounce", restitution=restitution))
+
+
+def seen(heights: list[float], speeds: list[list[float]], N: list[float], element: MechanismElement) -> list[Event]:
+    """Events of samples of a ball that does not turn."""
+    q, radius = np.array([1.0, 0, 0, 0]), 0.05
+    samples = [
+        MechanismSample(np.array([0, 0, radius + h]), np.array(v), np.zeros(3), q_WB=q, contact_force=n * UP)
+        for h, v, n in zip(heights, speeds, N, strict=True)
+    ]
+    watch = ContactWatch(element)
+    found = watch.conclude(EVERY * np.arange(len(samples)), samples, None)
+    assert found.events is not None
+    return list(found.events)
+
+
+def told(events: list[Event]) -> list[tuple[str, int]]:
+    """Kinds of events, and the sample before each."""
+    return [(event.kind, round(event.time_low / EVERY)) for event in events]
+
+
+def test_a_slip_that_ends_is_a_stick_and_at_rest_a_rest() -> None:
+    """The time is where the slip comes to zero; what stands then rests."""
+    events = seen([0] * 5, [[0.3, 0, 0], [0.2, 0, 0], [0.1, 0, 0], [0, 0, 0], [0, 0, 0]], [1.0] * 5, ball())
+    assert told(events) == [("rest", 2)]
+    assert events[0].time == pytest.approx(0.03)
+    assert events[0].name == "contact"
+
+
+def test_what_slides_back_has_turned() -> None:
+    """A slip that reverses between two samples is told as such."""
+    events = seen([0] * 4, [[0.1, 0, 0], [0.05, 0, 0], [-0.05, 0, 0], [-0.1, 0, 0]], [1.0] * 4, ball())
+    assert told(events) == [("turn", 1)]
+
+
+def test_an_impact_is_found_with_and_without_a_rebound() -> None:
+    """A ball that lands presses afterwards; one that rebounds between samples has the opposite speed."""
+    landed = seen([0.015, 0.005, 0, 0], [[0, 0, -1.0], [0, 0, -1.0], [0, 0, 0], [0, 0, 0]], [0, 0, 1.0, 1.0], ball())
+    assert told(landed) == [("impact", 1)]
+    assert landed[0].time == pytest.approx(0.015)
+    rebound = seen([0.015, 0.005, 0.004, 0.012], [[0, 0, -1.0]] * 2 + [[0, 0, 0.8]] * 2, [0] * 4, ball(0.8))
+    assert told(rebound) == [("impact", 1)]
+    during = seen([0.01, 0, 0.01, 0.02], [[0, 0, -1.0], [0, 0, 0.1], [0, 0, 0.8], [0, 0, 0.8]], [0, 9.0, 0, 0], ball())
+    assert [kind for kind, _ in told(during)] == ["impact"]
+
+
+def test_what_no_longer_presses_has_lifted_off() -> None:
+    """A force that ends is a lift-off between the samples."""
+    events = seen([0, 0, 0.01, 0.02], [[0, 0, 0], [0, 0, 0.5], [0, 0, 1.0], [0, 0, 1.0]], [1.0, 1.0, 0, 0], ball())
+    assert told(events) == [("lift_off", 1)]
+
+
+def test_an_engine_without_forces_of_contact_has_no_events() -> None:
+    """Without forces nothing is told, rather than that nothing happened."""
+    sample = MechanismSample(np.array([0, 0, 0.05]), np.zeros(3), np.zeros(3), q_WB=np.array([1.0, 0, 0, 0]))
+    watch = ContactWatch(ball())
+    assert watch.conclude(EVERY * np.arange(3), [sample] * 3, None).events is None
+    silent = replace(sample, contact_force=np.full(3, np.nan))
+    assert watch.conclude(EVERY * np.arange(3), [sample, silent, silent], None).events is None
