@@ -21,8 +21,11 @@ from proofroll.engines.pinocchio.joint_tree import JointTree
 
 _POINTS = {MechanismCapability.SPHERICAL_LOOP, MechanismCapability.REVOLUTE_LOOP}
 _NO_ROWS = "Pinocchio's rigid constraints hold points or whole frames together, and no single angle or direction"
-PROVIDES = joint_tree.PROVIDES - ALL_LOOPS | _POINTS
-LACKING: Mapping[str, str] = {**joint_tree.LACKING, **dict.fromkeys(ALL_LOOPS - _POINTS, _NO_ROWS)}
+PROVIDES = (joint_tree.PROVIDES - ALL_LOOPS | _POINTS) - {MechanismCapability.COUPLINGS}
+LACKING: Mapping[str, str] = {
+    **joint_tree.LACKING,
+    **dict.fromkeys((ALL_LOOPS - _POINTS) | {MechanismCapability.COUPLINGS}, _NO_ROWS),
+}
 _ITERATIONS = 50
 _ACCURACY = 1e-14
 
@@ -33,11 +36,12 @@ class ConstraintDynamics:
     Attributes:
         constraints: Pinocchio's.
         proximal: accuracy, μ and most iterations of its method.
+        on_couplings: forces of couplings; none.
     """
 
     def __init__(self, tree: JointTree, proximal: float) -> None:
         """Takes the term μ of the proximal method."""
-        self._tree, self._model = tree, tree.model
+        self._tree, self._model, self.on_couplings = tree, tree.model, np.zeros(0)
         self.proximal = _ACCURACY, proximal, _ITERATIONS
         self._proximal = pin.ProximalSettings(*self.proximal)
         self.constraints, self._loops = pin.StdVec_RigidConstraintModel(), []

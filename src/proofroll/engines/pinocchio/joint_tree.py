@@ -16,10 +16,12 @@ import pinocchio as pin
 from proofroll.elements.mechanism import WORLD, Joint, Loop, Mechanism, Spring
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import value_at, varies
 
-PROVIDES: frozenset[str] = (
-    ALL_JOINTS | ALL_LOOPS | FORCES | {MechanismCapability.REDUNDANT, MechanismCapability.ARMATURE}
-)
+_OF_JOINTS = {
+    MechanismCapability[name] for name in ("REDUNDANT", "ARMATURE", "ACTUATORS", "SATURATION", "SIGNALS", "COUPLINGS")
+}
+PROVIDES: frozenset[str] = ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
 LACKING: Mapping[str, str] = {
     MechanismCapability.JOINT_FRICTION: "these equations have no law that switches; Pinocchio's solver of dry friction "
     "in joints belongs to its contacts"
@@ -40,6 +42,10 @@ class JointTree:
         loops, springs: the frames at their two ends, after each spring itself.
         drive, damping: of each velocity, shape (nv,).
         sprung: stiffness, rest, and slices of configuration and velocity, of each joint that has a spring.
+        varies: whether a drive or a target changes in time.
+        now: time at which these are evaluated [s].
+        closed: whether loops or couplings hold joints together.
+        geared: rows on the velocities of the couplings, (couplings, nv).
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -100,16 +106,44 @@ class JointTree:
         self.damping = np.array([joint.damping for joint in by_velocity])
         sprung = zip(joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
         self.sprung = [(joint.stiffness, joint.rest, at_q, at_v) for joint, at_q, at_v in sprung if joint.stiffness]
-        self._constant = not self.sprung and not self.damping.any()
+        self._timed = [
+            (joint.torque, at)
+            for joint, at in zip(joints, self.mechanism.v_slices, strict=True)
+            if varies(joint.torque)
+        ]
+        self._actuators = [(item, *self.mechanism.place_of(item.joint)) for item in self.mechanism.actuators]
+        self.varies, self.now = any(map(varies, self.mechanism.signals)), 0.0
+        self._constant = not (self.sprung or self.damping.any() or self._timed or self._actuators)
+        couplings = self.mechanism.couplings
+        self.closed = bool(self.mechanism.loops or couplings)
+        self.geared = np.zeros((len(couplings), self.model.nv))
+        self._geared_q = np.zeros((len(couplings), self.model.nq))
+        for number, coupling in enumerate(couplings):
+            for joint, factor in ((coupling.joint_a, -coupling.ratio), (coupling.joint_b, 1.0)):
+                at_q, at_v = self.mechanism.place_of(joint)
+                self._geared_q[number, at_q] = self.geared[number, at_v] = factor
+        self._offsets = np.array([coupling.offset for coupling in couplings])
+
+    def apart(self, q: Array) -> Array:
+        """Distance of each coupling's joint_b from where it has to be."""
+        return np.asarray(self._geared_q @ q - self._offsets)
 
     def drives(self, q: Array, v: Array) -> Array:
-        """Generalised forces of joints' own springs, dampers and drives, shape (nv,); not to be written to."""
+        """Generalised forces of joints' springs, dampers, drives and actuators, shape (nv,); not to be written to."""
         if self._constant:
             return self.drive
         tau = self.drive - self.damping * v
         for stiffness, rest, at_q, at_v in self.sprung:
             tau[at_v] -= stiffness * (q[at_q] - rest)
+        for signal, at_v in self._timed:
+            tau[at_v] += value_at(signal, self.now)
+        if self._actuators:
+            np.add.at(tau, [place for _, _, place in self._actuators], self.efforts(q, v))
         return tau
+
+    def efforts(self, q: Array, v: Array) -> Array:
+        """Efforts of the actuators, (actuators,)."""
+        return np.array([item.effort(self.now, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self._actuators])
 
     def pulls(self, data: Any) -> Any:
         """Forces of springs on Pinocchio's joints, in their axes; positions and velocities are in ``data``."""

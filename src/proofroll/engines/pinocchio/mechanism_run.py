@@ -28,7 +28,7 @@ class MechanismRun:
         self._mechanism = mechanism
         self.tree = JointTree(mechanism)
         self._model, self._data = self.tree.model, self.tree.model.createData()
-        self._nq = self._model.nq
+        self._nq, self._end = self._model.nq, self._model.nq + self._model.nv
         rows = LoopRows(self.tree)
         mu = settings.proximal  # which constraint_dynamics has, and nothing else
         self.dynamics = NullSpace(self.tree, rows) if mu is None else ConstraintDynamics(self.tree, mu)
@@ -37,13 +37,20 @@ class MechanismRun:
         if self._turns:
             require_tangent_map()
         self._eliminates = settings.projection and bool(rows.rank)
-        start = np.concatenate([self.tree.q0, self.tree.v0])
+        # where signals change in time, it is the last component of the state: integrators hand on nothing else
+        start = np.concatenate([self.tree.q0, self.tree.v0, np.zeros(int(self.tree.varies))])
         resolution = float(getattr(settings, settings.resolution))
         integrator = INTEGRATORS[settings.integrator]
         self.motion = integrator(self._rates, self._accepted, start, np.ones(len(start)), resolution)
 
     def _rates(self, y: Array) -> Array:
-        q, v = y[: self._nq], y[self._nq :]
+        q, v = y[: self._nq], y[self._nq : self._end]
+        if self.tree.varies:
+            self.tree.now = y.item(-1)
+            return np.append(self._rates_now(q, v), 1.0)
+        return self._rates_now(q, v)
+
+    def _rates_now(self, q: Array, v: Array) -> Array:
         if not self._turns:
             return np.concatenate([v, self.dynamics.acceleration(self._data, q, v)])
         q = pin.normalize(self._model, q)  # the rates must not depend on the length to which a quaternion has drifted
@@ -55,12 +62,12 @@ class MechanismRun:
             raise Diverged(f"the state is not finite at t = {t:.6g} s")
         if not self._turns and not self._eliminates:
             return y
-        q, v = y[: self._nq], y[self._nq :]
+        q, v = y[: self._nq], y[self._nq : self._end]
         if self._turns:
             q = pin.normalize(self._model, q)
         if self._eliminates:
             q, v = self._rows.eliminated(self._data, q, v)
-        return np.concatenate([q, v])
+        return np.concatenate([q, v, y[self._end :]])
 
     def advance(self, t: float) -> None:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -75,7 +82,8 @@ class MechanismRun:
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, and what the reactions are."""
         data = self._model.createData()
-        q, v = self.motion.x[: self._nq], self.motion.x[self._nq :]
+        q, v = self.motion.x[: self._nq], self.motion.x[self._nq : self._end]
+        self.tree.now = self.motion.t
         acceleration, forces, on_loops = self.dynamics.reactions(data, q, v)
         pin.forwardKinematics(self._model, data, q, v, acceleration)
         pin.updateFramePlacements(self._model, data)
@@ -100,6 +108,8 @@ class MechanismRun:
             q_WB=np.array([np.roll(pin.Quaternion(data.oMf[frame].rotation).coeffs(), 1) for frame in self.tree.body]),
             joint_force=force,
             joint_torque=torque,
+            effort=self.tree.efforts(q, v) if self._mechanism.actuators else None,
+            coupling=self.dynamics.on_couplings if self._mechanism.couplings else None,
         )
 
     def built(self) -> MechanismBuilt:

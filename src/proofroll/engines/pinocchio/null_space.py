@@ -23,7 +23,7 @@ from proofroll.engines.pinocchio.joint_tree import JointTree
 
 
 class RowsAtState(NamedTuple):
-    """Φ, C with C v = Φ̇, Ċ v; and of each row its loop, and the force and moment on body_b of a unit multiplier."""
+    """Φ, C with C v = Φ̇, Ċ v; of each loop's row the loop, and force and moment on body_b of a unit multiplier."""
 
     residual: Array
     C: Array
@@ -42,14 +42,14 @@ class Split(NamedTuple):
 
 
 class LoopRows:
-    """The rows of all loops of a tree.
+    """The rows of all loops of a tree, then of its couplings.
 
     Attributes:
         rank: number of independent rows.
     """
 
     def __init__(self, tree: JointTree) -> None:
-        self._model = tree.model
+        self._model, self._tree = tree.model, tree
         kinds = [loop.kind for loop in tree.mechanism.loops]
         points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
         angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
@@ -67,11 +67,21 @@ class LoopRows:
             return rows.residual, rows.C
 
         self.rank = 0
-        if tree.loops:
+        if tree.closed:
             self.rank = independent_anywhere(tree.q0, at_rest, partial(pin.integrate, self._model))
 
     def at(self, data: Any, q: Array, v: Array) -> RowsAtState:
         """Rows at a state; positions, velocities and drifts of all frames are in ``data`` then."""
+        if not self._tree.mechanism.couplings:
+            return self._of_loops(data, q, v)
+        rows, geared = self._of_loops(data, q, v), self._tree.geared
+        return rows._replace(
+            residual=np.concatenate([rows.residual, self._tree.apart(q)]),
+            C=np.concatenate([rows.C, geared]),
+            drift=np.concatenate([rows.drift, np.zeros(len(geared))]),
+        )
+
+    def _of_loops(self, data: Any, q: Array, v: Array) -> RowsAtState:
         model = self._model
         pin.forwardKinematics(model, data, q, v, np.zeros(model.nv))
         pin.computeJointJacobians(model, data, q)
@@ -142,17 +152,22 @@ def _times(a: Array, J: Array) -> Array:
 
 
 class NullSpace:
-    """Accelerations and reactions of a tree with loops."""
+    """Accelerations and reactions of a tree with loops and couplings.
+
+    Attributes:
+        on_couplings: force of each on its joint_b when reactions were last asked for.
+    """
 
     def __init__(self, tree: JointTree, rows: LoopRows) -> None:
         self._tree, self._model, self._rows = tree, tree.model, rows
         self._rest = np.zeros(tree.model.nv)
+        self.on_couplings = np.zeros(0)
 
     def acceleration(self, data: Any, q: Array, v: Array) -> Array:
         """Acceleration of the joints, shape (nv,), which the next call may overwrite."""
         tree, model = self._tree, self._model
         tau = tree.drives(q, v)
-        if not tree.loops:
+        if not tree.closed:
             if not tree.springs:
                 acceleration: Array = pin.aba(model, data, q, v, tau)
                 return acceleration
@@ -177,13 +192,14 @@ class NullSpace:
         """Acceleration; forces on Pinocchio's joints of springs and loops; force and moment on body_b of each loop."""
         tree = self._tree
         on_loops = np.zeros((2, len(tree.loops), 3))
-        if not tree.loops:
+        if not tree.closed:
             acceleration = self.acceleration(data, q, v).copy()
             pin.forwardKinematics(self._model, data, q, v)
             pin.updateFramePlacements(self._model, data)
             return acceleration, tree.pulls(data), on_loops
         acceleration, rows, multipliers = self._solved(data, q, v, tree.drives(q, v))
         forces = tree.pulls(data)
+        multipliers, self.on_couplings = np.split(multipliers, [len(rows.loop)])
         np.add.at(on_loops[0], rows.loop, multipliers[:, None] * rows.force)
         np.add.at(on_loops[1], rows.loop, multipliers[:, None] * rows.torque)
         for (a, b), force, torque in zip(tree.loops, *on_loops, strict=True):
@@ -193,5 +209,5 @@ class NullSpace:
         return acceleration, forces, on_loops
 
     def constraint_rows(self, data: Any, q: Array, v: Array) -> Array:
-        """Rows of the loops on the velocities of the joints."""
-        return self._rows.at(data, q, v).C if self._tree.loops else np.zeros((0, self._model.nv))
+        """Rows of loops and couplings on the velocities of the joints."""
+        return self._rows.at(data, q, v).C if self._tree.closed else np.zeros((0, self._model.nv))

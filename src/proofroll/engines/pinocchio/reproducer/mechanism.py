@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from proofroll.core.errors import Refused
 from proofroll.core.program_text import assigned
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
@@ -193,8 +194,14 @@ def states(times):
 
 
 def source(run: MechanismRun, settings: PinocchioSettings) -> str:
-    """The program's part that runs a model, given at time 0."""
+    """The program's part that runs a model, given at time 0.
+
+    Raises:
+        Refused: it has actuators, couplings, or drives in time.
+    """
     tree, mechanism = run.tree, run.tree.mechanism
+    if mechanism.actuators or mechanism.couplings or tree.varies:
+        raise Refused("programs hold no actuators, couplings or drives in time yet")
     model = tree.model
     attached: dict[tuple[int, str], int] = {}
     frames = {body.name: frame for body, frame in zip(mechanism.bodies, tree.body, strict=True)}
