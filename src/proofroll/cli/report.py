@@ -58,6 +58,7 @@ def report(
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
     from proofroll.report.against import EarlierReport
     from proofroll.report.page.growing import begun
+    from proofroll.report.page.html import templates
     from proofroll.report.parts import all_parts, parts_of
     from proofroll.running.store import alone_in
     from proofroll.running.worker_pool import Workers
@@ -76,6 +77,7 @@ def report(
     if not studies:
         loaded = [item.briefly() for item in loaded]
     options.require_pages()
+    templates()  # read before the work, while which the code may change
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
     tell_left_out(loaded, engine or [])
     keys = list(dict.fromkeys(part.key for part in parts))

@@ -14,11 +14,16 @@ if TYPE_CHECKING:
 
 
 def environment(*folders: Path) -> jinja2.Environment:
-    """The report's templates and those of further folders; everything is escaped, save what they mark as ours."""
+    """The report's templates and those of further folders, as they are now: a long run ends with what it began with.
+
+    Everything is escaped, save what they mark as ours.
+    """
     import jinja2
 
+    places = dict.fromkeys([Path(__file__).parent / "templates", *folders])  # of equal names the first counts
+    files = [path for place in reversed(places) if place.is_dir() for path in place.iterdir() if path.is_file()]
     return jinja2.Environment(
-        loader=jinja2.FileSystemLoader([*dict.fromkeys([Path(__file__).parent / "templates", *folders])]),
+        loader=jinja2.DictLoader({path.name: path.read_text(encoding="utf-8") for path in files}),
         autoescape=True,
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,

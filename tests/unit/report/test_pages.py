@@ -8,8 +8,35 @@ from typing import Any
 import jinja2
 import pytest
 
+from proofroll.cli import options
+from proofroll.cli.report import report
+from proofroll.core.errors import InputError
 from proofroll.report.page import html
 from proofroll.report.pages import environment, rendered
+
+
+def test_templates_are_those_of_the_start(tmp_path: Path) -> None:
+    """What changes in a folder of templates while a report runs, also what nothing has used yet, changes no page."""
+    own = tmp_path / "own.html"
+    own.write_text("{{ a }}", encoding="utf-8")
+    (tmp_path / "common.html").write_text("not ours", encoding="utf-8")
+    made = environment(tmp_path)
+    own.write_text("{{ b }}", encoding="utf-8")
+    assert rendered(made, "own.html", a="told") == "told"
+    assert made.loader is not None
+    assert made.loader.get_source(made, "common.html")[0] != "not ours"
+
+
+def test_a_report_reads_its_templates_before_its_cases(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """The report command has all templates before the first case is begun."""
+    html._templates.cache_clear()
+
+    def begin(*_: object) -> None:
+        raise InputError("templates", html._templates.cache_info().currsize, "are read")
+
+    monkeypatch.setattr(options, "new_runner", begin)
+    with pytest.raises(InputError, match="templates = 1"):
+        report(["stick_slip"], out=tmp_path)
 
 
 def test_a_template_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
