@@ -117,8 +117,8 @@ def test_plain_data_round_trip() -> None:
 def test_singular_mass_matrix() -> None:
     """A joint that moves no mass makes the mass matrix singular, and an ordinary robot's is not."""
     robot = _tree("fixed", 2)
-    assert not RobotTruth.of(robot, random_states(robot, 2, 0)).singular
+    assert not RobotTruth.of(robot, random_states(robot, 2, 0)).dynamics.singular
     empty = RobotBody("end", 0.0, np.zeros(3), np.zeros((3, 3)))
     joint = RobotJoint("last", "revolute", "b0", "end", np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))
     robot = robot.change(bodies={**robot.bodies, "end": empty}, joints=(*robot.joints, joint))
-    assert RobotTruth.of(robot, random_states(robot, 2, 0)).singular
+    assert RobotTruth.of(robot, random_states(robot, 2, 0)).dynamics.singular

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable
 from xml.etree.ElementTree import Element
 
@@ -113,20 +114,21 @@ class Search:
                         continue
                     if self.engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
                         break  # one that is known of this engine closes the layer
-                    tried = self._tried(begun, hypothesis, layer)
-                    if tried is not None and tried.found[layer] <= _HELPS * begun.found[layer]:
+                    tried = self._tried(begun, hypothesis, layer, _HELPS * begun.found[layer])
+                    if tried is not None:
                         candidates.append(tried)
             best = sorted(candidates, key=lambda item: self._rank(item, layer))[:_BRANCHES]
         return best[0] if best else None
 
-    def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str) -> _Step | None:
+    def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str, most: float = math.inf) -> _Step | None:
+        """The step after a hypothesis; None: no other robot comes of it, or the layer is off by more than ``most``."""
         robot = hypothesis.change(RobotEvidence(self.file, step.truth.robot, self.reading, self.recompiled))
         if robot is None or robot is step.truth.robot or (self.reading.joints and not robot.moving):
             return None
         truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
-        left = differences(truth, self.reading)
-        if layer not in left:
+        if not differences(truth, self.reading, layer).get(layer, math.inf) <= most:
             return None
+        left = differences(truth, self.reading)
         known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
         before, after = step.found[layer], left[layer]
         cause = RobotCause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)

@@ -12,7 +12,7 @@ from proofroll.core.arrays import slices
 from proofroll.robots.model import Array, Robot, RobotBody, RobotJoint
 from proofroll.robots.protocol import Reading
 from proofroll.robots.states import RobotStates
-from proofroll.robots.two_formulations import Dynamics, passive, poses, world_jacobians
+from proofroll.robots.two_formulations import Dynamics, Frames, passive, poses, world_jacobians
 
 LAYERS = {
     "joints": "joints that are absent, added, or follow no other although the file says so",
@@ -28,20 +28,16 @@ LAYERS = {
 # Round-off of two formulations is 1e-15 to 3e-14 on robots with up to 67 velocities; the smallest known defect of an
 # importer is 1e-7.
 TOLERANCE = 1e-10
-# Smallest eigenvalue of the scaled mass matrix: some 64 velocities times round-off.
-_SINGULAR = 1e-14
 # Of the weight times one metre: a torque of gravity below is round-off of larger ones.
 _FLOOR = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
 class RobotTruth:
-    """A robot with what it does at some states."""
+    """A robot with what it does at some states; its equations of motion are evaluated when they are asked for."""
 
     robot: Robot
     states: RobotStates
-    dynamics: Dynamics
-    passive: Array
     like: RobotTruth | None = None
 
     @classmethod
@@ -50,14 +46,30 @@ class RobotTruth:
 
         Joints that the states do not have are at rest.
         """
-        states = states.completed(robot)
-        same = like is not None and _moves_alike(robot, like.robot)
-        dynamics = like.dynamics if like is not None and same else world_jacobians(robot, states)
-        return cls(robot, states, dynamics, passive(robot, states), like)
+        return cls(robot, states.completed(robot), like)
 
     def first(self, count: int) -> RobotTruth:
         """The truth at the first states alone."""
-        return RobotTruth(self.robot, self.states.first(count), self.dynamics.first(count), self.passive[:count])
+        return RobotTruth(self.robot, self.states.first(count))
+
+    @cached_property
+    def dynamics(self) -> Dynamics:
+        """By the first formulation."""
+        if self.like is not None and _moves_alike(self.robot, self.like.robot):
+            return self.like.dynamics
+        return world_jacobians(self.robot, self.states, self.frames)
+
+    @cached_property
+    def frames(self) -> Frames:
+        """Poses of all bodies."""
+        if self.like is not None and self.robot.joints is self.like.robot.joints:
+            return self.like.frames
+        return poses(self.robot, self.states)
+
+    @cached_property
+    def passive(self) -> Array:
+        """Damping, friction and springs, shape (states, n)."""
+        return passive(self.robot, self.states)
 
     @cached_property
     def scales(self) -> dict[str, float]:
@@ -80,11 +92,6 @@ class RobotTruth:
             "forward dynamics": max(float(np.abs(self.inverse + self.passive).max()), floor),
         }
         return {layer: size or 1.0 for layer, size in sizes.items()}
-
-    @cached_property
-    def singular(self) -> bool:
-        """True if the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
-        return self.dynamics.smallest < _SINGULAR
 
     @cached_property
     def inverse(self) -> Array:
@@ -134,9 +141,12 @@ def _moves_alike(robot: Robot, other: Robot) -> bool:
     )
 
 
-def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:
-    """Relative difference of an engine by layer; a layer that the engine does not offer is left out."""
-    robot, d = truth.robot, truth.dynamics
+def differences(truth: RobotTruth, reading: Reading, until: str = "") -> dict[str, float]:
+    """Relative difference of an engine by layer; a layer that the engine does not offer is left out.
+
+    Layers after ``until`` may be left out, too: most robots that a search tries are refuted before they move.
+    """
+    robot = truth.robot
     dofs = dict(zip(reading.joints, reading.dofs, strict=True))
     followers = {mimic.joint for mimic in robot.mimics}
     expected = {joint.name: joint.dofs for joint in robot.moving}
@@ -145,7 +155,7 @@ def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:
     free = followers - reduced - set(reading.coupled)
     off = {"joints": float(len(unlike | free))}
     common = [name for name in reading.joints if expected.get(name) == dofs[name]]
-    if not common:
+    if not common or until == "joints":
         return off
     G, theirs = _selection(robot, common, reduced), _columns(reading, common)
     groups = robot.groups
@@ -159,13 +169,15 @@ def differences(truth: RobotTruth, reading: Reading) -> dict[str, float]:
         + [_apart(reading.com[name], reading.mass[name], groups[name], scales["mass"]) for name in both]
         + [np.abs(reading.inertia[name] - groups[name].inertia).max() / scales["bodies"] for name in both]
     )
-    M = G.T @ d.M @ G
-    off["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], M, scales["mass matrix"])
+    if until in {"mass", "kinematics", "bodies"}:
+        return off
+    d = truth.dynamics
+    off["mass matrix"] = _off(reading.M[:, theirs][:, :, theirs], _between(G, d.M), scales["mass matrix"])
     for layer, own, expected_torque in (("gravity", reading.g, d.g), ("bias", reading.h, d.h)):
         off[layer] = _off(own[:, theirs], expected_torque @ G, scales[layer])
     if reading.inverse is not None:
         off["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
-    if reading.forward is not None and not truth.singular:
+    if reading.forward is not None and not d.singular:
         given = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
         reached = reading.forward[:, theirs] @ G.T
         off["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
@@ -177,19 +189,27 @@ def first_failing(found: dict[str, float], tolerances: dict[str, float]) -> str 
     return next((layer for layer, value in found.items() if not value <= tolerances[layer]), None)
 
 
+def _between(G: Array, M: Array) -> Array:
+    """Gᵀ M G, where most columns of G select one velocity alone."""
+    if np.count_nonzero(G) == G.shape[1] and np.all(G.sum(axis=0) == 1):
+        rows = G.argmax(axis=0)
+        return np.asarray(M[:, rows[:, None], rows])
+    return np.asarray(G.T @ M @ G)
+
+
 def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
     """Map from the velocities of some joints to those of all: followers move with them, others are at rest."""
-    columns = robot.columns
-    G = np.zeros((robot.dofs, 0))
+    columns, dofs = robot.columns, robot.dofs
     followers = {mimic.joint: mimic for mimic in robot.mimics}
+    blocks = [np.zeros((dofs, 0))]
     for name in joints:
-        block = np.zeros((robot.dofs, columns[name].stop - columns[name].start))
+        block = np.zeros((dofs, columns[name].stop - columns[name].start))
         block[columns[name]] = np.eye(block.shape[1])
         for follower in reduced:
             if followers[follower].other == name:
                 block[columns[follower]] = followers[follower].multiplier
-        G = np.hstack([G, block])
-    return G
+        blocks.append(block)
+    return np.concatenate(blocks, axis=1)
 
 
 def _columns(reading: Reading, joints: list[str]) -> list[int]:
@@ -199,7 +219,7 @@ def _columns(reading: Reading, joints: list[str]) -> list[int]:
 
 def _kinematics(truth: RobotTruth, reading: Reading, joints: list[str]) -> float:
     children = {joint.name: joint.child for joint in truth.robot.moving}
-    true = poses(truth.robot, truth.states)
+    true = truth.frames
     off = []
     for name in joints:
         if name in reading.position:

@@ -7,7 +7,6 @@ import numpy as np
 from proofroll.robots.layers import RobotTruth
 from proofroll.robots.model import Array
 from proofroll.robots.protocol import Reading
-from proofroll.robots.two_formulations import poses
 
 _TORQUES = ("gravity", "bias", "inverse dynamics")
 
@@ -31,7 +30,7 @@ def worst_place(truth: RobotTruth, reading: Reading, layer: str) -> str | None:
             if abs(one[index] - other[index]) > 1e-9 * max(abs(one[index]), abs(other[index])):
                 return f"body {bodies[worst]}: {what} {one[index]:.6g}, true {other[index]:.6g}"
     if layer == "kinematics":
-        true_poses = poses(truth.robot, truth.states)
+        true_poses = truth.frames
         differences = [
             (float(np.abs(held - true).max(axis=axes)[state]), name, what, state)
             for name in common

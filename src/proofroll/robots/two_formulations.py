@@ -15,6 +15,11 @@ from scipy.spatial.transform import Rotation
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 
+# Smallest eigenvalue of the scaled mass matrix: some 64 velocities times round-off.
+_SINGULAR = 1e-14
+# Products of a matrix product that OpenBLAS computes in one thread; several threads cost more here than they save.
+_ALONE = 2**18
+
 
 @dataclasses.dataclass(frozen=True)
 class Dynamics:
@@ -30,17 +35,17 @@ class Dynamics:
     g: Array
     h: Array
 
-    def first(self, count: int) -> Dynamics:
-        """Terms at the first states alone."""
-        return Dynamics(self.M[:count], self.g[:count], self.h[:count])
-
     @cached_property
-    def smallest(self) -> float:
-        """The smallest eigenvalue of M with velocities scaled by their own inertia; 0 where one has none."""
+    def singular(self) -> bool:
+        """True if the mass matrix, every velocity scaled by its own inertia, has no inverse within round-off."""
         own = np.sqrt(np.abs(np.diagonal(self.M, axis1=1, axis2=2)))
         if not own.size or not own.min():
-            return 0.0
-        return float(np.linalg.eigvalsh(self.M / own[:, :, None] / own[:, None, :]).min())
+            return True
+        try:  # as of all whose eigenvalues exceed the bound
+            np.linalg.cholesky(self.M / own[:, :, None] / own[:, None, :] - _SINGULAR * np.eye(own.shape[1]))
+        except np.linalg.LinAlgError:
+            return True
+        return False
 
 
 def passive(robot: Robot, states: RobotStates) -> Array:
@@ -72,7 +77,10 @@ def within(joint: RobotJoint, states: RobotStates) -> tuple[Array, Array]:
     return joint.position + slid @ joint.rotation.T - R @ joint.child_position, R
 
 
-def poses(robot: Robot, states: RobotStates) -> dict[str, tuple[Array, Array]]:
+Frames = dict[str, tuple[Array, Array]]
+
+
+def poses(robot: Robot, states: RobotStates) -> Frames:
     """Position of the origin and rotation of every body in the world, shapes (states, 3) and (states, 3, 3)."""
     placed = {WORLD: (np.zeros((states.count, 3)), np.broadcast_to(np.eye(3), (states.count, 3, 3)))}
     for joint in robot.joints:
@@ -105,28 +113,47 @@ class _Motion:
     alpha: Array
 
 
-def world_jacobians(robot: Robot, states: RobotStates) -> Dynamics:
-    """Formulation A."""
+def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = None) -> Dynamics:
+    """Formulation A; ``frames`` are the :func:`poses`, where they are known."""
     count, n = states.count, robot.dofs
     v = states.stacked(states.velocity, robot)
-    frames = poses(robot, states)
+    frames = poses(robot, states) if frames is None else frames
     rest = np.zeros((count, 3))
     motions = {WORLD: _Motion(np.zeros((count, 3, n)), np.zeros((count, 3, n)), rest, rest, rest)}
-    M = np.zeros((count, n, n))
-    g, c = np.zeros((count, n)), np.zeros((count, n))
     for joint in robot.joints:
-        motion = motions[joint.child] = _carried(robot, joint, motions[joint.parent], frames, v)
-        body = robot.bodies[joint.child]
-        R = frames[joint.child][1]
-        r = R @ body.com
-        Jc = motion.Jv - skew(r) @ motion.Jw
-        ac = motion.a + np.cross(motion.alpha, r) + np.cross(motion.w, np.cross(motion.w, r))
-        inertia = R @ body.inertia @ R.transpose(0, 2, 1)
-        torque = _rotate(inertia, motion.alpha) + np.cross(motion.w, _rotate(inertia, motion.w))
-        M += body.mass * Jc.transpose(0, 2, 1) @ Jc + motion.Jw.transpose(0, 2, 1) @ inertia @ motion.Jw
-        g -= body.mass * np.einsum("sij,i->sj", Jc, robot.gravity)
-        c += body.mass * np.einsum("sij,si->sj", Jc, ac) + np.einsum("sij,si->sj", motion.Jw, torque)
+        motions[joint.child] = _carried(robot, joint, motions[joint.parent], frames, v)
+    M, g, c = np.zeros((count, n, n)), np.zeros((count, n)), np.zeros((count, n))
+    if motions.keys() - {WORLD}:
+        bodies = [robot.bodies[joint.child] for joint in robot.joints]
+        mass = np.array([body.mass for body in bodies])[:, None]
+        R = np.array([frames[joint.child][1] for joint in robot.joints])  # (bodies, states, 3, 3)
+        r = R @ np.array([body.com for body in bodies])[:, None, :, None]
+        inertia = R @ np.array([body.inertia for body in bodies])[:, None] @ R.swapaxes(2, 3)
+        moving = [motions[joint.child] for joint in robot.joints]
+        Jv, Jw, w, a, alpha = (np.array([getattr(motion, name) for motion in moving]) for name in vars(moving[0]))
+        Jc = Jv - skew(r[..., 0]) @ Jw
+        ac = a + _swung(w, alpha, r[..., 0])
+        Iw, Ialpha = (np.einsum("bsij,bsj->bsi", inertia, rate) for rate in (w, alpha))
+        M = _summed(mass[..., None, None] * Jc, Jc) + _summed(inertia @ Jw, Jw)
+        g = -_summed(Jc, np.broadcast_to((mass * robot.gravity)[:, None], ac.shape)[..., None])[..., 0]
+        c = _summed(Jc, (mass[..., None] * ac)[..., None])[..., 0]
+        c += _summed(Jw, (Ialpha + _cross(w, Iw))[..., None])[..., 0]
     return Dynamics(M + np.diag(armature(robot)), g, g + c + turned_armature(robot, v))
+
+
+def _summed(one: Array, other: Array) -> Array:
+    """Sum of oneᵀ other over bodies, of arrays of shape (bodies, states, 3, any); states first."""
+    left, right = (each.swapaxes(0, 1).reshape(each.shape[1], -1, each.shape[3]) for each in (one, other))
+    total = np.zeros((one.shape[1], one.shape[3], other.shape[3]))
+    rows = max(1, _ALONE // (one.shape[3] * other.shape[3]))
+    for start in range(0, left.shape[1], rows):
+        total += left[:, start : start + rows].swapaxes(1, 2) @ right[:, start : start + rows]
+    return total
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Vector product a × b along the last axis: numpy's own takes several times longer for few vectors."""
+    return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
 
 
 def armature(robot: Robot) -> Array:
@@ -145,14 +172,12 @@ def turned_armature(robot: Robot, v: Array) -> Array:
     return torques
 
 
-def _carried(
-    robot: Robot, joint: RobotJoint, parent: _Motion, frames: dict[str, tuple[Array, Array]], v: Array
-) -> _Motion:
+def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v: Array) -> _Motion:
     (p_parent, R_parent), (p, R) = frames[joint.parent], frames[joint.child]
     r = p - p_parent
     Jv, Jw = parent.Jv - skew(r) @ parent.Jw, parent.Jw.copy()
     if joint.kind == "fixed":
-        return _Motion(Jv, Jw, parent.w, parent.a + _swung(parent, r), parent.alpha)
+        return _Motion(Jv, Jw, parent.w, parent.a + _swung(parent.w, parent.alpha, r), parent.alpha)
     columns = robot.columns[joint.name]
     rate = v[:, columns]
     if joint.kind == "free":
@@ -162,16 +187,15 @@ def _carried(
     relative = np.einsum("sij,sj->si", u, rate)
     if joint.kind == "prismatic":
         Jv[:, :, columns] = u
-        a = parent.a + _swung(parent, r) + 2 * np.cross(parent.w, relative)
+        a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * _cross(parent.w, relative)
         return _Motion(Jv, Jw, parent.w, a, parent.alpha)
     anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
     Jw[:, :, columns], Jv[:, :, columns] = u, -skew(p - anchor) @ u
-    w, alpha = parent.w + relative, parent.alpha + np.cross(parent.w, relative)
-    a = parent.a + _swung(parent, anchor - p_parent)
-    a = a + np.cross(alpha, p - anchor) + np.cross(w, np.cross(w, p - anchor))
+    w, alpha = parent.w + relative, parent.alpha + _cross(parent.w, relative)
+    a = parent.a + _swung(parent.w, parent.alpha, anchor - p_parent) + _swung(w, alpha, p - anchor)
     return _Motion(Jv, Jw, w, a, alpha)
 
 
-def _swung(motion: _Motion, r: Array) -> Array:
-    """Acceleration of a point of the body at r against that of its origin."""
-    return np.cross(motion.alpha, r) + np.cross(motion.w, np.cross(motion.w, r))
+def _swung(w: Array, alpha: Array, r: Array) -> Array:
+    """Acceleration of a point at r of a body that turns so against that of its origin."""
+    return _cross(alpha, r) + _cross(w, _cross(w, r))
