@@ -19,6 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import Mujoco
+from proofroll.engines.mujoco.reproducer.mechanism_loop import stepped
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 
 _ON_CONE = 1 - 1e-9
@@ -196,9 +197,8 @@ def _mechanism(scene: Scene, settings: Any) -> Callable[[FloatArray], FloatArray
     bodies = [model.body(body.name).id for body in mechanism_of(scene).bodies]
 
     def run(times: FloatArray) -> FloatArray:
-        for steps in _counted(times, settings.dt):
-            mujoco.mj_step(model, data, steps)
-            _check(data)
+        for _ in stepped(model, data, times.tolist()):
+            pass
         mujoco.mj_forward(model, data)
         return np.array(data.xpos[bodies])
 

@@ -1,7 +1,8 @@
 """Pinocchio without the adapter: its kinematics, dynamics and contact solver, with the cylinder's directions by hand.
 
 The models with rows are built here; the plane and its solver come from the adapter's builder. Rows with rolling run
-under scipy's DOP853, as the adapter's preset ``matched`` does.
+under scipy's DOP853, as the adapter's preset ``matched`` does. The loop of mechanisms is that of the
+reproducer's program.
 """
 
 from __future__ import annotations
@@ -18,16 +19,19 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION
+from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
+from proofroll.engines.pinocchio.reproducer.mechanism import loop_of
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
-from proofroll_benchmarks.bare.mechanisms import dop853, pinocchio_null_space
+from proofroll_benchmarks.bare.steps import dop853
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:
     """See :mod:`proofroll_benchmarks.bare`; with bounded friction the rows watch for slip, and end there."""
     if is_mechanism(scene):
-        return pinocchio_null_space(scene, settings)
+        return _mechanism(scene, settings)
     body = in_vertical_cylinder(scene)
     if settings.formulation == "contact":
         if settings.solver != "pgs":
@@ -43,6 +47,18 @@ def prepare(scene: Scene, settings: Any) -> Bare:
         1e-9,
         "the geometry is rounded otherwise, so the steps differ within their tolerance",
     )
+
+
+def _mechanism(scene: Scene, settings: Any) -> Bare:
+    mechanism_run = MechanismRun(mechanism_of(scene), settings)
+    loop, frames = loop_of(mechanism_run, settings), mechanism_run.tree.body
+
+    def run(times: FloatArray) -> FloatArray:
+        *_, last = loop.states(times.tolist())
+        loop.place(last[: loop.model.nq], last[loop.model.nq :])
+        return np.array([loop.data.oMf[frame].translation for frame in frames])
+
+    return Bare(run, 1e-11, "the same steps; sums are in another order")
 
 
 def _ball(body: RollingBall) -> Any:

@@ -23,7 +23,7 @@ from proofroll.engines.projection.geometry import geometry_of
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, Orientation, RotatingFrame
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
-from proofroll_benchmarks.bare.mechanisms import dop853, rk4
+from proofroll_benchmarks.bare.steps import dop853, rk4
 
 
 def prepare(scene: Scene, settings: Any) -> Bare:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.engine_abilities import Reproduces
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
+from proofroll.core.program_text import imported, module_text
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
@@ -190,3 +192,15 @@ def test_what_has_no_program(engine: str, options: dict[str, str], parameters: d
     kind = kind_of(engine)
     with pytest.raises(Refused, match=words):
         kind.reproducer(load_scene(CYLINDER, **parameters), resolve_settings(kind, options))
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "pinocchio"])
+def test_the_loop_of_mechanisms_stands_once(engine: str) -> None:
+    """The program holds the text of the loop by which the adapter's cost is measured, and needs the engine alone."""
+    loop = importlib.import_module(f"proofroll.engines.{engine}.reproducer.mechanism_loop")
+    kind = kind_of(engine)
+    settings = resolve_settings(kind, {"formulation": {"mujoco": "joints", "pinocchio": "null_space"}[engine]})
+    text = kind.reproducer(load_scene("four_bar"), settings)
+    assert text.startswith(module_text(loop))
+    assert "proofroll" not in text
+    assert {engine, "numpy"} <= set(imported(text.partition("\n\n")[0])) <= {engine, "numpy", "scipy"}

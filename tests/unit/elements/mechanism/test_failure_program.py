@@ -46,9 +46,9 @@ def written(engine: str, options: dict[str, Any]) -> str:
 @pytest.mark.parametrize(
     ("engine", "options", "needs"),
     [
-        ("mujoco", {"formulation": "joints", "preset": "default", "dt": 0.05}, {"mujoco", "numpy", "sys"}),
-        ("exudyn", {"formulation": "redundant", "preset": "default", "dt": 0.05}, {"exudyn", "numpy", "sys"}),
-        ("pinocchio", {"formulation": "null_space", "preset": "default", "dt": 0.1}, {"numpy", "pinocchio", "sys"}),
+        ("mujoco", {"formulation": "joints", "preset": "default", "dt": 0.05}, {"mujoco", "numpy"}),
+        ("exudyn", {"formulation": "redundant", "preset": "default", "dt": 0.05}, {"exudyn", "numpy"}),
+        ("pinocchio", {"formulation": "null_space", "preset": "default", "dt": 0.1}, {"numpy", "pinocchio", "scipy"}),
     ],
 )
 def test_a_program_shows_the_failure(tmp_path: Path, engine: str, options: dict[str, Any], needs: set[str]) -> None:
@@ -66,7 +66,7 @@ def test_a_program_shows_the_failure(tmp_path: Path, engine: str, options: dict[
 def test_equations_of_ours_ask_proofroll() -> None:
     """Where the equations that fail are this package's, the program runs them through it and says why."""
     text = written("projection", {"formulation": "dependent", "preset": "matched"})
-    assert set(imported(text)) == {"numpy", "proofroll", "sys"}
+    assert set(imported(text)) == {"numpy", "proofroll"}
     assert "Why proofroll: its equations are proofroll's." in text
 
 

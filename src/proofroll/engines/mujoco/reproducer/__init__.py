@@ -11,15 +11,22 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
-from proofroll.core.program_text import assigned
+from proofroll.core.program_text import assigned, module_text
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, normal_rate_source, wall_source
 from proofroll.elements.mechanism import Mechanism
 from proofroll.engines.mujoco.contact import Resistance
 from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
-from proofroll.engines.mujoco.reproducer import text
+from proofroll.engines.mujoco.reproducer import mechanism_loop, text
 from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
 from proofroll.engines.mujoco.start import EVALUATIONS
+
+_MECHANISM = '''
+
+def run(times):
+    """Places [m], energy [J] and how far loops are open [m] at each time."""
+    yield from followed(MODEL, PLACES, times)
+'''
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
@@ -83,7 +90,8 @@ def mechanism_source(xml: str, mechanism: Mechanism) -> str:
     """The program's part that runs a mechanism, given as MJCF whose first keyframe is the start."""
     places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
     places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
-    return text.MECHANISM.format(model=xml, places=places)
+    asks = "# Places that are followed: body, and where on it [m].\n" + assigned(PLACES=places)
+    return f'{module_text(mechanism_loop)}\n\nMODEL = """{xml}"""\n{asks}{_MECHANISM}'
 
 
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:

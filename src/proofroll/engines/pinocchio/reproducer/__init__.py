@@ -16,6 +16,11 @@ from proofroll.engines.pinocchio.reproducer import contact, rows, stepping
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
+_ADAPTIVE = """from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+from scipy.integrate import DOP853
+"""
+
 
 def source(body: RollingBall, settings: PinocchioSettings) -> str:
     """See :class:`proofroll.core.engine_abilities.Reproduces`; the settings say whether the orientation is integrated.
@@ -35,7 +40,7 @@ def source(body: RollingBall, settings: PinocchioSettings) -> str:
             numbers, program = numbers + rows.carriage(body), rows.COMPOSITE
         parts = [program, stepping.source(settings)]
         imports = "import numpy as np\nimport pinocchio as pin\n"
-        imports += ("from scipy.integrate import DOP853\n" if settings.integrator == "dop853" else "") + "\n"
+        imports += (_ADAPTIVE if settings.integrator == "dop853" else "") + "\n"
     return "".join(
         [
             imports,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
+
 from proofroll.core.program_text import assigned
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows
 from proofroll.engines.pinocchio.integrators import PATIENCE, SHORT
+from proofroll.engines.pinocchio.reproducer.mechanism_loop import steps
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 _FIXED = '''
@@ -52,22 +55,6 @@ def states(times):
                 q, v = project(q, v)
             start, done = pressed(q, v), done + 1
         yield q, v
-'''
-
-ADAPTIVE_STEPS = '''
-def steps(solver, times, accept):
-    """States at each time by scipy's DOP853, of which a step ends at each; accept may change that of the solver."""
-    for t in times:
-        solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
-        while solver.status == "running":
-            wanted, message = solver.h_abs, solver.step()
-            if message is not None:
-                raise RuntimeError(f"no step is small enough past {solver.t:g} s: {message}")
-            if solver.t == t:  # a step cut short at a sample says nothing about the next
-                solver.h_abs = max(wanted, solver.h_abs)
-            accept(solver)
-        yield solver.y
-
 '''
 
 _ADAPTIVE = '''
@@ -131,7 +118,7 @@ def run(times):
 
 def source(settings: PinocchioSettings) -> str:
     """``states(times)`` and ``run(times)`` for what a formulation defines."""
-    return (ADAPTIVE_STEPS + _ADAPTIVE if settings.integrator == "dop853" else _FIXED) + _RUN
+    return (f"\n\n{inspect.getsource(steps)}\n{_ADAPTIVE}" if settings.integrator == "dop853" else _FIXED) + _RUN
 
 
 def numbers(mechanism: BallWithRows, settings: PinocchioSettings) -> str:
