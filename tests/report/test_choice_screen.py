@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from browsing import UNDRAWN, Visit
 
+from proofroll.report.page.advice import advice
 from proofroll.report.page.choice import DECADES, ChoiceMatrix
 from proofroll.report.page.html import choice_of
 
@@ -33,7 +34,7 @@ def matrix(everything: Any) -> ChoiceMatrix:
 
 def expected(matrix: ChoiceMatrix, decade: int, forces: bool) -> list[list[list[str]]]:
     """Class and title of every cell."""
-    cells = [[matrix.cell(row, column, decade, forces) for column in matrix.columns] for row in matrix.rows]
+    cells = [[matrix.cell(row, column, 10.0**-decade, forces) for column in matrix.columns] for row in matrix.rows]
     return [[[f"cell {c.state}", c.title if c.state != "none" else ""] for c in row] for row in cells]
 
 
@@ -47,7 +48,9 @@ def test_the_slider_chooses_the_tolerance(seen: Visit, matrix: ChoiceMatrix) -> 
             slider.press("ArrowRight")
         seen.wait(f"document.getElementById('choice').dataset.at === '{decade - DECADES.start}'")
         assert seen.page.evaluate(SHOWN) == expected(matrix, decade, False)
-        assert seen.page.locator("#answer").inner_text() == matrix.answer(decade, False)
+        assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, False)
+        words = seen.page.locator("#words li").all_inner_texts()
+        assert words == [item.sentence for item in advice(matrix, 10.0**-decade, False)]
         assert slider.get_attribute("aria-valuetext") == f"1e-{decade}"
     seen.page.get_by_label("forces count, too").check()
     seen.wait(f"document.getElementById('choice').dataset.at === '{2 * len(DECADES) - 1}'")
@@ -92,9 +95,9 @@ def test_cells_lead_to_their_evidence(seen: Visit) -> None:
 def test_the_matrix_is_there_without_a_program(report_page: Path, matrix: ChoiceMatrix) -> None:
     """What is written says what the matrix says at the first tolerance: printed, and read without JavaScript."""
     text = report_page.read_text(encoding="utf-8")
-    assert matrix.answer(4, False).split(" the cheapest")[0].split("1e-4")[0] in text
+    assert matrix.answer(1e-4, False).split(" the cheapest")[0].split("1e-4")[0] in text
     table = text[text.index('id="choice"') : text.index('id="choices"')]
     for row in matrix.rows:
         for column in matrix.columns:
-            cell = matrix.cell(row, column, 4, False)
+            cell = matrix.cell(row, column, 1e-4, False)
             assert cell.state == "none" or f'class="cell {cell.state}"' in table

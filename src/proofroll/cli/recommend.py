@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.tradeoff import Over, SceneOrFile, Until, measure, question_of, ranges_of, require_observables
-from proofroll.core.errors import InputError
+from proofroll.cli.tradeoff import Over, Until, measure, question_of, ranges_of, require_observables
+from proofroll.core.errors import InputError, require_known
 
 if TYPE_CHECKING:
     from proofroll.studies.tradeoff.claims import TradeoffClaims
@@ -24,7 +24,10 @@ _PREFIXES = {"k": 1e3, "m": 1e-3, "µ": 1e-6, "\u03bc": 1e-6, "u": 1e-6, "n": 1e
 
 
 def recommend(
-    scene: SceneOrFile,
+    scenes: Annotated[
+        list[str],
+        typer.Argument(help="A scene, or a file of a trade-off; several scenes, studies or groups."),
+    ],
     quantity: Annotated[str, typer.Option(help="Observable that matters.")] = "",
     tolerance: Annotated[
         str, typer.Option(help="Largest error: 1e-3 in its unit, '1 mm', or '1 %' of its scale.")
@@ -37,6 +40,10 @@ def recommend(
     over: Over = None,
     until: Until = None,
     measure_first: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
+    forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does; from a report.")] = False,
+    report: Annotated[
+        Path | None, typer.Option(help="A report.json whose runs answer, as they do for several names.")
+    ] = None,
     out: options.Out = Path("out"),
     jobs: options.Jobs = None,
     as_json: options.Json = False,
@@ -45,7 +52,24 @@ def recommend(
 
     It chooses among models of engines; solutions of the scene's own equations (closed form, reduced, projection) are
     listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
+
+    Of several scenes, studies or groups (as loops) the runs of a report answer, OUT/report.json unless --report names
+    another: what to take for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it.
     """
+    if len(scenes) > 1 or forces or report is not None:
+        given = {
+            "--quantity": quantity,
+            "--budget": budget,
+            "--set": settings,
+            "--over": over,
+            "--until": until,
+            "--measure": measure_first,
+        }
+        for name, value in given.items():
+            if value:
+                raise InputError(name, value if value is not True else "given", "it is for one scene, without a report")
+        _from_report(scenes, tolerance, engine or [], report or out / "report.json", forces=forces, as_json=as_json)
+    (scene,) = scenes
     from proofroll.core.plugins import engine_names, parse_engine, require_engine
     from proofroll.report.tradeoff.tables import answer_lines
     from proofroll.studies.tradeoff.recommend import recommend as answered
@@ -66,6 +90,38 @@ def recommend(
     recommendation = replace(answered(study, required), not_measured=not_measured)
     options.show(recommendation, as_json, lambda: answer_lines(recommendation))
     raise typer.Exit(options.OK if recommendation.answer.choice and recommendation.affordable else options.CONTRADICTED)
+
+
+def _from_report(
+    names: list[str], tolerance: str, engines: list[str], path: Path, *, forces: bool, as_json: bool
+) -> None:
+    """Advice for several scenes from the runs of a report; exits with 1 if nothing holds the tolerance in one of them.
+
+    Raises:
+        InputError: the report has no runs of a scene, or of an engine.
+    """
+    from proofroll.report.against import EarlierReport
+    from proofroll.report.page.advice import advice
+    from proofroll.report.page.choice import ChoiceStudy, choice_matrix
+
+    lines = EarlierReport.read(path, "--report").lines
+    for name in engines:
+        require_known("--engine", name, sorted({line.engine for line in lines}), f"{path} has")
+    lines = [line for line in lines if not engines or line.engine in engines]
+    studies: dict[str, ChoiceStudy] = {}
+    for name in names:
+        found = [line for line in lines if name in {line.study, line.scene, line.group, *line.group.split()}]
+        if not found:
+            known = ", ".join(dict.fromkeys(line.group for line in lines))
+            raise InputError("scenes", name, f"{path} has none; proofroll report {name} runs it; groups there: {known}")
+        studies |= {line.study: ChoiceStudy(line.study, "") for line in found}
+    part = _tolerance(tolerance, "1").absolute(1.0)
+    matrix = choice_matrix(lines, studies)
+    advised = advice(matrix, part, forces)
+    content = {"report": str(path), "tolerance": part, "with_forces": forces, "advice": advised}
+    options.show(content, as_json, lambda: [item.sentence for item in advised])
+    single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
+    raise typer.Exit(options.OK if all(item.choice for item in single) else options.CONTRADICTED)
 
 
 def _tolerance(text: str, unit: str) -> Any:

@@ -100,8 +100,8 @@ class EarlierReport:
     lines: list[TableLine]
 
     @classmethod
-    def read(cls, path: Path) -> EarlierReport:
-        """Earlier report from its ``report.json``.
+    def read(cls, path: Path, option: str = "--against") -> EarlierReport:
+        """Earlier report from its ``report.json``, which an option of a command names.
 
         Raises:
             InputError: it cannot be read, or has no long table.
@@ -112,11 +112,9 @@ class EarlierReport:
             lines = [TableLine(**_known(dict(zip(table["columns"], row, strict=True)))) for row in table["data"]]
             return cls(path, said["date"], made["machine"], made["versions"], lines)
         except OSError as problem:
-            raise InputError("--against", path, f"cannot be read: {problem.strerror}") from None
+            raise InputError(option, path, f"cannot be read: {problem.strerror}") from None
         except (KeyError, TypeError, ValueError):
-            raise InputError(
-                "--against", path, "is no report.json with a long table; proofroll report writes one"
-            ) from None
+            raise InputError(option, path, "is no report.json with a long table; proofroll report writes one") from None
 
 
 def _known(values: dict[str, Any]) -> dict[str, Any]:

@@ -20,9 +20,11 @@ from proofroll.report.pages import packed
 DECADES = range(2, 9)
 # The one that a reader sees first.
 FIRST = 4
+# All that a reader can ask for: forces, too, and the tolerance.
+ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
 NEEDS = ("motion", "motion and forces")
 NOT_RUN = "none"
-_SEVERITY = list(Verdict)
+SEVERITY = list(map(str, Verdict))
 _WHY = {
     LimitFinding.WITHIN: "finer steps come closer",
     LimitFinding.NO_LADDER: "the closest of what was run",
@@ -40,6 +42,8 @@ class ChoiceCell(NamedTuple):
         title: the same in sentences.
         href: id of the evidence; empty: there is none.
         cost: of the slowest scene; infinite where the tolerance is not held in all, or nothing was measured.
+        name: setting and step in it; of several scenes that they have in common, or empty.
+        why: short reason why the tolerance is not held; empty: it is.
     """
 
     state: str
@@ -47,6 +51,8 @@ class ChoiceCell(NamedTuple):
     title: str
     href: str = ""
     cost: float = math.inf
+    name: str = ""
+    why: str = ""
 
 
 class ChoiceStudy(NamedTuple):
@@ -97,22 +103,23 @@ class ChoiceMatrix:
         """Names of the engines, in the order of the rows."""
         return list(dict.fromkeys(row.engine for row in self.rows))
 
-    def cell(self, row: ChoiceRow, column: ChoiceColumn, decade: int, forces: bool) -> ChoiceCell:
-        """Cell at a tolerance of ``10**-decade``."""
+    def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
+        """Cell at a tolerance, a part of the size."""
         own = [name for name in column.studies if name in row.found]
-        cells = [(self.titles[name], _cell(row.found[name], 10.0**-decade, forces)) for name in own]
+        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in own]
         return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
 
-    def answer(self, decade: int, forces: bool) -> str:
+    @property
+    def models(self) -> list[ChoiceRow]:
+        """Rows of engines' models with all their settings, without solutions of the scenes' own equations."""
+        return [row for row in self.rows if not row.setting and not row.own_equations]
+
+    def answer(self, tolerance: float, forces: bool) -> str:
         """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
-        asked = f"{NEEDS[forces]} to {number(10.0**-decade)}"
+        asked = f"{NEEDS[forces]} to {number(tolerance)}"
         said, without = [], []
         for column in (item for item in self.columns if item.whole):
-            cells = [
-                (self.cell(row, column, decade, forces), row.name)
-                for row in self.rows
-                if not row.setting and not row.own_equations
-            ]
+            cells = [(self.cell(row, column, tolerance, forces), row.name) for row in self.models]
             cell, name = min(cells, key=lambda item: item[0].cost, default=(ChoiceCell(NOT_RUN, "", ""), ""))
             if math.isfinite(cell.cost):
                 said.append(f"{column.group}: {name} ({cell.text} s/s)")
@@ -126,16 +133,15 @@ class ChoiceMatrix:
     @cached_property
     def data(self) -> str:
         """All cells at all tolerances as JSON: unlike cells once, and for each row and column their numbers."""
-        asked = list(product((False, True), DECADES))
         pool: dict[tuple[str, str, str, str], int] = {}
         grid = [
             [
-                [pool.setdefault(self.cell(row, column, at, need)[:4], len(pool)) for need, at in asked]
+                [pool.setdefault(self.cell(row, column, at, need)[:4], len(pool)) for need, at in ASKED]
                 for column in self.columns
             ]
             for row in self.rows
         ]
-        answers = [self.answer(at, need) for need, at in asked]
+        answers = [self.answer(at, need) for need, at in ASKED]
         return json.dumps({"cells": list(pool), "grid": grid, "answers": answers}, separators=(",", ":"))
 
     @property
@@ -178,19 +184,21 @@ def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
         cost, size, item = min(held, key=lambda entry: entry[:2])
         text = "✓" if math.isinf(cost) else f"{'' if item.clean else '~'}{number(cost)}"
         spent = "not timed" if math.isinf(cost) else f"{text} s of computing per simulated second"
-        return ChoiceCell(Verdict.AGREES, text, f"{item.name}: within {number(size)}, {spent}", item.href, cost)
+        title = f"{item.name}: within {number(size)}, {spent}"
+        return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.name)
     if told:
         size, item = min(told, key=lambda entry: entry[0])
         limit = item.limit(forces)
         state = Verdict.CONVERGES if limit == LimitFinding.WITHIN else Verdict.DIFFERS
-        why = _WHY[limit]
-        return ChoiceCell(state, error(size, 1), f"{item.name}: off by {error(size)}; {why}", item.href)
+        title, why = f"{item.name}: off by {error(size)}; {_WHY[limit]}", f"off by {error(size, 1)}, {_WHY[limit]}"
+        return ChoiceCell(state, error(size, 1), title, item.href, name=item.name, why=why)
     if whole:
         lacking = "no forces" if whole[0].motion is not None else "no motion"
-        return ChoiceCell(Verdict.INCOMPLETE, lacking, f"{whole[0].name}: reports {lacking}", whole[0].href)
+        title = f"{whole[0].name}: reports {lacking}"
+        return ChoiceCell(Verdict.INCOMPLETE, lacking, title, whole[0].href, why=f"reports {lacking}")
     item = found[0]
     state = item.blame or Verdict.FAILED
-    return ChoiceCell(state, str(state), f"{item.name}: {item.message}".rstrip(": "), item.href)
+    return ChoiceCell(state, str(state), f"{item.name}: {item.message}".rstrip(": "), item.href, why=str(state))
 
 
 def _joined(cells: Sequence[tuple[str, ChoiceCell]]) -> ChoiceCell:
@@ -198,8 +206,10 @@ def _joined(cells: Sequence[tuple[str, ChoiceCell]]) -> ChoiceCell:
     if len(cells) == 1:
         return cells[0][1]
     title = "; ".join(f"{name}: {cell.title}" for name, cell in cells)
-    worst = max((cell for _, cell in cells), key=lambda cell: (_SEVERITY.index(Verdict(cell.state)), cell.cost))
+    worst = max((cell for _, cell in cells), key=lambda cell: (SEVERITY.index(cell.state), cell.cost))
     held = sum(cell.state == Verdict.AGREES for _, cell in cells)
+    name = worst.name if len({cell.name for _, cell in cells}) == 1 else ""
     if held == len(cells):
-        return worst._replace(title=title)
-    return worst._replace(text=f"{held} of {len(cells)}", title=title, cost=math.inf)
+        return worst._replace(title=title, name=name)
+    why = f"{worst.why}; holds {held} of {len(cells)}"
+    return worst._replace(text=f"{held} of {len(cells)}", title=title, cost=math.inf, name=name, why=why)

@@ -18,7 +18,8 @@ from proofroll.files.json_data import plain
 from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, report_kinds
-from proofroll.report.page.choice import DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.advice import advice
+from proofroll.report.page.choice import ASKED, DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -50,6 +51,8 @@ def page(
         pictures: of the further studies, markup by name; what is not there is left out.
         replay: as the comparisons' kind of element gives it; None: the page has none.
     """
+    choice = choice_of(content)
+    words = [[item.sentence for item in advice(choice, tolerance, forces)] for forces, tolerance in ASKED]
     drawn = {
         "precision": content.precision,
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
@@ -61,7 +64,9 @@ def page(
         content=content,
         curves=curves,
         pictures=pictures,
-        choice=choice_of(content),
+        choice=choice,
+        words=words[FIRST - DECADES.start],
+        all_words=packed(json.dumps(words, ensure_ascii=False).encode("utf-8", "replace")),
         styles=[styles(comparison.rows) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
@@ -140,6 +145,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "outlines": OUTLINES,
         "decades": DECADES,
         "first_decade": FIRST,
+        "first_tolerance": 10.0**-FIRST,
         "again": _again,
         "told_hosts": told_hosts,
         "part_kinds": part_kinds(),

@@ -32,6 +32,8 @@
     const { cells, grid, answers } = JSON.parse(await unpack("choices"));
     rows.forEach((row, i) => grid[i].forEach((numbers, j) => fill(row.cells[j + 1], cells[numbers[place]])));
     answer.textContent = answers[place];
+    const words = JSON.parse(await unpack("all-words"))[place];
+    document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
     table.dataset.at = place;
   }
   slider.addEventListener("input", show);

@@ -28,7 +28,7 @@ def at(
     found = choice_matrix(lines, STUDIES)
     row = next(item for item in found.rows if (item.engine, item.setting) == ("alpha", setting))
     column = next(item for item in found.columns if item.whole and item.group == group)
-    return found.cell(row, column, decade, forces)
+    return found.cell(row, column, 10.0**-decade, forces)
 
 
 def test_a_cell_has_the_cheapest_run_that_holds_the_tolerance() -> None:
@@ -110,22 +110,22 @@ def test_the_answer_names_the_cheapest_engine_of_each_group() -> None:
     own = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
     ball = line(study="ball", group="ball rolling", error=0.1)
     found = choice_matrix([*ARM, beta, own, ball], STUDIES)
-    assert found.answer(3, False) == (
+    assert found.answer(1e-3, False) == (
         "For motion to 1e-3 the cheapest are trees: alpha joints (0.01 s/s); "
         "nothing that was run and timed holds it for ball rolling."
     )
-    assert "trees: beta joints (0.5 s/s)" in found.answer(8, False)
-    assert "motion and forces" in found.answer(3, True)
+    assert "trees: beta joints (0.5 s/s)" in found.answer(1e-8, False)
+    assert "motion and forces" in found.answer(1e-3, True)
 
 
 def test_the_data_hold_every_cell(whole: ChoiceMatrix) -> None:
     """What the page's program shows is what the matrix says, for all tolerances, with and without forces."""
     data = json.loads(whole.data)
     for index, (forces, decade) in enumerate(product((False, True), DECADES)):
-        assert data["answers"][index] == whole.answer(decade, forces)
+        assert data["answers"][index] == whole.answer(10.0**-decade, forces)
         for row, numbers in zip(whole.rows, data["grid"], strict=True):
             for column, own in zip(whole.columns, numbers, strict=True):
-                assert tuple(data["cells"][own[index]]) == whole.cell(row, column, decade, forces)[:4]
+                assert tuple(data["cells"][own[index]]) == whole.cell(row, column, 10.0**-decade, forces)[:4]
     assert len(data["cells"]) < len(whole.rows) * len(whole.columns) * 14
 
 
@@ -133,7 +133,7 @@ def test_what_was_not_run_is_empty(whole: ChoiceMatrix) -> None:
     """An engine that was not asked for a scene has a cell that says so."""
     row = next(item for item in whole.rows if item.engine == "beta")
     column = next(item for item in whole.columns if item.group == "ball rolling")
-    assert whole.cell(row, column, 4, False) == ChoiceCell(NOT_RUN, "", "not run")
+    assert whole.cell(row, column, 1e-4, False) == ChoiceCell(NOT_RUN, "", "not run")
 
 
 @pytest.fixture

@@ -1,0 +1,145 @@
+"""Advice in words: what to take for each group of scenes and each scene, what else there is, and what serves all."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from proofroll.core.number_format import counted, number
+from proofroll.report.page.choice import SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
+
+_NOTHING = "nothing that was run and timed holds it"
+
+
+@dataclass(frozen=True)
+class Advised:
+    """Advice for some scenes.
+
+    Attributes:
+        of: the group or study; ``all`` of them.
+        sentence: for a person.
+        choice: setting and step, or formulation; None: nothing holds the tolerance.
+        cost: of the choice, wall seconds per simulated second at the slowest scene; None: without a choice, or of all.
+    """
+
+    of: str
+    sentence: str
+    choice: str | None = None
+    cost: float | None = None
+
+
+def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised]:
+    """Advice for each column of the matrix, and at last over all."""
+    return [
+        *(of_column(matrix, column, tolerance, forces) for column in matrix.columns),
+        over_all(matrix, tolerance, forces),
+    ]
+
+
+def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> Advised:
+    """Cheapest that holds the tolerance, the best of each other engine beside it, and what forces change."""
+    title = column.title if column.whole else f"“{column.title}”"
+    engines = sorted(_engines(matrix, column, tolerance, forces), key=lambda item: _standing(item[1]))
+    if not engines:
+        return Advised(column.title, f"For {title} no engine was run.")
+    first, *others = engines
+    asked = f"For {title} to {number(tolerance)}{' with forces' if forces else ''}"
+    if forces and _without_forces(matrix, column):
+        return Advised(column.title, f"{asked}: forces are not judged there.")
+    said = [_other(name, cell, first[1]) for name, cell in others]
+    held = math.isfinite(first[1].cost)
+    if held:
+        said.insert(0, f"take {_named(*first)} ({first[1].text} s/s)")
+    else:
+        said = [_NOTHING, _other(*first, first[1]), *said]
+    changed = "" if forces else _with_forces(matrix, column, tolerance, first[1])
+    choice = (_named(*first), first[1].cost) if held else (None, None)
+    return Advised(column.title, f"{asked} {'; '.join(said)}.{changed}", *choice)
+
+
+def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
+    """Fewest formulations with which as many studies as possible hold the tolerance, the most useful one first."""
+    alone = [column for column in matrix.columns if len(column.studies) == 1]
+    columns = {column.studies[0]: column for column in alone}
+    costs = {
+        row.name: {
+            name: cell.cost
+            for name, column in columns.items()
+            if math.isfinite((cell := matrix.cell(row, column, tolerance, forces)).cost)
+        }
+        for row in matrix.models
+    }
+    missing = set(columns)
+    said: list[str] = []
+    chosen: list[str] = []
+    while missing and (best := max(costs, key=lambda name: _use(costs[name], missing), default="")):
+        gained = missing & costs[best].keys()
+        if not gained:
+            break
+        missing -= gained
+        chosen.append(best)
+        said.append(f"{best} {'holds it in' if not said else 'brings it to'} {len(columns) - len(missing)}")
+    asked = f"Over all, {counted(len(columns), 'studies')}, to {number(tolerance)}{' with forces' if forces else ''}"
+    left = ", ".join(matrix.titles[name] for name in columns if name in missing)
+    sentence = f"{asked}: {'; '.join(said) or _NOTHING}{f'; nothing holds it for {left}' if said and left else ''}."
+    return Advised("all", sentence, ", ".join(chosen) or None)
+
+
+def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
+    """Number of studies that a formulation adds, and how cheap it is there."""
+    gained = missing & costs.keys()
+    return len(gained), -sum(math.log(costs[name]) for name in gained if costs[name] > 0)
+
+
+def _engines(
+    matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool
+) -> list[tuple[str, ChoiceCell]]:
+    """Best formulation of each engine: the cheapest that holds the tolerance, else the one that comes closest to it."""
+    found: dict[str, tuple[str, ChoiceCell]] = {}
+    for row in matrix.models:
+        cell = matrix.cell(row, column, tolerance, forces)
+        if row.found.keys() & set(column.studies):
+            best = found.setdefault(row.engine, (row.name, cell))
+            if _standing(cell) < _standing(best[1]):
+                found[row.engine] = (row.name, cell)
+    return list(found.values())
+
+
+def _standing(cell: ChoiceCell) -> tuple[float, int]:
+    return cell.cost, SEVERITY.index(cell.state)
+
+
+def _named(name: str, cell: ChoiceCell) -> str:
+    return cell.name or name
+
+
+def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
+    """Another engine beside the cheapest: how many times its cost, or why it does not get there."""
+    if math.isfinite(cell.cost):
+        return f"{_named(name, cell)} costs {_times(cell.cost, first.cost)}"
+    return f"{name} does not get there ({cell.why})" if cell.why else f"{_named(name, cell)} holds it, not timed"
+
+
+def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, without: ChoiceCell) -> str:
+    """Sentence about forces, which were not asked for."""
+    if _without_forces(matrix, column):
+        return " Forces are not judged there."
+    name, cell = min(_engines(matrix, column, tolerance, True), key=lambda item: item[1].cost)
+    if not math.isfinite(cell.cost):
+        return " If forces count, too, nothing that was run and timed holds it."
+    if cell.cost == without.cost:
+        return " It holds the forces, too."
+    more = f", {_times(cell.cost, without.cost)}" if math.isfinite(without.cost) else ""
+    return f" If forces count, too, take {_named(name, cell)} ({cell.text} s/s{more})."
+
+
+def _without_forces(matrix: ChoiceMatrix, column: ChoiceColumn) -> bool:
+    """True if no run of the column has forces that are judged."""
+    found = (item for row in matrix.models for name in column.studies for item in row.found.get(name, ()))
+    return all(item.forces is None for item in found)
+
+
+def _times(cost: float, of: float) -> str:
+    """A cost beside another one: ``as much``, ``3.4 times that``."""
+    times = float(f"{cost / of:.2g}") if of else math.inf
+    return "as much" if times == 1 else f"{times:g} times that"

@@ -1,0 +1,75 @@
+"""``proofroll recommend`` for several scenes, from the runs of a report."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from table_lines import ARM, line
+
+from proofroll.files.json_data import plain
+from proofroll.report.long_table import LongTable
+
+Proofroll = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def report(tmp_path: Path) -> Path:
+    """A report of an arm and of a ball, which only one engine holds."""
+    ball = [
+        line(study="ball", scene="ball", group="ball rolling", error=0.1),
+        line(study="ball", scene="ball", group="ball rolling", engine="beta", error=1e-7, cost=0.7),
+    ]
+    made = {"environment": {"machine": "m", "versions": {}}, "date": "2026-01-01"}
+    file = tmp_path / "report.json"
+    file.write_text(json.dumps(made | {"table": plain(LongTable([*ARM, *ball]))}))
+    return file
+
+
+def test_several_scenes_are_advised_from_a_report(proofroll: Proofroll, report: Path) -> None:
+    """By study, scene or group: a choice for each and over all, in the folder of results or where it is named."""
+    code, out, err = proofroll("recommend", "arm", "rolling", "--tolerance", "1e-3", "--report", str(report), "--json")
+    assert (code, err) == (0, "")
+    content = json.loads(out)
+    assert content["tolerance"] == 1e-3
+    assert [item["of"] for item in content["advice"]] == ["trees", "ball rolling", "all"]
+    assert [item["choice"] for item in content["advice"]] == [
+        "alpha joints default at dt 1e-3 s", "beta joints default at dt 1e-3 s", "alpha joints, beta joints",
+    ]  # fmt: skip
+    code, out, _ = proofroll("recommend", "arm", "ball", "--tolerance", "0.1 %", "--out", str(report.parent))
+    assert code == 0
+    assert "Over all, 2 studies, to 1e-3: alpha joints holds it in 1; beta joints brings it to 2." in " ".join(
+        out.split()
+    )
+
+
+def test_forces_and_engines_of_several_scenes(proofroll: Proofroll, report: Path) -> None:
+    """Forces count where they are asked for; among some engines nothing may hold it, which is exit code 1."""
+    given = ("--report", str(report), "--tolerance", "1e-3")
+    code, out, _ = proofroll("recommend", "arm", "--forces", *given)
+    assert code == 0
+    assert "with forces take alpha joints tuned" in " ".join(out.split())
+    code, out, _ = proofroll("recommend", "arm", "ball", "--engine", "alpha", *given)
+    assert code == 1
+    assert "nothing holds it for ball" in " ".join(out.split())
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["arm", "cart"], "proofroll report cart runs it"),
+        (["arm", "ball", "--measure"], "--measure"),
+        (["arm", "ball", "--engine", "nobody"], "nobody"),
+        (["arm", "ball", "--tolerance", "1 mm"], "1 mm"),
+    ],
+)
+def test_what_a_report_cannot_answer_is_one_line(
+    proofroll: Proofroll, report: Path, more: list[str], words: str
+) -> None:
+    """A scene or an engine that it has not, an option of measured curves, a tolerance with a unit."""
+    code, out, err = proofroll("recommend", "--report", str(report), "--tolerance", "1e-3", *more)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert len(err.splitlines()) <= 2

@@ -1,0 +1,68 @@
+"""Advice in words: what to take, what else there is, what forces change, and what serves all."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from table_lines import ARM, FORCE, LINE, line
+
+from proofroll.report.long_table import TableLine
+from proofroll.report.page.advice import advice
+from proofroll.report.page.choice import ChoiceStudy, choice_matrix
+
+STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}", [""]) for number, name in enumerate(("arm", "chain"))}
+BETA = line(engine="beta", row=3, error=1e-9, cost=0.5)
+WRONG = line(engine="gamma", row=4, error=2e-2, cost=0.3, limit="another limit", verdict="differs")
+MUTE = line(engine="delta", row=5, error=None, cost=None, status="refused", message="no loops", verdict="refused")
+
+
+def said(lines: list[TableLine], tolerance: float, forces: bool = False) -> list[str]:
+    """The sentences."""
+    return [item.sentence for item in advice(choice_matrix(lines, STUDIES), tolerance, forces)]
+
+
+def test_each_engine_is_told_beside_the_cheapest() -> None:
+    """The choice with its step, another with how many times its cost, and those that never get there with why."""
+    one = said([*ARM, BETA, WRONG, MUTE], 1e-3)[0]
+    assert one == (
+        "For trees to 1e-3 take alpha joints default at dt 1e-3 s (0.01 s/s); "
+        "beta joints default at dt 1e-3 s costs 50 times that; "
+        "delta joints does not get there (refused); "
+        "gamma joints does not get there (off by 0.02, its limit of small steps is another). "
+        "If forces count, too, take alpha joints tuned at dt 1e-3 s (0.2 s/s, 20 times that)."
+    )
+
+
+def test_the_choice_is_told_apart_from_its_sentence() -> None:
+    """Name and cost are there for a program; where nothing holds it there are none."""
+    found = advice(choice_matrix([LINE], STUDIES), 1e-3, False)[0]
+    assert (found.of, found.choice, found.cost) == ("trees", "alpha joints default at dt 1e-3 s", 0.01)
+    assert advice(choice_matrix([LINE], STUDIES), 1e-7, False)[0].choice is None
+
+
+def test_where_nothing_holds_it_the_closest_is_named() -> None:
+    """Nothing is advised; what comes closest says by how much it misses."""
+    one = said([LINE, FORCE], 1e-5)[0]
+    assert one.startswith("For trees to 1e-5 nothing that was run and timed holds it; alpha joints does not get there")
+    assert "off by 5e-4, finer steps come closer" in one
+    assert one.endswith("If forces count, too, nothing that was run and timed holds it.")
+
+
+def test_forces_are_told_where_they_change_nothing_or_are_never_given() -> None:
+    """The same choice, or none of whom forces are known."""
+    exact = replace(FORCE, error=1e-9)
+    assert said([LINE, exact], 1e-3)[0].endswith("It holds the forces, too.")
+    assert said([LINE], 1e-3)[0].endswith("Forces are not judged there.")
+    assert said([LINE], 1e-3, forces=True)[0] == "For trees to 1e-3 with forces: forces are not judged there."
+    assert "with forces" in said([LINE, exact], 1e-3, forces=True)[0]
+
+
+def test_over_all_few_formulations_cover_what_can_be_covered() -> None:
+    """The one that holds most studies first, then what adds to it; studies without any are named."""
+    chain = [replace(item, study="chain", scene="chain") for item in (LINE, BETA)]
+    assert said([*ARM, *chain], 1e-3)[-1] == "Over all, 2 studies, to 1e-3: alpha joints holds it in 2."
+    assert said([*ARM, *chain], 1e-6)[-1] == (
+        "Over all, 2 studies, to 1e-6: alpha joints holds it in 1; beta joints brings it to 2."
+    )
+    coarse = replace(LINE, study="chain", scene="chain")
+    assert said([*ARM, coarse], 1e-6)[-1].endswith("alpha joints holds it in 1; nothing holds it for A chain.")
