@@ -123,6 +123,10 @@ REAL: list[tuple[str, str, str, set[str]]] = [
         "pinocchio",
         {"tree_read_again"},
     ),
+    *[
+        ("two worlds, geared", text.replace("<actuator>", FLOOR), "pinocchio", {"tree_read_again"})
+        for text in (mjcf(joint='armature="0.2"'), mjcf(second=TWO.replace("<joint", '<joint armature="0.2"')))
+    ],
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "mujoco", set()),
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "exudyn", set()),
     ("hidden shape", mjcf(shape=HIDDEN), "pinocchio", {"noncolliding_shapes_weightless"}),

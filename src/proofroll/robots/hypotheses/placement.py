@@ -66,7 +66,10 @@ def first_tree_only(evidence: RobotEvidence) -> Robot | None:
 
 @hypothesis({"pinocchio": "4.1.0"}, "write one <worldbody>; of a scene.xml read the robot's own file")
 def tree_read_again(evidence: RobotEvidence) -> Robot | None:
-    """The first tree is read once for every <worldbody>: its masses are added again, with joints that carry nothing."""
+    """The first tree is read once for every <worldbody>: its masses are added again, with joints that carry nothing.
+
+    Of these the ones that share a body with others keep their armature.
+    """
     robot, file = evidence.robot, evidence.file
     times = sum(1 for _ in file.root.iter("worldbody"))
     if file.kind != "mjcf" or times < 2:
@@ -79,8 +82,14 @@ def tree_read_again(evidence: RobotEvidence) -> Robot | None:
     for name, joint in ((joint.name, joint) for joint in robot.moving):
         for again in (f"{name} ({number})" for number in range(2, times + 1)):
             bodies[again] = RobotBody(again, 0.0, np.zeros(3), np.zeros((3, 3)))
-            joints.append(dataclasses.replace(joint, name=again, parent=WORLD, child=again))
+            kept = joint.armature if _one_of_several(joint, robot) else 0.0
+            joints.append(dataclasses.replace(joint, name=again, parent=WORLD, child=again, armature=kept))
     return robot.change(bodies=bodies, joints=tuple(joints))
+
+
+def _one_of_several(joint: RobotJoint, robot: Robot) -> bool:
+    """True if the joint's body in the file has others: bodies without mass, ``name/0``, lie between them."""
+    return joint.parent.rpartition("/")[0] == joint.child or joint.child.rpartition("/")[0] in robot.bodies
 
 
 @hypothesis({"pybullet": "3.2.7"}, "give the root link a mass")
