@@ -79,7 +79,7 @@ def recommend(
     require_observables(question, [question.quantity])  # before minutes are spent on measuring
     for text in engine or []:
         require_engine(parse_engine(text).name)
-    unit = question.loaded().observables[question.quantity].unit
+    unit = question.loaded.observables[question.quantity].unit
     required = Requirements(
         question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ())
     )

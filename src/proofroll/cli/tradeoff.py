@@ -87,7 +87,7 @@ def question_of(
 
 def require_observables(question: Question, names: list[str]) -> None:
     """Refuses what no run of the scene can be asked for."""
-    scene = question.loaded()
+    scene = question.loaded
     for name in names:
         scene.observable(name)
 

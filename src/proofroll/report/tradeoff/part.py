@@ -110,7 +110,7 @@ class TradeoffPart(Part):
         """Lines of each error of each point, without verdicts: the choice of a tolerance judges them."""
         study = self.study
         assert study is not None  # it was made
-        scene = self.asked.swept.loaded()
+        scene = self.asked.swept.loaded
         group, place = group_of(scene), point_name(study.parameters)
         limits = {(item.curve, item.quantity): _limit(item) for item in study.budgets}
         found = []

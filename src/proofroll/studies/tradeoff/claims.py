@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +46,7 @@ class TradeoffClaims:
     holds: list[Holds] = field(default_factory=list)
     converges: list[Converges] = field(default_factory=list)
 
-    @property
+    @cached_property
     def swept(self) -> Question:
         """Question that is swept."""
         return Question(self.scene, self.parameters, self.until, self.quantity)
@@ -100,8 +101,7 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
 
 def _check(where: str, found: TradeoffClaims) -> None:
     bounded("until", found.until, above=0)
-    scene = load_scene(found.scene, **found.parameters)
-    unit = scene.observable(found.quantity, f"{where}: quantity").unit
+    unit = found.swept.loaded.observable(found.quantity, f"{where}: quantity").unit
     if not (found.cheapest or found.holds or found.converges):
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
         raise InputError(f"{where}: cheapest", "nothing", advice)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -61,8 +62,9 @@ class Question:
         """Step of several sampling intervals [s], without digits that multiplying leaves (0.005000000000000001)."""
         return float(f"{self.every * factor:.12g}")
 
+    @cached_property
     def loaded(self) -> Scene:
-        """The scene with these parameters."""
+        """The scene with these parameters, read when it is first asked for."""
         return load_scene(self.scene, **self.parameters)
 
     def case(self, scene: Scene, facts: EngineFacts, every: float, time_limit: float = STUDY_TIME_LIMIT) -> Case:

@@ -169,7 +169,7 @@ def _run(
     progress: Progress | None,
 ) -> None:
     """Runs curves with steps or tolerances, and the truths that they need besides those that are there."""
-    scene = question.loaded()
+    scene = question.loaded
     options: list[tuple[str, dict[str, Any]]] = []
     for curve, value in wanted:
         facts = curve.facts

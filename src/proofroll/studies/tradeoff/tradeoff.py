@@ -106,7 +106,7 @@ def tradeoff(
         InputError: something that does not exist, or a quantity that the scene does not have.
         Missing: no engine can be asked.
     """
-    scene = question.loaded()
+    scene = question.loaded
     scene.observable(question.quantity)
     curves, absent = curves_of(engines, runner.workers, scene.requires)
     if not curves:
@@ -162,7 +162,7 @@ def _check(found: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[
     for values in itertools.product(*found.over.values()):
         place = dict(zip(found.over, values, strict=True))
         question = dataclasses.replace(found.question, parameters={**found.question.parameters, **place})
-        scene = question.loaded()
+        scene = question.loaded
         runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
         intervals = {case.every for both in runs.values() for case in both}
         truths = {every: question.case(scene, truth, every) for every in intervals}
@@ -207,7 +207,7 @@ def pareto_entries(curves: Iterable[Curve], quantity: str) -> list[tuple[CurvePo
 
 def stored(folder: Path, question: Question, engines: Sequence[str] = (), *, brief: bool = False) -> Path:
     """File of a question's study below the folder of results; a brief or restricted one has its own."""
-    scene = question.loaded()
+    scene = question.loaded
     parts = [[scene.digest, question.until], *([sorted(engines)] if engines else [])]
     digests = (hashlib.sha256(json.dumps(part).encode()).hexdigest()[:10] for part in parts)
     return folder / "tradeoff" / f"{'-'.join([scene.name, *digests])}{'-brief' if brief else ''}.json"

@@ -9,18 +9,17 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from proofroll.core.dataset import observe, scales
+from proofroll.core.dataset import observe
 from proofroll.core.observable import Role
 from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import Verdict
-from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
-from proofroll.running.case import Result, Status
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
-from proofroll.studies.comparison.outcome import Run
-from proofroll.studies.comparison.planning import Plan, point_name
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import point_name
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,9 +121,7 @@ class CaseDifference:
     changed: list[str]
 
 
-def case_difference(
-    item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner
-) -> CaseDifference:
+def case_difference(outcome: Outcome, before: Run, after: Run, runner: Runner) -> CaseDifference:
     """One case in both versions."""
     verdicts = [
         (one.observable, one.verdict, other.verdict)
@@ -146,13 +143,13 @@ def case_difference(
         if abs(one.order - other.order) > _ANOTHER_ORDER
     ]
     return CaseDifference(
-        comparison=item.comparison.name,
-        scene=item.comparison.scene,
+        comparison=outcome.comparison.name,
+        scene=outcome.comparison.scene,
         setting=setting_of(before),
         point=point_name(before.parameters),
         old=RunInVersion.of(before),
         new=RunInVersion.of(after),
-        numbers=_numbers(item, before, after, results, runner),
+        numbers=_numbers(outcome, before, after, runner),
         orders=orders,
         changed=changed,
     )
@@ -162,15 +159,13 @@ def _ending(run: Run) -> str:
     return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
 
 
-def _numbers(item: Plan, before: Run, after: Run, results: Mapping[str, Result], runner: Runner) -> NumbersApart | None:
+def _numbers(outcome: Outcome, before: Run, after: Run, runner: Runner) -> NumbersApart | None:
     """Difference of the trajectories; None: there are none."""
     if before.case is None or after.case is None or not before.result.trajectory or not after.result.trajectory:
         return None
-    one, other = (read(runner.store.trajectory(run.case)) for run in (before, after) if run.case is not None)
-    scene = load_scene(item.comparison.scene, **before.parameters)
-    truth = item.truths[point_name(before.parameters)]
-    sizes = scales(scene, read(runner.store.trajectory(truth))) if results[truth.key].trajectory else {}
-    return _apart(scene, one, other, sizes)
+    one, other = (read(runner.store.trajectory(case)) for case in (before.case, after.case))
+    point = outcome.points[point_name(before.parameters)]
+    return _apart(point.scene, one, other, point.reference.sizes if point.reference else {})
 
 
 def _apart(scene: Scene, one: xr.Dataset, other: xr.Dataset, sizes: Mapping[str, float]) -> NumbersApart:

@@ -17,8 +17,8 @@ from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import Interval, interleaved, ratio
 from proofroll.studies.comparison.compare import evaluate
-from proofroll.studies.comparison.outcome import Run
-from proofroll.studies.comparison.planning import Plan, plan
+from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.planning import plan
 from proofroll.studies.versions.difference import (
     CaseDifference,
     NumberKind,
@@ -27,9 +27,6 @@ from proofroll.studies.versions.difference import (
     case_difference,
     setting_of,
 )
-
-# Rounds of timing: with twelve one estimate moved by 5 % between series, with twenty the interval is some 4 % wide.
-ROUNDS = 20
 
 Progress = Callable[[str], None]
 
@@ -112,7 +109,7 @@ def compared(
     sides: tuple[str, str],
     comparisons: Sequence[Comparison],
     runner: Runner,
-    rounds: int = ROUNDS,
+    rounds: int,
     progress: Progress | None = None,
 ) -> VersionsStudy:
     """The same cases in two versions of an engine, the old and the new ``NAME`` or ``NAME@PLACE``, and what changed.
@@ -127,12 +124,12 @@ def compared(
     plans = [plan(dataclasses.replace(item, timed=False), sides, runner.workers) for item in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
     results = runner.run(cases.values(), lambda case, _: progress(case.engine.name))
-    pairs: list[tuple[Plan, Run, Run]] = []
+    pairs: list[tuple[Outcome, Run, Run]] = []
     for item in plans:
-        runs = evaluate(item, results, runner).runs
-        one, other = ([run for run in runs if parse_engine(run.row.engine).name == side] for side in sides)
-        pairs += [(item, before, after) for before, after in zip(one, other, strict=True)]
-    differences = [case_difference(item, before, after, results, runner) for item, before, after in pairs]
+        outcome = evaluate(item, results, runner)
+        one, other = ([run for run in outcome.runs if parse_engine(run.row.engine).name == side] for side in sides)
+        pairs += [(outcome, before, after) for before, after in zip(one, other, strict=True)]
+    differences = [case_difference(outcome, before, after, runner) for outcome, before, after in pairs]
     speeds = _speeds(pairs, runner, rounds, progress) if rounds else {}
     old, new = (EngineVersion(name, its.version, its.interpreter) for name, its in zip(sides, told, strict=True))
     return VersionsStudy(
@@ -190,13 +187,13 @@ def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Inte
 
 
 def _speeds(
-    found: Sequence[tuple[Plan, Run, Run]], runner: Runner, rounds: int, progress: Progress
+    found: Sequence[tuple[Outcome, Run, Run]], runner: Runner, rounds: int, progress: Progress
 ) -> dict[tuple[str, str], Interval]:
     """Time of the new version over that of the old one, for the first point of each setting that both run."""
     chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
-    for item, before, after in found:
+    for outcome, before, after in found:
         if before.result.status == after.result.status == Status.DONE:
-            chosen.setdefault((item.comparison.name, setting_of(before)), (before, after))
+            chosen.setdefault((outcome.comparison.name, setting_of(before)), (before, after))
     speeds = {}
     with Stopwatch(runner.workers) as watch:
         for key, (before, after) in chosen.items():
