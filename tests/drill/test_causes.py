@@ -9,6 +9,7 @@ import pytest
 
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import changed
+from proofroll_drill.mutants import mechanism_models as models
 from proofroll_drill.mutants import mechanism_numbers as numbers
 from proofroll_drill.mutants import mechanism_samples as samples
 from proofroll_drill.mutants.base import Mutant
@@ -36,6 +37,13 @@ def test_a_number_that_is_read_back_is_the_cause(kind: type[Mutant]) -> None:
 @pytest.mark.parametrize("kind", REACTIONS)
 def test_reactions_that_are_told_wrongly_at_time_0_are_named(kind: type[Mutant]) -> None:
     """The certificate's forces and moments show sign, axes, joint and point, in trees and in loops."""
+    found = tried(kind)
+    assert found.named, found.said
+
+
+@pytest.mark.parametrize("kind", [models.TiltedAxis, samples.CentreVelocity, samples.Unnormalised])
+def test_what_the_first_steps_or_the_end_of_a_run_tell_is_named(kind: type[Mutant]) -> None:
+    """An axis that the first turning shows, velocities of the centres of mass, and quaternions that grow are named."""
     found = tried(kind)
     assert found.named, found.said
 

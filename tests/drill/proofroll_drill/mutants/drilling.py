@@ -102,7 +102,7 @@ def tried(kind: type[Mutant]) -> Mutated:
     engine = kind.build(scene, settings)
     certificate = certificate_of(kind, engine, scene, settings)
     lines = [line.as_dict() for line in certificate]
-    by = first_difference(certificate) or ""
+    by, ended = first_difference(certificate) or "", ""
     if by:
         causes = diagnosed(scene, lines, step=STEP)
     else:
@@ -112,14 +112,14 @@ def tried(kind: type[Mutant]) -> Mutated:
             return Mutated(kind.fault, kind.__name__, scene.name, True, str(error), False, "")
         judgements = judged(reference, recording.dataset)
         wrong = [item for item in judgements if item.verdict == Verdict.DIFFERS]
-        by = recording.failure or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
+        ended = recording.failure or ""  # which says why
+        by = ended or "; ".join(f"{item.observable} {item.reason.partition(';')[0]}" for item in wrong[:2])
         causes = diagnosed(scene, lines, recording.dataset, reference.dataset, STEP, judgements) if by else []
-    said = "; ".join(item.sentence for item in causes)
+    said = "; ".join(item.sentence for item in causes) or ended
     # The first cause, and what looks the same from outside, are the answer; what is said after it does not count.
     answer = " ".join(item.sentence for item in causes[:1] + [item for item in causes[1:] if item.cause.alternative])
-    return Mutated(
-        kind.fault, kind.__name__, scene.name, bool(by), by, any(word in answer for word in kind.named), said
-    )
+    named = any(word in (answer or ended) for word in kind.named)
+    return Mutated(kind.fault, kind.__name__, scene.name, bool(by), by, named, said)
 
 
 def judged(reference: Reference, dataset: Any) -> list[Judgement]:

@@ -158,7 +158,7 @@ class Unnormalised(ToldMechanism):
 
     fault = "quaternion not normalised"
     scene = TOP
-    named = ("not of unit length",)
+    named = ("q_WB has length",)
 
     def misreport(self, sample: MechanismSample) -> MechanismSample:
         """Quaternions that grow by a twentieth per second."""

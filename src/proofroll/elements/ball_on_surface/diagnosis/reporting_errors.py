@@ -17,6 +17,7 @@ from proofroll.core.diagnosis.samples import (
     another_clock,
     at_start,
     both,
+    forced_otherwise,
     reported_quaternions,
     reported_vectors,
     single_precision_run,
@@ -91,6 +92,8 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
     known = np.all(np.isfinite(said) & np.isfinite(true), axis=-1)
     own = {name: frame[known] for name, frame in axes.items()}
     told = Reported("force", _FORCE, "N", said[known], true[known], time[known], own).after_start()
+    if forced_otherwise(evidence, told):
+        return
     yield _friction_reversed(told, own[SURFACE][-len(told.true) :, :, 0])
     yield from told.causes(evidence.step)
 

@@ -13,7 +13,12 @@ from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_ea
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
 from proofroll.elements.mechanism.diagnosis.reporting_errors import REPORTING_ERRORS
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, GIVEN, residuals_of
-from proofroll.elements.mechanism.diagnosis.structure import loop_lacks_row, lost_coupling, other_axis
+from proofroll.elements.mechanism.diagnosis.structure import (
+    axis_of_first_steps,
+    loop_lacks_row,
+    lost_coupling,
+    other_axis,
+)
 
 GRAVITY = any_gravity(
     residuals_of,
@@ -27,6 +32,7 @@ HYPOTHESES: tuple[Any, ...] = (
     reactions_at_start,
     BUILT,
     other_axis,
+    axis_of_first_steps,
     *FACTORS_OF_ALL,
     of_each_body,
     of_each_joint,

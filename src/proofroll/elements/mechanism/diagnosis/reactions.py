@@ -14,7 +14,7 @@ from scipy.optimize import linear_sum_assignment
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.samples import both
+from proofroll.core.diagnosis.samples import both, forced_otherwise
 from proofroll.core.diagnosis.vectors import Reported, product
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 from proofroll.elements.mechanism.diagnosis.reporting_errors import BODY
@@ -132,7 +132,8 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
     said, true = ({kind: _stacked(data, kind, names) for kind, _, _ in _KINDS} for data in (run, truth))
     bars = {kind: _bar(truth, f"{kind}s") for kind, _, _ in _KINDS}
     for each in _reactions(evidence, placed_of(evidence.element.mechanism, truth), said, true, bars):
-        yield from each.causes(evidence.step)
+        if not forced_otherwise(evidence, each.reported):
+            yield from each.causes(evidence.step)
 
 
 @hypothesis(

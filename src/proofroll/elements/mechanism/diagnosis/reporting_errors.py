@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.diagnosis import Cause, Evidence
+from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
+from proofroll.core.diagnosis.lines import DERIVED, differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
     at_start,
@@ -58,6 +59,31 @@ def _of_centres(told: Reported, evidence: Evidence) -> Iterator[Cause]:
     yield told.cause("centre of mass", says, told.true + shift[-len(told.true) :], "give the origins of the frames")
 
 
+@hypothesis(
+    "centres of mass at time 0",
+    "the scene's own vectors at time 0, of the centres of mass, are those of the certificate",
+)
+def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
+    """Positions, velocities or accelerations at time 0 are those of the centres of mass; nothing else differs."""
+    element, wrong = evidence.element, {line["quantity"]: line for line in differing(evidence.lines)}
+    com, start = np.array([body.com for body in element.mechanism.bodies]), element.start
+    w, turning = start.w_WB[0], element.first_motion.angular_acceleration
+    arm = np.einsum("nij,nj->ni", start.R_WB[0, :-1], com)
+    acceleration = np.cross(turning, arm) + np.cross(w, np.cross(w, arm))
+    shifts = {"position": arm, "velocity": np.cross(w, arm), "acceleration": acceleration}
+    shifts[f"acceleration{DERIVED}"] = acceleration
+    said = {"position": "p_WB is the position", "velocity": "v_WB is the velocity"}
+    said |= {"acceleration": "the acceleration is that", f"acceleration{DERIVED}": said["velocity"]}
+    if set(wrong) - shifts.keys():
+        return
+    for name, line in wrong.items():
+        off = np.reshape(line["found"], (-1, 3)) - np.reshape(line["expected"], (-1, 3))
+        if off.shape == arm.shape:
+            says = f"{said[name]} of the centres of mass, not of the origins of the bodies' frames"
+            proof = f"{name} at time 0", str(line["unit"]), apart(off, 0 * off), apart(off, shifts[name])
+            yield Cause("centre of mass", says, *proof, "give the origins of the frames")
+
+
 def _size(element: Any, name: str) -> float:
     """Scale of a quantity of a mechanism, from its length and natural time."""
     length, time = element.length, element.natural_time
@@ -74,6 +100,7 @@ REPORTING_ERRORS: tuple[Any, ...] = (
     CLOCK,
     reported_vectors(_UNITS, _frames, CLOCK, _size, _of_centres),
     at_start(_axes_at_start, frozenset()),
+    centres_at_start,
     reported_quaternions(_attitudes),
     single_precision_run,
 )

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.lines import differing
+from proofroll.core.diagnosis.lines import DERIVED, differing, scale_of
 from proofroll.core.diagnosis.samples import both
+from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
+
+_REMEDY = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
+# Lines of the certificate that follow from the joints' axes.
+_OF_AXES = {
+    "forces", "torques", "acceleration", "angular acceleration", f"acceleration{DERIVED}",
+    f"angular acceleration{DERIVED}",
+}  # fmt: skip
 
 
 @hypothesis("joint axis", "seen from the parent, the child turns about one direction throughout, which is not the axis")
@@ -37,10 +48,9 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
         before, after = (float(np.max(np.linalg.norm(seen - np.outer(seen @ n, n), axis=-1))) for n in (axis, own))
         if above_round_off(before, float(np.max(np.abs(seen)))) and _turns_about(placed, parent, child, own, axis):
             says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
-            remedy = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
             covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
             what = (f"turning of {joint.name} across its axis", "rad/s", before, after)
-            yield Cause(f"axis of {joint.name}", says, *what, remedy, 2, covered)
+            yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered)
 
 
 def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis: FloatArray) -> bool:
@@ -63,12 +73,78 @@ def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
         both = f"({_shown(found[i])}) in the world, not ({_shown(expected[i])})"
         says = f"the joint {joint.name} was built with the axis {both}"
         after = float(np.max(np.delete(off, i), initial=0.0))
-        remedy = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
-        yield Cause("joint axis", says, "joint axes at time 0", "1", float(np.max(off)), after, remedy, 0, ("motion",))
+        yield Cause("joint axis", says, "joint axes at time 0", "1", float(np.max(off)), after, _REMEDY, 0, ("motion",))
+
+
+@hypothesis(
+    "joint axis at time 0",
+    "the child's first turning tells the axis; a mechanism with that axis has the other accelerations and reactions",
+)
+def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
+    """A joint sets off about another axis than the scene's, in the pose that the scene has."""
+    lines, element = {str(line["quantity"]): line for line in evidence.lines}, evidence.element
+    wrong = {str(line["quantity"]) for line in differing(evidence.lines)}
+    turning = lines.get(f"angular acceleration{DERIVED}")
+    if not wrong or wrong - _OF_AXES or turning is None or not turning["found"]:
+        return
+    start, mechanism = element.start, element.mechanism
+    rate, w = np.vstack([np.reshape(turning["found"], (-1, 3)), np.zeros(3)]), start.w_WB[0]
+    for index, joint in enumerate(mechanism.joints):
+        if joint.kind != "revolute":
+            continue
+        parent, child = (mechanism.body_index[name] for name in (joint.parent, joint.child))
+        above = np.zeros(3) if parent == len(w) else w[parent]
+        R_P, R_C = start.R_WB[0, parent], start.R_WB[0, child]
+        own = R_P.T @ (rate[child] - rate[parent] - np.cross(above, w[child] - above))
+        size = float(np.linalg.norm(own))
+        if not size:
+            continue
+        axis = joint.parent_frame[:, 2]
+        own = own / size * np.sign(own @ axis or 1.0)
+        other = replace(
+            joint,
+            axis=tuple(R_C.T @ R_P @ own),
+            orientation=tuple(Rotation.from_matrix(R_P.T @ R_C).as_euler("xyz")),
+            q0=(0.0,),
+            rest=joint.rest - joint.q0[0],
+        )
+        joints = (*mechanism.joints[:index], other, *mechanism.joints[index + 1 :])
+        try:
+            expected = _first(type(element)(replace(mechanism, joints=joints)))
+        except InputError:  # its loops do not close
+            continue
+        before, after = (_apart(lines, each) for each in ({}, expected))  # in tolerances
+        seen = before > 1
+        left = float(np.max((after / np.where(seen, before, 1.0))[seen], initial=0.0))
+        says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
+        largest = float(np.max(before))
+        what = ("first motion and reactions, in tolerances,", "1", largest, left * largest)
+        covered = ("motion", *COVERED)
+        yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, explains=int(np.sum(seen)))
+
+
+def _first(element: Any) -> dict[str, FloatArray]:
+    """Lines that follow from a mechanism's axes."""
+    found, wrench = element.first_motion, element.first_wrench
+    said = {"acceleration": found.acceleration, "angular acceleration": found.angular_acceleration}
+    return {"forces": wrench[:, :3], "torques": wrench[:, 3:], **said} | {
+        f"{name}{DERIVED}": values for name, values in said.items()
+    }
+
+
+def _apart(lines: Mapping[str, Mapping[str, Any]], expected: Mapping[str, FloatArray]) -> FloatArray:
+    """Differences of all that hangs on axes from what is expected, or from the scene, each by its line's tolerance."""
+    parts = [np.zeros(1)]
+    for name in sorted(_OF_AXES & lines.keys()):
+        line = lines[name]
+        if line["found"] and line["difference"]:
+            off = np.subtract(line["found"], np.ravel(expected.get(name, line["expected"])))
+            parts.append(np.abs(np.nan_to_num(off)) / scale_of(line) / line["tolerance"])
+    return np.concatenate(parts)
 
 
 def _shown(vector: FloatArray) -> str:
-    return ", ".join(f"{x:.4g}" for x in vector)
+    return ", ".join(f"{x:.4g}" for x in np.round(vector, 9) + 0.0)  # not -0
 
 
 # Part of the mechanism's size from which on a loop is open, and part of inertia and loads that balances.
