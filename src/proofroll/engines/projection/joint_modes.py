@@ -157,28 +157,12 @@ class SwitchedMotion:
 
     def _crossing(self, k: int, kind: str) -> tuple[float, int, str]:
         """Time just after a mode ended within the last step, with that mode's joint and end."""
-        stepper = self._stepper
-        begun, low, high = stepper.t_before, stepper.t_before, stepper.t
 
-        def excess(t: float) -> float:
-            return next(each[2] for each in self._excess(stepper.inside(t)) if each[:2] == (k, kind))
+        def margin(x: Array) -> float:
+            return -next(excess for joint, end, excess, _ in self._excess(x) if (joint, end) == (k, kind))
 
-        width = _ULPS * float(np.spacing(high))
-        while high - low > width and excess(low) >= 0:  # a slip starts with none, a rebound at the stop
-            middle = 0.5 * (low + high)
-            if excess(middle) < 0:
-                low = middle
-                break
-            high = middle
-        if high - begun <= width:
-            return begun, k, kind
-        from scipy.optimize import brentq
-
-        root = float(brentq(excess, low, high, xtol=width, rtol=4 * np.finfo(float).eps))
-        while root < high and excess(root) <= 0:
-            root = min(high, root + width)
-            width *= 2
-        return root, k, kind
+        now = self._stepper.t
+        return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1], k, kind
 
     def _switch(self, t: float, k: int, kind: str) -> None:
         stepper, joint = self._stepper, self._joints[k]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -70,6 +70,34 @@ class Stepper(ABC):
     @abstractmethod
     def inside(self, t: float) -> FloatArray:
         """The state at a time [s] within the last step."""
+
+    def crossing(self, margin: Callable[[FloatArray], float], high: float, width: float) -> tuple[float, float]:
+        """Times [s] within the last step before and after a margin of the state became negative.
+
+        Args:
+            margin: negative at the time ``high``. One that starts at zero and rises first (a slip starts with none, a
+                rebound at its stop) is followed to where it comes back.
+            high: [s].
+            width: to which the time is located [s].
+        """
+        from scipy.optimize import brentq
+
+        def at(t: float) -> float:
+            return margin(self.inside(t))
+
+        start = low = self.t_before
+        if at(low) <= 0:
+            low = 0.5 * (start + high)
+            while low - start > width and at(low) <= 0:
+                low, high = 0.5 * (start + low), low
+            if low - start <= width:
+                return start, start
+        root = float(brentq(at, low, high, xtol=width, rtol=4 * np.finfo(float).eps))
+        while True:  # what the root search says, with a state on either side
+            before, after = max(low, root - width), min(high, root + width)
+            if (at(before) > 0 or before == low) and (at(after) < 0 or after == high):
+                return before, after
+            width *= 4
 
     def bracket(self, low: float, high: float) -> tuple[float, float]:
         """Bracket of an event located between two times [s]: as tight as it was located."""

@@ -141,13 +141,16 @@ class Switching:
 
     def _ended(self, survey: Survey) -> tuple[Exit, float, float] | None:
         """The first exit within the last step and the times [s] between which it lies."""
+        from scipy.optimize import brentq
+
         found = [
             (*self._crossing(index, self.stepper.t), exit_)
             for index, exit_ in enumerate(self.mode.exits)
             if survey.margins[index] < 0
         ]
         if not found and self._survey.trend < 0 < survey.trend and self._may_dip(survey):
-            lowest = self._root(lambda t: self._at(t).trend, self.stepper.t_before, self.stepper.t)
+            now, before = self.stepper.t, self.stepper.t_before
+            lowest = float(brentq(lambda t: self._at(t).trend, before, now, xtol=self._resolution(now)))
             if self._at(lowest).margins[survey.dips] < 0:
                 found = [(*self._crossing(survey.dips, lowest), self.mode.exits[survey.dips])]
         if not found:
@@ -163,35 +166,12 @@ class Switching:
     def _at(self, t: float) -> Survey:
         return self.mode.survey(self.stepper.inside(t))
 
-    def _root(self, function: Callable[[float], float], low: float, high: float) -> float:
-        from scipy.optimize import brentq
-
-        return float(brentq(function, low, high, xtol=self._resolution(high), rtol=4 * np.finfo(float).eps))
-
     def _resolution(self, t: float) -> float:
         return max(_LOCATED * self._pace.time, 4 * float(np.spacing(t)))
 
     def _crossing(self, index: int, high: float) -> tuple[float, float]:
         """Times [s] within the last step before and after a margin became negative, which it is at ``high``."""
-        start = self.stepper.t_before
-
-        def margin(t: float) -> float:
-            return self._at(t).margins[index]
-
-        low, width = start, self._resolution(high)
-        if self._survey.margins[index] <= 0:
-            # The margin starts at zero and rises first (a slip starts with none): go back to where it is positive.
-            low = 0.5 * (start + high)
-            while low - start > width and margin(low) <= 0:
-                low, high = 0.5 * (start + low), low
-            if low - start <= width:
-                return start, start
-        root = self._root(margin, low, high)
-        while True:  # what the root search says, with a state on either side
-            before, after = max(low, root - width), min(high, root + width)
-            if (margin(before) > 0 or before == low) and (margin(after) < 0 or after == high):
-                return before, after
-            width *= 4
+        return self.stepper.crossing(lambda y: self.mode.survey(y).margins[index], high, self._resolution(high))
 
     def _switch(self, exit_: Exit, low: float, high: float) -> None:
         self._idle = self._idle + 1 if high == self.stepper.t_before else 0
