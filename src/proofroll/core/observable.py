@@ -29,7 +29,7 @@ class Observable:
             tolerance must be absolute.
         headline: whether summaries show it: the motion, and the forces that a person asks for first.
         watched: whether a first look judges it though no summary shows it.
-        always: whether it is judged where nobody gives a tolerance, too: by half of its size, events by their number.
+        always: whether it is judged without a tolerance, too: by half of its size, events by their number.
         asked_as: what a scene asks for so that a first look judges it, as ``orientation``; empty: nothing.
         decides: whether a trade-off, a stability map and a recommendation go by it by default.
         asked_for: whether a person may ask for a recommendation by it.

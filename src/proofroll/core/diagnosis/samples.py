@@ -158,7 +158,7 @@ def moves_otherwise(evidence: Evidence, name: str, *others: str) -> bool:
 
 
 def forced_otherwise(evidence: Evidence, told: Reported) -> bool:
-    """True if velocities depart from the truth as a force does: it is that of another motion, not told wrongly."""
+    """True if velocities depart from the truth as a force does: it belongs to another motion."""
     least = CLOSES * told.before / (told.size or 1.0)
     return any(_departure(evidence, name) > least for name in ("v_WB", "w_WB"))
 

@@ -97,7 +97,7 @@ class Reference:
         return self.sizes.get(name)
 
     def always(self, names: Iterable[str]) -> dict[str, Tolerance]:
-        """Tolerances of those observables that are judged where nobody gives one; only what differs is told."""
+        """Tolerances of the observables that are judged without one; only what differs is shown."""
         items = {name: self.scene.observables[name] for name in names if self.scene.observables[name].always}
         end = Tolerance(float(self.dataset["time"][-1]), False, "s")
         return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
