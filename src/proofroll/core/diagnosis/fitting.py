@@ -13,6 +13,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
 
 M = TypeVar("M")
+FactT = TypeVar("FactT")
 # The true run's own residuals are the measurement's: a difference below so many of them says nothing.
 ABOVE = 20.0
 
@@ -153,11 +154,11 @@ class Residuals(Generic[M]):
         return Cause(name, says, *proof, explains=explains)
 
 
-def once(residuals: Callable[[Evidence], Iterator[Residuals[M]]]) -> Callable[[Evidence], Sequence[Residuals[M]]]:
+def once(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence], Sequence[FactT]]:
     """The same, found only once for each evidence: nearly every hypothesis asks for it."""
 
     @wraps(residuals)
-    def found(evidence: Evidence) -> Sequence[Residuals[M]]:
+    def found(evidence: Evidence) -> Sequence[FactT]:
         if residuals not in evidence.found:
             evidence.found[residuals] = tuple(residuals(evidence))
         return evidence.found[residuals]

@@ -29,7 +29,7 @@ RESIDUALS = (
     ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
 )
 # Parts of a mechanism's weight and speed below which nothing presses and nothing slides; softened contacts creep.
-PRESSES, _SLIDES = 1e-6, 1e-2
+PRESSES, SLIDES = 1e-6, 1e-2
 _AXIS = 1e-12  # component of a unit normal that is none
 
 
@@ -110,7 +110,7 @@ def residuals(
     presses = np.asarray(PRESSES * weight < N)
     t = np.linalg.norm(T, axis=-1)
     bound = friction * np.where(presses, N, 0.0)
-    slides = np.asarray(presses & said & (found.slip > _SLIDES * speed) & (friction > 0))
+    slides = np.asarray(presses & said & (found.slip > SLIDES * speed) & (friction > 0))
     against = np.sum(T * u, axis=-1) / np.where(slides, bound * found.slip, 1.0)
     # De Saxcé's correction makes the law a projection onto the cone: λ = P(λ − r (u + μ|u_t| n))
     r = weight / speed

@@ -8,6 +8,7 @@ import numpy as np
 
 from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
+from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
@@ -31,6 +32,7 @@ HYPOTHESES: tuple[Any, ...] = (
     reactions,
     reactions_at_start,
     BUILT,
+    *contacts.HYPOTHESES,
     other_axis,
     axis_of_first_steps,
     *FACTORS_OF_ALL,

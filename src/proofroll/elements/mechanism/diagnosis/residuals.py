@@ -24,7 +24,10 @@ _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for w
 # Where the start itself is another, its accelerations are.
 _STATE = {"position", "orientation", "velocity", "spin"}
 # What an engine is given, and may say to hold though it does not.
-GIVEN = ("mass", "centre of mass", "inertia", "gravity", "joint positions", "joint axes")
+GIVEN = (
+    "mass", "centre of mass", "inertia", "gravity", "joint positions", "joint axes",
+    "gaps", "normals of contact", "places of contact", "friction of contacts", "restitution of contacts",
+)  # fmt: skip
 # The start is known so many times as badly as its first steps show.
 _KNOWN = 10.0
 

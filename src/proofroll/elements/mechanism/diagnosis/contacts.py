@@ -1,0 +1,381 @@
+"""Hypotheses of contacts: another coefficient, a contact left out, another law of friction, late or swapped impacts."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis.clocks import said_delay
+from proofroll.core.diagnosis.fitting import once, said_factor
+from proofroll.core.diagnosis.samples import both
+from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, Followed, followed, normal_forces
+from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
+from proofroll.elements.mechanism.model import Mechanism
+
+# Parts of a mechanism's weight and size by which forces and gaps have to differ to be another law's.
+_FORCE, _SUNK = 1e-4, 1e-3
+_OFF = 1e-3  # factor of friction that is none
+_TURNS = 0.3  # rad: a slip that turns less tells no shape of a cone
+_ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
+_HELD = 1e-6  # part of a mechanism's speed below which the truth sticks
+_DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
+_REAL = 1e-9  # imaginary part of a real root [s]
+_COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Contacts of a run with its forces; arrays over (time, contacts)."""
+
+    evidence: Evidence
+    time: FloatArray
+    found: Followed
+    force: FloatArray
+    N: FloatArray
+    u_n: FloatArray
+    presses: NDArray[np.bool_]
+    slides: NDArray[np.bool_]
+    true: Followed
+    true_force: FloatArray
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Whose."""
+        mechanism: Mechanism = self.evidence.element.mechanism
+        return mechanism
+
+    @property
+    def friction(self) -> FloatArray:
+        """Coefficient of each contact."""
+        return np.array([contact.friction for contact in self.mechanism.contacts])
+
+    @property
+    def across(self) -> FloatArray:
+        """Slip along the surfaces [m/s], (time, contacts, 3)."""
+        return np.asarray(self.found.slide - self.u_n[..., None] * self.found.normal)
+
+    @property
+    def T(self) -> FloatArray:
+        """Friction [N], (time, contacts, 3)."""
+        return np.asarray(self.force - self.N[..., None] * self.found.normal)
+
+    @property
+    def against(self) -> FloatArray:
+        """Coulomb's friction of the normal forces that the run tells, against its slip [N]."""
+        slip = np.where(self.found.slip > 0, self.found.slip, 1.0)
+        return np.asarray(-(self.friction * self.N / slip)[..., None] * self.across)
+
+
+@once
+def touch_of(evidence: Evidence) -> Iterator[Touch]:
+    """The contacts of the run, if it has any and tells their forces."""
+    pair, element = both(evidence), evidence.element
+    if pair is None or not element.mechanism.contacts or "contact_forces" not in pair[0] or not is_motion(pair[0]):
+        return
+    run, truth = pair
+    found = followed(placed_of(element.mechanism, run))
+    force = run["contact_forces"].to_numpy()
+    if np.isnan(force[1:]).any():
+        return
+    N = normal_forces(found, force)
+    presses = np.asarray(PRESSES * element.force < N)
+    presses[0] = False  # several engines know no force there
+    slides = presses & np.asarray(found.slip > SLIDES * element.speed)
+    true = followed(placed_of(element.mechanism, truth))
+    u_n = np.sum(found.normal * found.slide, axis=-1)
+    yield Touch(
+        evidence,
+        run["time"].to_numpy(),
+        found,
+        force,
+        N,
+        u_n,
+        presses,
+        slides,
+        true,
+        truth["contact_forces"].to_numpy(),
+    )
+
+
+@hypothesis("contact forces", "the true forces with another sign, frame or time are what is said")
+def contact_forces(evidence: Evidence) -> Iterator[Cause]:
+    """Forces of contact on the other body, in other axes, at another time."""
+    for touch in touch_of(evidence):
+        known = np.isfinite(touch.true_force[1:]).all(axis=(0, 2))
+        if np.abs(touch.found.slide - touch.true.slide).max() > _SUNK * evidence.element.speed:
+            continue  # another motion has other forces
+        said, true = touch.force[1:, known], touch.true_force[1:, known]
+        if known.any() and "contact_forces" not in evidence.settled:
+            what, least = "the force of a contact on its first body", evidence.element.force
+            yield from Reported("contact_forces", what, "N", said, true, touch.time[1:], {}, least).causes(
+                evidence.step
+            )
+
+
+@hypothesis(
+    "friction of contacts", "friction of what slides is one factor times its bound, against its slip, in every sample"
+)
+def friction_factor(evidence: Evidence) -> Iterator[Cause]:
+    """A coefficient of friction that is not the scene's, of each contact or of all."""
+    for touch in touch_of(evidence):
+        names = [contact.name for contact in touch.mechanism.contacts]
+        groups = [(list(range(len(names))), "all contacts"), *(([k], name) for k, name in enumerate(names))]
+        for which, name in groups[: 1 if len(names) == 1 else None]:
+            at = touch.slides[:, which] & (touch.friction[which] > 0)
+            T, full = touch.T[:, which][at], touch.against[:, which][at]
+            if len(T) < 2 or np.abs(T - full).max() <= _FORCE * evidence.element.force:
+                continue
+            factor = float(np.sum(T * full) / np.sum(full * full))
+            off = abs(factor) <= _OFF
+            says = f"friction of {name} is {'off' if off else said_factor(factor)}"
+            after = float(np.abs(T - (0.0 if off else factor) * full).max())
+            proof = "friction of what slides", "N", float(np.abs(T - full).max()), after
+            yield Cause("friction", says, *proof, "give each pair its own coefficient", 0 if off else 1, _COVERS)
+
+
+@hypothesis("contact left out", "a contact never presses, and its shapes overlap where the truth presses them apart")
+def left_out(evidence: Evidence) -> Iterator[Cause]:
+    """A pair that the engine has not."""
+    for touch in touch_of(evidence):
+        true = normal_forces(touch.true, touch.true_force)
+        for k, contact in enumerate(touch.mechanism.contacts):
+            sunk = float(touch.found.gap[:, k].min()) < -_SUNK * evidence.element.length
+            if sunk and not touch.presses[:, k].any():
+                before, after = float(np.nanmax(np.abs(true[1:, k]))), float(np.abs(touch.N[1:, k]).max())
+                says = f"the contact {contact.name} is left out"
+                yield Cause(
+                    "left out",
+                    says,
+                    f"normal force of {contact.name}",
+                    "N",
+                    before,
+                    after,
+                    "let the pair touch",
+                    0,
+                    _COVERS,
+                )
+
+
+@hypothesis(
+    "convex cone", "from the start of a slip each contact rises at μ|u|, as the convex dual of Coulomb's law lets it"
+)
+def convex_cone(evidence: Evidence) -> Iterator[Cause]:
+    """A sliding contact that hops: its first flight begins at the speed that makes impulse and slip orthogonal."""
+    for touch in touch_of(evidence):
+        t, size = touch.time, evidence.element.length
+        part = (t[1] - t[0]) / (t[2] - t[1])
+        slip = np.linalg.norm(touch.across[1] + part * (touch.across[1] - touch.across[2]), axis=-1)  # as it flies off
+        rises = touch.friction * slip
+        which = (rises > SLIDES * evidence.element.speed) & (np.abs(touch.found.gap[0]) < _SUNK * size)
+        if not which.any() or touch.presses[1:3, which].any():
+            continue
+        # a flight from a closed gap: gap = w t - a t²/2 and its rate w - a t
+        began = 2 * touch.found.gap[1, which] / (t[1] - t[0]) - touch.u_n[1, which]
+        says, name = "convex cone: the sliding contact hops at u_n = μ|u_t|", "speed along the normal at the start"
+        after = float(np.abs(began - rises[which]).max())
+        remedy = "no step mends it: correct the normal rows (MuJoCo's preset tuned), or take Coulomb's own law"
+        yield Cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy, 0, _COVERS)
+
+
+@hypothesis(
+    "friction pyramid", "friction of a slip that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample"
+)
+def pyramid(evidence: Evidence) -> Iterator[Cause]:
+    """A pyramid in place of the cone, about axes that one angle tells."""
+    for touch in touch_of(evidence):
+        at = touch.slides & (touch.friction > 0)
+        n, T, u, bound = touch.found.normal[at], touch.T[at], touch.across[at], (touch.friction * touch.N)[at]
+        if len(T) < 4 or np.abs(n - n[0]).max() > _FORCE:
+            continue
+        e1 = np.eye(3)[np.argmin(np.abs(n[0]))]
+        e1 = np.cross(n[0], e1) / np.linalg.norm(np.cross(n[0], e1))
+        e2 = np.cross(n[0], e1)
+        plane = np.array([e1, e2])
+        heading = np.unwrap(np.arctan2(*(u @ plane.T).T[::-1]))
+        against = np.abs(T - touch.against[at]).max()
+        if np.ptp(heading) < _TURNS or against <= _FORCE * evidence.element.force:
+            continue
+        turned = np.array([[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in _ANGLES])
+        sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
+        after = float(np.abs(sides - bound).max(axis=1).min())
+        says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
+        remedy = "choose the elliptic cone"
+        yield Cause("pyramid", says, "friction of what slides", "N", float(against), after, remedy, 1, _COVERS)
+
+
+@hypothesis(
+    "creep", "contacts that stick in the truth slide at one speed times T/(μN), as a regularised friction lets them"
+)
+def creep(evidence: Evidence) -> Iterator[Cause]:
+    """Slip of contacts that stick, by a regularised law of friction."""
+    for touch in touch_of(evidence):
+        held = touch.presses & (touch.true.slip <= _HELD * evidence.element.speed) & (touch.friction > 0)
+        slip = touch.found.slip[held]
+        run, truth = evidence.run, evidence.truth
+        assert run is not None
+        assert truth is not None
+        moved = float(np.abs(run["positions"].to_numpy() - truth["positions"].to_numpy()).max())
+        if len(slip) < 4 or slip.max() * (touch.time[-1] - touch.time[0]) < moved:
+            continue  # something else moves it further
+        used = np.linalg.norm(touch.T[held], axis=-1) / (touch.friction * touch.N)[held]
+        speed = float(np.sum(slip * used) / np.sum(used * used))
+        says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
+        after = float(np.abs(slip - speed * used).max())
+        yield Cause(
+            "creep", says, "slip of what sticks", "m/s", float(slip.max()), after, "make that speed smaller", 1, _COVERS
+        )
+
+
+@hypothesis(
+    "impacts", "flights before and after an impact, extended to where they meet, tell its time and its restitution"
+)
+def impacts(evidence: Evidence) -> Iterator[Cause]:
+    """Impacts that come late, or with the restitution of another pair."""
+    for touch in touch_of(evidence):
+        law = [contact.restitution for contact in touch.mechanism.contacts]
+        names = [contact.name for contact in touch.mechanism.contacts]
+        met = [(k, *one) for k in range(len(law)) for one in _met(touch, k)]
+        if not met:
+            continue
+        delays = np.array([delay for _, delay, _ in met])
+        size = float(np.abs(delays).max())
+        if evidence.step and size > _DELAY * evidence.step:
+            steps = np.round(2 * np.mean(delays) / evidence.step) / 2
+            says = f"impacts come {said_delay(float(np.mean(delays)), evidence.step)}"
+            after = float(np.abs(delays - steps * evidence.step).max())
+            yield Cause(
+                "late impact",
+                says,
+                "time of impacts",
+                "s",
+                size,
+                after,
+                "let the impact act in the step in which the gap closes",
+                0,
+                _COVERS,
+            )
+        seen = np.array([ratio for _, _, ratio in met])
+        own = np.array([law[k] for k, _, _ in met])
+        before = float(np.abs(seen - own).max())
+        if before <= _RATIO:
+            continue
+        of_each = sorted({k for k, _, _ in met})
+        for order in itertools.permutations(of_each):
+            moved = dict(zip(of_each, order, strict=True))
+            after = float(np.abs(seen - [law[moved[k]] for k, _, _ in met]).max())
+            swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
+            yield Cause(
+                "restitution",
+                f"restitution is of another pair: {swaps}",
+                "restitution",
+                "1",
+                before,
+                after,
+                "give each pair its own",
+                0,
+                _COVERS,
+            )
+        factor = float(seen @ own / (own @ own)) if own.any() else np.nan
+        says = f"restitution of all pairs is {said_factor(factor)}"
+        after = float(np.abs(seen - factor * own).max())
+        yield Cause(
+            "restitution",
+            says,
+            "restitution",
+            "1",
+            before,
+            after,
+            "look at what the engine makes of it",
+            1,
+            _COVERS,
+            explains=len(met),
+        )
+
+
+def _met(touch: Touch, c: int) -> Iterator[tuple[float, float]]:
+    """Delay [s] and restitution of each impact of a contact between two flights, of two samples each at least."""
+    t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
+    for k in range(1, len(t) - 2):
+        if not (free[k - 1 : k + 3].all() and rate[k] < 0 < rate[k + 1]):
+            continue
+        flights = []
+        for at, other in ((k, k - 1), (k + 1, k + 2)):
+            a = (rate[at] - rate[other]) / (t[at] - t[other])
+            flights.append(np.poly1d([a / 2, rate[at] - a * t[at], gap[at] - rate[at] * t[at] + a * t[at] ** 2 / 2]))
+        before, after = flights
+        closes = [r.real for r in before.roots if abs(r.imag) < _REAL and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
+        meets = [r.real for r in (before - after).roots if abs(r.imag) < _REAL and t[k] <= r.real <= t[k + 1]]
+        if closes and meets:
+            when = min(meets, key=lambda at: abs(at - min(closes)))
+            yield when - min(closes), float(-after.deriv()(when) / before.deriv()(when))
+
+
+@hypothesis(
+    "contacts at time 0", "the accelerations at time 0 are those of a mechanism whose contacts differ in one thing"
+)
+def at_start(evidence: Evidence) -> Iterator[Cause]:
+    """Friction of another size, off or swapped, and contacts left out, by the first steps of the certificate."""
+    element, start = evidence.element, None
+    if element.mechanism.contacts:
+        start = of_start(evidence, derived=True)
+    if start is None:
+        return
+    mechanism, size = element.mechanism, element.length
+    found = start.each[0].acceleration * np.array([1, 1, 1, size, size, size])
+
+    def off(pairs: Sequence[Any]) -> float:
+        try:
+            first = type(element)(replace(mechanism, pairs=tuple(pairs))).first_motion
+        except Refused:
+            return float("inf")
+        return float(
+            np.abs(np.concatenate([first.acceleration, size * first.angular_acceleration], axis=-1) - found).max()
+        )
+
+    pairs = mechanism.pairs
+    before = off(pairs)
+
+    def cause(says: str, after: float, remedy: str, fitted: int = 0) -> Cause:
+        name = "acceleration at time 0"
+        return Cause(
+            "contacts at time 0", says, name, "m/s^2", before, after, remedy, fitted, _COVERS, explains=found.size
+        )
+
+    def scaled(factor: float) -> tuple[Any, ...]:
+        return tuple(replace(pair, friction=factor * pair.friction) for pair in pairs)
+
+    if not before > _FORCE * element.first_motion.scale:
+        return
+    for pair in pairs:
+        if len(pairs) > 1:
+            left = off([other for other in pairs if other is not pair])
+            yield cause(f"the contact {pair.name} is left out", left, "let the pair touch")
+    yield cause("friction of all contacts is off", off(scaled(0.0)), "give each pair its coefficient")
+    for a, b in itertools.combinations(pairs, 2):
+        if a.friction != b.friction:
+            swap = {a.name: b.friction, b.name: a.friction}
+            after = off([replace(pair, friction=swap.get(pair.name, pair.friction)) for pair in pairs])
+            yield cause(f"friction of {a.name} and {b.name} is swapped", after, "give each pair its own coefficient")
+    from scipy.optimize import minimize_scalar  # half a second, which few runs need
+
+    fit = minimize_scalar(
+        lambda factor: off(scaled(factor)), bounds=(0.0, 3.0), method="bounded", options={"xatol": 1e-6}
+    )
+    yield cause(
+        f"friction of all contacts is {said_factor(float(fit.x))}",
+        float(fit.fun),
+        "give each pair its own coefficient",
+        1,
+    )
+
+
+HYPOTHESES = (contact_forces, convex_cone, pyramid, friction_factor, left_out, impacts, creep, at_start)

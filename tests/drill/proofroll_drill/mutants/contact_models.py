@@ -1,0 +1,199 @@
+"""Bodies that touch otherwise than in the scene: an exact motion of another mechanism, or another report of it."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from proofroll.core.scene import Scene
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.truth.hybrid import follow, states_of
+from proofroll.truth.mechanism.contact_tree import ContactTree
+from proofroll_drill.mutants.base import STEP
+from proofroll_drill.mutants.mechanism_models import MechanismMutant
+
+SLED: Any = ("sled", {})
+BALLS: Any = (str(Path(__file__).parent / "two_bounces"), {})
+_TOLERANCE = 1e-12
+
+
+class ContactMutant(MechanismMutant):
+    """Follows the changed mechanism by the truth's first route."""
+
+    scene: ClassVar[Any] = SLED
+    until, every = 0.05, 0.005  # its faults show at once
+    honest: ClassVar[bool] = False  # reads back what it built
+
+    def __init__(self, scene: Scene, settings: Any) -> None:  # noqa: ARG002 -- it has no settings
+        self.scenes, self.t = scene, 0.0
+        self.mechanism = self.other(mechanism_of(scene))
+        self.dynamics = ContactDynamics(self.mechanism)
+        self.tree = ContactTree(self.dynamics, _TOLERANCE, 1.0)
+        self.path = follow(self.tree, self.until + 4 * STEP)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        self.t = t
+
+    def sample(self) -> MechanismSample:
+        """See :class:`proofroll.core.engine.Engine`."""
+        at = np.array([self.clock(self.t)])
+        (number,) = self.path.leg_at(at)
+        state = states_of(self.tree, self.path, at, [number])[0]
+        q, v = state[: self.mechanism.nq], state[self.mechanism.nq :]
+        record, force = self.dynamics.sample(q, v, self.path.legs[number].mode)
+        force = np.where(np.isnan(force), 0.0, force)
+        motion = {name: record[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")}
+        sample: MechanismSample = self.misreport(MechanismSample(**motion, contact_force=force))
+        return sample
+
+    def built(self) -> MechanismBuilt:
+        """Contacts as the scene has them, or as it built them; accelerations are derived from its steps."""
+        mechanism = self.mechanism if self.honest else mechanism_of(self.scenes)
+        dynamics = ContactDynamics(mechanism)
+        found = touches(mechanism, dynamics.at(*mechanism.start()).solution.motion)
+        bodies = mechanism.bodies
+        return MechanismBuilt(
+            mass=np.array([body.mass for body in bodies]),
+            com=np.array([body.com for body in bodies]),
+            inertia=np.array([body.inertia for body in bodies]),
+            gravity=np.array(mechanism.gravity),
+            contact_gap=np.array([each.gap for each in found]),
+            contact_normal=np.array([each.normal for each in found]),
+            contact_place=np.array([each.place for each in found]),
+            contact_friction=np.array([contact.friction for contact in mechanism.contacts]),
+            contact_restitution=np.array([contact.restitution for contact in mechanism.contacts]),
+        )
+
+
+def of_pairs(mechanism: Mechanism, change: Any) -> Mechanism:
+    """Each pair changed."""
+    return dataclasses.replace(mechanism, pairs=tuple(change(pair) for pair in mechanism.pairs))
+
+
+def of_geometry(mechanism: Mechanism, name: str, **values: Any) -> Mechanism:
+    """One geometry changed."""
+    changed = (dataclasses.replace(g, **values) if g.name == name else g for g in mechanism.geometries)
+    return dataclasses.replace(mechanism, geometries=tuple(changed))
+
+
+class FrictionOff(ContactMutant):
+    """Every pair is smooth."""
+
+    fault = "friction of contacts off"
+    named = ("friction of all contacts is off",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """Without friction."""
+        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.0))
+
+
+class FrictionOnePercent(ContactMutant):
+    """A hundredth more friction."""
+
+    fault = "friction of contacts 1 % off"
+    named = ("friction of all contacts is 1.01",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """With a hundredth more."""
+        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.01 * pair.friction))
+
+
+class ContactLeftOut(ContactMutant):
+    """One foot touches nothing."""
+
+    fault = "a contact left out"
+    named = ("the contact back is left out",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """Without the last pair."""
+        return dataclasses.replace(mechanism, pairs=mechanism.pairs[:-1])
+
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
+        """The last force is zero."""
+        assert sample.contact_force is not None
+        return dataclasses.replace(sample, contact_force=np.append(sample.contact_force, np.zeros((1, 3)), axis=0))
+
+
+class FootMoved(ContactMutant):
+    """One foot is a millimetre further ahead, and its certificate says so."""
+
+    fault = "a foot moved 1 mm"
+    honest = True
+    named = ("places of contact",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """Ahead."""
+        x, y, z = next(g.position for g in mechanism.geometries if g.name == "left_foot")
+        return of_geometry(mechanism, "left_foot", position=(x + 1e-3, y, z))
+
+
+class NormalTurned(ContactMutant):
+    """The floor leans by a thousandth, and its certificate says so."""
+
+    fault = "normal of a contact turned"
+    scene: ClassVar[Any] = BALLS
+    honest = True
+    named = ("normals of contact",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """With another floor."""
+        return of_geometry(mechanism, "floor", normal=(1e-3, 0.0, 1.0))
+
+
+class OtherBody(ContactMutant):
+    """The force on the second body is reported."""
+
+    fault = "force of contact on the other body"
+    named = ("contact_forces has the wrong sign",)
+
+    def misreport(self, sample: MechanismSample) -> MechanismSample:
+        """Minus."""
+        assert sample.contact_force is not None
+        return dataclasses.replace(sample, contact_force=-sample.contact_force)
+
+
+class RestitutionSwapped(ContactMutant):
+    """Each ball bounces as the other should."""
+
+    fault = "restitution swapped between pairs"
+    scene = BALLS
+    until, every = 0.4, 0.02
+    named = ("restitution is of another pair",)
+
+    def other(self, mechanism: Mechanism) -> Mechanism:
+        """Swapped."""
+        one, two = mechanism.pairs
+        swapped = (one.restitution, two.restitution)[::-1]
+        pairs = (dataclasses.replace(p, restitution=e) for p, e in zip((one, two), swapped, strict=True))
+        return dataclasses.replace(mechanism, pairs=tuple(pairs))
+
+
+class LateImpact(ContactMutant):
+    """The ball goes on for a step before the impact acts."""
+
+    fault = "impact one step late"
+    scene = BALLS
+    until, every = 0.4, 0.02
+    named = ("impacts come one step",)
+
+    def sample(self) -> MechanismSample:
+        """Free flight from where the ball is a step after it has come to the floor."""
+        sample = super().sample()
+        p, v = np.array(sample.p_WB), np.array(sample.v_WB)
+        for happened in self.path.happenings:
+            since = self.t - happened.time
+            if since <= 0:
+                continue
+            number = [pair.name for pair in self.mechanism.pairs].index(happened.name)
+            comes, e, g = 9.81 * happened.time, self.mechanism.pairs[number].restitution, 9.81
+            p[number, 2] += -comes * STEP - g * STEP**2 / 2 - e * comes * since + g * since**2 / 2
+            p[number, 2] += e * (comes + g * STEP) * (since - STEP) - g * (since - STEP) ** 2 / 2
+            v[number, 2] += (1 + e) * g * STEP
+        return dataclasses.replace(sample, p_WB=p, v_WB=v)

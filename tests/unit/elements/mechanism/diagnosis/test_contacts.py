@@ -1,0 +1,63 @@
+"""Causes of contacts: laws of friction other than Coulomb's, of real engines, and no accusation of an honest one."""
+
+from __future__ import annotations
+
+import functools
+
+import pytest
+import xarray as xr
+
+from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.scene import Scene
+from proofroll.core.truth import truth
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
+
+EVERY = 0.01
+STEPS = {"default": 2e-3, "matched": 1e-3, "tuned": 1e-3}
+
+
+@functools.cache
+def sled() -> tuple[Scene, xr.Dataset]:
+    """A sled that slides and turns, and its truth."""
+    scene = load_scene("sled")
+    true = truth(scene, simulate(scene, "mujoco", until=0.1, every=EVERY, formulation="geoms")["time"].to_numpy())
+    return scene, true
+
+
+def said(engine: str, formulation: str, preset: str) -> list[str]:
+    """Causes of an engine's sled."""
+    scene, true = sled()
+    run = simulate(scene, engine, until=0.1, every=EVERY, formulation=formulation, preset=preset)
+    element = scene.elements[0]
+    return [cause.says for cause in diagnose(Evidence(element, [], run, true, STEPS[preset]), hypotheses_of(element))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("preset", "words"),
+    [("default", "friction pyramid"), ("matched", "convex cone: the sliding contact hops at u_n = μ|u_t|")],
+)
+def test_mujocos_laws_of_friction_are_named(preset: str, words: str) -> None:
+    """The pyramid and the convex cone are each the one cause, proven by the run's own forces and flights."""
+    (only,) = said("mujoco", "geoms", preset)
+    assert only.startswith(words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("engine", "formulation", "preset"), [("mujoco", "geoms", "tuned"), ("exudyn", "spheres", "matched")]
+)
+def test_engines_with_coulombs_law_are_accused_of_nothing(engine: str, formulation: str, preset: str) -> None:
+    """A corrected cone and a penalty law have small errors, and no cause."""
+    assert said(engine, formulation, preset) == []
+
+
+@pytest.mark.slow
+def test_creep_of_a_regularised_law_is_named_with_its_speed() -> None:
+    """A sled that stands on a slope creeps in Exudyn by the speed of its regularised friction, 1e-4 m/s."""
+    still = load_scene("sled_on_slope", speed=0.0, cross_speed=0.0, spin=0.0)
+    run = simulate(still, "exudyn", until=0.2, every=EVERY, formulation="spheres", preset="matched")
+    true, element = truth(still, run["time"].to_numpy()), still.elements[0]
+    causes = diagnose(Evidence(element, [], run, true, 1e-3), hypotheses_of(element))
+    assert any("contacts that stick creep at 0.0001 m/s" in cause.says for cause in causes), causes
