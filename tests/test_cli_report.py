@@ -5,14 +5,18 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from proofroll.cli.report import _of_groups
 from proofroll.report.page.growing import Report
 from proofroll.running.store import alone_in
+from proofroll.studies.comparison import compare
+from proofroll.studies.comparison.outcome import Outcome
 
 Proofroll = Callable[..., tuple[int, str, str]]
 
@@ -128,6 +132,58 @@ def test_a_part_that_fails_does_not_take_the_report_away(
     html = (out / "report.html").read_text(encoding="utf-8")
     assert "no memory left" in html
     assert "A claim" in html
+
+
+def test_a_stopped_report_keeps_what_has_ended_and_goes_on(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ctrl-C in the second of two comparisons: the page has the first; the same command runs no case again."""
+    oracle = COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"')
+    names = files(tmp_path, first=oracle, second=oracle.replace("[4]", "[3]").replace("A claim", "Another claim"))
+    command = ["report", *names, "--out", str(tmp_path / "out"), "--jobs", "1"]
+    judged, evaluate = [], compare.evaluate
+
+    def stop_in_the_second(*arguments: Any) -> Outcome:
+        judged.append(arguments)
+        if len(judged) == 2:
+            raise KeyboardInterrupt
+        return evaluate(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(compare, "evaluate", stop_in_the_second)
+        code, said, err = proofroll(*command)
+    assert (code, said) == (130, "")
+    assert "the first of 2 comparisons is in" in err
+    assert "stopped: 1 of 2 comparisons are in" in err
+    assert "the same command goes on from there" in err
+    content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert [item["title"] for item in content["comparisons"]] == ["A claim"]
+    assert content["awaited"] == ["Another claim"]
+    before = {file: file.stat().st_mtime_ns for file in (tmp_path / "out" / "cases").iterdir()}
+    code, _, err = proofroll(*command)
+    assert code == 0, err
+    assert {file: file.stat().st_mtime_ns for file in before} == before
+    content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert [item["title"] for item in content["comparisons"]] == ["A claim", "Another claim"]
+    assert content["awaited"] == []
+
+
+def test_progress_counts_comparisons(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While cases run it is said which comparison is under way, and about how long the rest will take."""
+    said: list[str] = []
+
+    @contextmanager
+    def noted(*_: Any, **__: Any) -> Iterator[Callable[..., None]]:
+        yield said.append
+
+    monkeypatch.setattr("proofroll.cli.options.progress_bar", noted)
+    oracle = COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"')
+    names = files(tmp_path, first=oracle, second=oracle.replace("[4]", "[3]"))
+    code, _, err = proofroll("report", *names, "--out", str(tmp_path / "out"), "--jobs", "1")
+    assert code == 0, err
+    assert "1 of 2 comparisons, about" in said[0]
+    assert "s left, " in said[0]
+    assert "2 of 2 comparisons, " in said[-1]
 
 
 def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) -> None:

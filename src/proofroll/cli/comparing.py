@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
+from proofroll.core.number_format import number as written
 
 if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
@@ -97,27 +99,62 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
             options.complain(f"{name} is left out of {', '.join(without)}: no row is of it")
 
 
-def outcomes_of(comparisons: list[Any], engines: list[str], runner: Runner, stage: str = "") -> list[Outcome]:
-    """Runs all comparisons with one progress bar; ``stage`` is put before what it says."""
+def outcomes_of(
+    comparisons: list[Any],
+    engines: list[str],
+    runner: Runner,
+    stage: str = "",
+    finished: Callable[[dict[int, Outcome]], None] | None = None,
+) -> list[Outcome]:
+    """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
+
+    Args:
+        comparisons: in their order.
+        engines: to which they are restricted.
+        runner: runs their cases.
+        stage: is put before what the bar says.
+        finished: called when one has ended, with all that have ended by their numbers.
+    """
     from proofroll.studies.comparison.compare import evaluate, run_plan
     from proofroll.studies.comparison.planning import plan
 
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     cases = {case.key: case for item in plans for case in item.cases}
-    within = [item for item in plans if item.comparison.budget]
+    missing = {number: {case.key for case in item.cases} for number, item in enumerate(plans)}
     results: dict[str, Result] = {}
+    ended: dict[int, Outcome] = {}
+    start, reused = time.monotonic(), runner.reused
+
+    def end(key: str = "") -> None:
+        """Judges each comparison of which this case was the last."""
+        for number in [number for number, keys in missing.items() if keys <= {key}]:
+            del missing[number]
+            ended[number] = evaluate(plans[number], results, runner)
+            if finished:
+                finished(ended)
+
     with options.progress_bar(f"{stage}cases", total=len(cases)) as advance:
 
-        def told(case: Case, _: Result) -> None:
-            advance(f"{stage}{case.engine.name}")
+        def told(case: Case, result: Result) -> None:
+            results[case.key] = result
+            ran = len(results) - (runner.reused - reused)
+            seconds = (time.monotonic() - start) / ran * (len(cases) - len(results)) if ran else 0.0
+            of = f"{len(ended) + 1} of {len(plans)} comparisons, " if len(plans) > 1 else ""
+            advance(f"{stage}{of}{f'about {written(seconds, 1)} s left, ' if ran else ''}{case.engine.name}")
+            end(case.key)
+            for keys in missing.values():
+                keys.discard(case.key)
 
-        for item in within:
-            results |= run_plan(item, runner, told)
-        results |= runner.run((case for key, case in cases.items() if key not in results), told)
+        for item in plans:
+            if item.comparison.budget:
+                run_plan(item, runner, told)
+        place = {case.key: at for at, item in reversed([*enumerate(plans)]) for case in item.cases}
+        runner.run((case for key, case in cases.items() if key not in results), told, place=place)
+        end()
     if runner.damaged:
         options.complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
-    return [evaluate(item, results, runner) for item in plans]
+    return [ended[at] for at in range(len(plans))]
 
 
 def exit_code(outcomes: list[Outcome]) -> int:

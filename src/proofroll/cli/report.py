@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,15 +13,19 @@ from proofroll.cli import options
 from proofroll.cli.comparing import asked, exit_code, outcomes_of, tell_left_out
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from rich.table import Table
 
+    from proofroll.core.comparison import Comparison
     from proofroll.report.page.growing import Report
     from proofroll.report.page.records import ReportContent
     from proofroll.report.parts import Part
     from proofroll.running.runner import Runner
     from proofroll.studies.comparison.outcome import Outcome
+
+# Part of the time that writing unfinished pages may take.
+_WRITING = 0.05
 
 
 def report(
@@ -49,10 +54,11 @@ def report(
 
     Without names it makes those that lie in the folder of studies itself: the main comparisons, and all further studies
     but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names.
-    The files are there after the first comparison, and are written again after all of them and after each further
-    study. A study that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that
-    says so, and the report names the command that makes it whole. --set and --budget are for scenes and robot files:
-    what 60 s of processor time do not suffice for is left out and named.
+    The files are there after the first comparison, and are written again now and then, after all of them and after each
+    further study. A report that is stopped (Ctrl-C) keeps what has ended; the same command goes on from there. A study
+    that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and
+    the report names the command that makes it whole. --set and --budget are for scenes and robot files: what 60 s of
+    processor time do not suffice for is left out and named.
     """
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
@@ -87,13 +93,14 @@ def report(
         outcomes: list[Outcome] = []
         if loaded:
             stage = _begin(1, total, "comparisons")
-            outcomes = outcomes_of(loaded[:1], engine or [], runner, stage)
-            if len(loaded) > 1:
-                first = begun(outcomes, runner.store, command, [item.title for item in loaded[1:]], left_out)
-                first.expect(parts, out, fresh=fresh)
-                first.write(out)
-                options.complain(f"{stage}the first is in {out / 'report.html'}")
-                outcomes += outcomes_of(loaded[1:], engine or [], runner, stage)
+            growing = _Growing(
+                loaded, parts, out, lambda ended, awaited: begun(ended, runner.store, command, awaited, left_out)
+            )
+            try:
+                outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add)
+            except KeyboardInterrupt:
+                growing.stopped()
+                raise
         made = begun(outcomes, runner.store, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
@@ -107,6 +114,46 @@ def report(
                 made.write(out)
         options.show(made.content, as_json, lambda: _shown(made.content, out))
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
+
+
+class _Growing:
+    """The page of a report whose comparisons are being run: written when the first has ended, and now and then."""
+
+    def __init__(
+        self,
+        comparisons: list[Comparison],
+        parts: list[Part],
+        out: Path,
+        made: Callable[[list[Outcome], list[str]], Report],
+    ) -> None:
+        self._comparisons, self._parts, self._out, self._made = comparisons, parts, out, made
+        self._ended: dict[int, Outcome] = {}
+        self._start, self._spent = time.monotonic(), 0.0
+
+    def add(self, ended: dict[int, Outcome]) -> None:
+        """Writes the page if others are awaited, and writing has taken little time so far."""
+        self._ended = ended
+        begin = time.monotonic()
+        if len(ended) == len(self._comparisons) or self._spent > _WRITING * (begin - self._start):
+            return
+        self._write()
+        if not self._spent:
+            options.complain(f"the first of {len(self._comparisons)} comparisons is in {self._out / 'report.html'}")
+        self._spent += time.monotonic() - begin
+
+    def stopped(self) -> None:
+        """Writes the comparisons that have ended, and says how to go on."""
+        if self._ended:
+            self._write()
+            many = f"{len(self._ended)} of {len(self._comparisons)} comparisons are in {self._out / 'report.html'}"
+            options.complain(f"stopped: {many}; the same command goes on from there")
+
+    def _write(self) -> None:
+        ended = [self._ended[at] for at in sorted(self._ended)]
+        awaited = [item.title for at, item in enumerate(self._comparisons) if at not in self._ended]
+        page = self._made(ended, awaited)
+        page.expect(self._parts, self._out)
+        page.write(self._out)
 
 
 def _of_groups(names: list[str], only: str) -> list[str]:

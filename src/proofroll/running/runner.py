@@ -7,10 +7,11 @@ import os
 import queue
 import threading
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
@@ -69,10 +70,11 @@ class Runner:
         cases: Iterable[Case],
         progress: Callable[[Case, Result], None] | None = None,
         budget: TimeBudget | None = None,
+        place: Mapping[str, int] = MappingProxyType({}),
     ) -> dict[str, Result]:
         """Results by key of the case; what the ``budget`` does not suffice for is left out.
 
-        ``progress`` is called in this thread as each arrives.
+        ``progress`` is called in this thread as each arrives; ``place``: see ``follow``.
         """
 
         def told(case: Case, result: Result) -> tuple[()]:
@@ -80,13 +82,14 @@ class Runner:
                 progress(case, result)
             return ()
 
-        return self.follow(cases, told, budget)
+        return self.follow(cases, told, budget, place)
 
     def follow(
         self,
         cases: Iterable[Case],
         then: Callable[[Case, Result], Iterable[Case]],
         budget: TimeBudget | None = None,
+        place: Mapping[str, int] = MappingProxyType({}),
     ) -> dict[str, Result]:
         """Like :meth:`run`, but each result may ask for further cases, which are begun at once.
 
@@ -94,11 +97,12 @@ class Runner:
             cases: with which it begins.
             then: called in this thread as each result arrives; returns cases that have not been asked for yet.
             budget: processor time of cases in workers here; a cluster has none.
+            place: of cases by key; those of an earlier place are all begun first.
         """
         results: dict[str, Result] = {}
         asked: set[str] = set()
         arrived: _Arrived = queue.SimpleQueue()
-        shared = WaitingCases(budget)
+        shared = WaitingCases(budget, place)
         running = 0
         ready: deque[tuple[Case, Result]] = deque()
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 from collections import deque
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from proofroll.running.case import Case
 from proofroll.running.time_budget import TimeBudget
@@ -14,13 +16,15 @@ class WaitingCases:
 
     Args:
         budget: of the processor time of the cases, or None.
+        place: of cases by key, 0 without; those of an earlier place are all begun before one of a later place is.
     """
 
-    def __init__(self, budget: TimeBudget | None = None) -> None:
+    def __init__(self, budget: TimeBudget | None = None, place: Mapping[str, int] = MappingProxyType({})) -> None:
         self.budget = budget
+        self._place = place
         self._changed = threading.Condition()
-        self._by_engine: dict[str, deque[Case]] = {}
-        self._begun: set[str] = set()
+        self._by_engine: dict[int, dict[str, deque[Case]]] = {}
+        self._begun: set[tuple[int, str]] = set()
         self._closed = False
 
     def add(self, case: Case) -> None:
@@ -28,7 +32,8 @@ class WaitingCases:
         if self.budget:
             self.budget.wait()
         with self._changed:
-            self._by_engine.setdefault(case.engine.name, deque()).append(case)
+            groups = self._by_engine.setdefault(self._place.get(case.key, 0), {})
+            groups.setdefault(case.engine.name, deque()).append(case)
             self._changed.notify()
 
     def close(self) -> None:
@@ -44,13 +49,15 @@ class WaitingCases:
         """
         with self._changed:
             while not self._closed:
-                group = self._by_engine.get(engine or "")
-                if not group:
-                    fresh = [cases for name, cases in self._by_engine.items() if cases and name not in self._begun]
-                    group = max(fresh or self._by_engine.values(), key=len, default=None)
-                if group:
+                at = min((place for place, groups in self._by_engine.items() if any(groups.values())), default=None)
+                if at is not None:
+                    groups = self._by_engine[at]
+                    group = groups.get(engine or "")
+                    if not group:
+                        fresh = [cases for name, cases in groups.items() if cases and (at, name) not in self._begun]
+                        group = max(fresh or groups.values(), key=len)
                     case = group.popleft()
-                    self._begun.add(case.engine.name)
+                    self._begun.add((at, case.engine.name))
                     return case
                 self._changed.wait()
             return None

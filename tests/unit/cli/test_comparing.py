@@ -86,7 +86,7 @@ def test_a_first_look_stays_within_its_budget(
 
     with monkeypatch.context() as patch:
         patch.setattr("proofroll.running.time_budget.TimeBudget.begin", short)
-        patch.setattr("proofroll.running.time_budget.TimeBudget.end", lambda *_: None)
+        patch.setattr("proofroll.running.time_budget.TimeBudget.end", lambda *_, **__: None)
         code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--jobs", "1")
     assert code == 0, err
     assert "Left out, for 60 s of processor time did not suffice: reduced[formulation=" in out
