@@ -236,7 +236,7 @@ def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Out
     content = write_report([dataclasses.replace(outcome, runs=lost)], store, tmp_path, COMMAND)
     assert content.comparisons[0].evidence
     found = content.comparisons[0].evidence.findings
-    assert found.answer.startswith("Of 1 engine setting, 1 gives no result somewhere")
+    assert found.answer.startswith("Of 1 engine setting, 1 gives no result at some points")
     assert found.recommendation == []
     assert "gamma is not installed here" in whole((tmp_path / "report.html").read_text(encoding="utf-8"))
 

@@ -108,7 +108,7 @@ def onset_study(
 
     loaded = load_scene(scene, **parameters)
     if len(loaded.elements) > 1 or not isinstance(loaded.elements[0], BallOnSurface):
-        raise InputError("scene", scene, "a first slip is that of one ball on one surface; name a scene of such a one")
+        raise InputError("scene", scene, "a first slip needs one ball on one surface; name a scene of these")
     if loaded.elements[0].rolling.gap0:
         raise InputError("scene", scene, "its ball begins in the air; name a scene whose ball begins on its wall")
     if BallCapability.BOUNDED_FRICTION not in loaded.requires:

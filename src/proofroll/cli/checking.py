@@ -135,7 +135,7 @@ def _comparison(path: Path) -> SoundFile:
 
 def _study(path: Path, study: str) -> SoundFile:
     readers = {point.name: point for point in announced(READERS)}
-    require_known(f"{path.name}: study", study, readers, "nothing reads such a file; choose from")
+    require_known(f"{path.name}: study", study, readers, "no study of this name is installed; choose from")
     content = readers[study].load()(str(path))
     parts = (
         {"entries": content}

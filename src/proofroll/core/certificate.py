@@ -191,4 +191,4 @@ def _single(line: Line) -> str:
     one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)
     if not np.array_equal(one, other):
         return ""
-    return '; it is the same number in single precision (float32): settings of such an engine say precision = "single"'
+    return '; it is the same number in single precision (float32): settings of the engine must say precision = "single"'

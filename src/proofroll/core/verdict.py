@@ -224,7 +224,7 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
     if limit.floor:
         text += f"; {limit.floor}"
     if limit.saturated:
-        text += "; two tolerances give the same run, for something else limits its steps, as near samples do"
+        text += "; two tolerances give the same run, so its steps have another limit, as near samples"
     return _Ladder(finding, error, bar, order, leaves, wrong, text)
 
 
@@ -259,7 +259,7 @@ def _reason(
     if rungs.finding == LimitFinding.NO_LADDER:
         text += "; one step only, so the limit is unknown"
     elif not rungs.text:
-        text += f"; no limit shown: {rungs.lost or 'not every step of the ladder gave such a curve'}"
+        text += f"; no limit shown: {rungs.lost or 'not every step of the ladder gave this curve'}"
     else:
         text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text

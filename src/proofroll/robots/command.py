@@ -30,7 +30,7 @@ def check(
     against: Annotated[Path | None, typer.Option(help="Another file of the robot, instead of engines.")] = None,
     names: Annotated[
         list[str] | None,
-        typer.Option("--map", help="With --against: joint=joint where names differ, or a TOML file of such; repeat."),
+        typer.Option("--map", help="With --against: joint=joint where names differ, or a TOML file of pairs; repeat."),
     ] = None,
     accept: Annotated[
         str | None,

@@ -93,7 +93,7 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
         apart = _apart(scene, run.sample, recording.passed[run.t])
         if apart > _SAME:
             timed.remarks.append(
-                f"no speed is told: the run that is timed ends at {run.t:g} s elsewhere than the one that is judged "
+                f"no speed is given: the timed run ends at {run.t:g} s elsewhere than the one that is judged "
                 f"({number(apart)} of its size)"
             )
             return timed

@@ -57,7 +57,7 @@ def test_who_says_no_precision_is_told_how() -> None:
     """A float32 engine that does not say so is refused with the setting that it lacks."""
     scene = load_scene("pendulum", mass=1.3)
     said = first_difference(certify(build(Single, scene, SingleSettings()), scene))
-    assert 'single precision (float32): settings of such an engine say precision = "single"' in str(said)
+    assert 'single precision (float32): settings of the engine must say precision = "single"' in str(said)
 
 
 def test_another_precision_is_one_line() -> None:

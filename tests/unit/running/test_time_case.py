@@ -56,7 +56,7 @@ def test_a_run_that_nobody_looks_at_is_the_same() -> None:
     """An engine that saves its work where it is not sampled has no speed, and the row says why."""
     found = timed(Watched)
     assert found.rates == []
-    assert "no speed is told: the run that is timed ends at" in found.remarks[0]
+    assert "no speed is given: the timed run ends at" in found.remarks[0]
 
 
 @pytest.mark.parametrize(

@@ -158,7 +158,7 @@ class Joint:
         if self.parent == self.child:
             raise InputError(f"{place}.child", self.child, "a joint connects two bodies; parent and child are the same")
         if self.child == WORLD:
-            raise InputError(f"{place}.child", WORLD, "the world is nobody's child; exchange parent and child")
+            raise InputError(f"{place}.child", WORLD, "the world cannot be a child; exchange parent and child")
         for key in ("position", "orientation", "child_position"):
             checks.assign(self, **{key: checks.vector(f"{place}.{key}", getattr(self, key))})
         checks.assign(self, axis=checks.axis(f"{place}.axis", self.axis))

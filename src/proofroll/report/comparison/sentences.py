@@ -56,12 +56,12 @@ def _answer(content: ReportedComparison, found: list[Score]) -> str:
         "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
         "incomplete": ("agrees", "agree", "without reporting all that is judged"),
         "converges": ("needs", "need", "a finer step"),
-        "ill-posed": ("is", "are", "beyond judgement somewhere, where the question is ill-posed"),
+        "ill-posed": ("is", "are", "beyond judgement at some points, where the question is ill-posed"),
         "another-scene": ("is", "are", "of another kind than the scene, so not judged"),
         "not-judged": ("is", "are", "not judged, for there is no truth, or none exact enough for the tolerance"),
         "refused": ("refuses", "refuse", "the scene, or some case of it, with the reason"),
-        "differs": ("differs", "differ", "somewhere, with no limit of small steps shown to be the truth"),
-        "failed": ("gives", "give", "no result somewhere"),
+        "differs": ("differs", "differ", "at some points, with no limit of small steps shown to be the truth"),
+        "failed": ("gives", "give", "no result at some points"),
     }
     parts = []
     for verdict, (one, many, rest) in said.items():

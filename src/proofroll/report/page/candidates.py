@@ -98,7 +98,7 @@ def _candidate(
 def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
     """Verdict and message of the first place without a result."""
     if not judged:
-        return Verdict.NOT_JUDGED, "nobody can be judged here"
+        return Verdict.NOT_JUDGED, "no engine can be judged here"
     for place, lines in judged.items():
         if not lines:
             return Verdict.FAILED, f"no run with this step at {place}"

@@ -41,7 +41,7 @@ def read_run(path: Path) -> xr.Dataset:
     except (OSError, ValueError, TypeError, KeyError):
         raise InputError("run", path, "no run in netCDF or npz; proofroll run … --out writes one") from None
     if not curves(dataset):
-        raise InputError("run", path, "it has no variable over time; proofroll run … --out writes such a file")
+        raise InputError("run", path, "it has no variable over time; proofroll run … --out writes a file that has")
     return dataset
 
 

@@ -27,7 +27,7 @@ from proofroll.studies.comparison.planning import point_name
 if TYPE_CHECKING:
     import xarray as xr
 
-_WRITES = "proofroll run … --out writes such a file"
+_WRITES = "proofroll run … --out writes one"
 
 
 def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:

@@ -25,7 +25,7 @@ _UNTIL, _SAMPLES = 1.0, 50
 _STEP = 4e-3  # s: samples lie whole numbers of it apart, which a ladder of steps down to 1e-3 s divides
 BUDGET = 60.0  # processor-seconds that a person waits for who asks nothing in particular
 _CLOSE = "close"
-_BECAUSE = "nobody has said what to expect of this scene"
+_BECAUSE = "no file says what to expect of this scene"
 # Along an axis a parameter is taken to these parts of its default, where its bounds allow.
 _PARTS = (0.1, 1.0, 10.0)
 

@@ -178,7 +178,7 @@ BAD = {
         "cycle",
     ),
     "child of itself": (SLIDER_CRANK + ROD + joint("extra", "extra"), "the same"),
-    "world as a child": (SLIDER_CRANK + joint("rod", "world"), "nobody's child"),
+    "world as a child": (SLIDER_CRANK + joint("rod", "world"), "cannot be a child"),
     "loop that does not close": (
         SLIDER_CRANK.replace("dependent = true", ""),
         r"loops.wrist = 'rod to slider': does not close: its points are 0\.0\d+ m apart",

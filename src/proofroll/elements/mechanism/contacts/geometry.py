@@ -32,7 +32,7 @@ _KEYS: Mapping[str, tuple[str, ...]] = {
     "plane": ("normal",),
     "box": ("size", "orientation"),
 }
-_RULES = "only a plane with a sphere, ellipsoid, circle or box, and two spheres, have a rule; choose such a pair"
+_RULES = "only a plane with a sphere, ellipsoid, circle or box, and two spheres, have a rule; choose one of these pairs"
 
 
 @dataclass(frozen=True)
