@@ -14,16 +14,17 @@ from proofroll.core.plugins import release
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability
-from proofroll.elements.mechanism.capabilities import require
+from proofroll.elements.mechanism.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.engines.pinocchio import constraint_dynamics, joint_tree
+from proofroll.engines.pinocchio import constraint_dynamics, impulses, joint_tree
 from proofroll.engines.pinocchio.contact_run import ContactRun
+from proofroll.engines.pinocchio.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import OF_MECHANISMS, PRESETS, PinocchioSettings, lowered
 
 # Before 4.0 the constraints have other signatures and other results.
-_OF_PINOCCHIO_4 = {"contact", "constraint_dynamics"}
+_OF_PINOCCHIO_4 = {"contact", "constraint_dynamics", "impulses"}
 
 
 class Pinocchio:
@@ -37,13 +38,16 @@ class Pinocchio:
         "contact": ALL_OF_A_BALL | {BallCapability.MOVING_WALL, BallCapability.IMPACTS},
         "null_space": joint_tree.PROVIDES,
         "constraint_dynamics": constraint_dynamics.PROVIDES,
+        "impulses": impulses.PROVIDES,
     }
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"impulses": frozenset({MechanismCapability.CONTACT})}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
         "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
         "contact": {BallCapability.TANGENTIAL_RESTITUTION: "Pinocchio's solver has no restitution to be asked for"},
         "null_space": joint_tree.LACKING,
         "constraint_dynamics": constraint_dynamics.LACKING,
+        "impulses": impulses.LACKING,
     }
     settings: ClassVar[type[Any]] = PinocchioSettings
     lowered = staticmethod(lowered)
@@ -54,6 +58,7 @@ class Pinocchio:
         "contact": Level.CONTACT,
         "null_space": Level.PROJECTION,
         "constraint_dynamics": Level.CONSTRAINT,
+        "impulses": Level.CONTACT,
     }
     terms: ClassVar[Sequence[Term]] = (
         Term(
@@ -85,7 +90,7 @@ class Pinocchio:
     @staticmethod
     def caveat(settings: PinocchioSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.TellsCaveats`: Pinocchio computes terms, and has no steps."""
-        terms = "contact solver" if settings.formulation == "contact" else "terms"
+        terms = "contact solver" if settings.solver else "terms"
         return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
 
     @staticmethod
@@ -119,6 +124,8 @@ class Pinocchio:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
         from proofroll.engines.pinocchio.reproducer import mechanism, source
 
+        if settings.formulation == "impulses":
+            raise Refused("programs hold no contacts between bodies yet")
         if settings.formulation in OF_MECHANISMS:
             return mechanism.source(_of_mechanism(scene, settings), settings)
         return source(rolling_ball(scene), _decided(scene, settings))
@@ -127,7 +134,7 @@ class Pinocchio:
 def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
     mechanism, formulation = mechanism_of(scene), settings.formulation
     require(mechanism, Pinocchio.provides[formulation], Pinocchio.lacking[formulation])
-    return MechanismRun(mechanism, settings)
+    return (ImpulseRun if formulation == "impulses" else MechanismRun)(mechanism, settings)
 
 
 def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:

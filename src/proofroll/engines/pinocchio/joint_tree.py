@@ -48,8 +48,13 @@ class JointTree:
         geared: rows on the velocities of the couplings, (couplings, nv).
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+    def __init__(self, mechanism: Mechanism, *, apart: bool = False) -> None:
+        """Takes whether the places of free bodies are coordinates ``apart`` from their orientations.
+
+        Velocities of a free-flyer joint turn with the body, and a step of semi-implicit Euler multiplies them by the
+        square root of 1 + (ω dt)²; apart, they stay along the world's axes.
+        """
+        self.mechanism, self._apart = mechanism, apart
         self.model: Any = pin.Model()
         self.model.gravity.linear = np.array(mechanism.gravity)
         self.joint: list[int] = []
@@ -64,7 +69,7 @@ class JointTree:
             if joint.kind == "fixed":
                 index, place = parent, place * back
             else:
-                index, place = self.model.addJoint(parent, _joint_model(joint), place, joint.name), back
+                index, place = self.model.addJoint(parent, self._joint_model(joint), place, joint.name), back
             carried[joint.child] = index, place
             body = data[joint.child]
             inertia = pin.Inertia(body.mass, np.array(body.com), np.array(body.inertia))
@@ -91,11 +96,28 @@ class JointTree:
             self._frame(f"{item.name} b", on_b, at_b * pin.SE3(B, np.array(item.position_b))),
         )
 
+    def _joint_model(self, joint: Joint) -> Any:
+        if joint.kind == "planar":  # pin.JointModelPlanar has cosine and sine, and velocities in the child
+            return _composite(pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())
+        if joint.kind == "free" and self._apart:
+            return _composite(pin.JointModelTranslation(), pin.JointModelSpherical())
+        return {
+            "revolute": pin.JointModelRZ,
+            "prismatic": pin.JointModelPZ,
+            "universal": lambda: pin.JointModelUniversal(_Z, _X),
+            "spherical": pin.JointModelSpherical,
+            "free": pin.JointModelFreeFlyer,
+        }[joint.kind]()
+
     def _start(self) -> tuple[Array, Array]:
         q, v = self.mechanism.start()
-        for joint, at in zip(self.mechanism.joints, self.mechanism.q_slices, strict=True):
+        slices = zip(self.mechanism.joints, self.mechanism.q_slices, self.mechanism.v_slices, strict=True)
+        for joint, at, at_v in slices:
             if joint.kind in {"spherical", "free"}:  # Pinocchio writes the scalar last
                 q[at.stop - 4 : at.stop] = np.roll(q[at.stop - 4 : at.stop], -1)
+            if joint.kind == "free" and self._apart:
+                along = slice(at_v.start, at_v.start + 3)
+                v[along] = pin.Quaternion(q[at.stop - 4 : at.stop]).matrix() @ v[along]
         return q, v
 
     def _laws(self) -> None:
@@ -173,16 +195,8 @@ class JointTree:
         forces[joint] = forces[joint] + at.act(pin.Force(force, np.zeros(3) if torque is None else torque))
 
 
-def _joint_model(joint: Joint) -> Any:
-    if joint.kind == "planar":  # JointModelPlanar has other coordinates: cosine and sine, and velocities in the child
-        composite = pin.JointModelComposite(pin.JointModelPX())
-        composite.addJoint(pin.JointModelPY())
-        composite.addJoint(pin.JointModelRZ())
-        return composite
-    return {
-        "revolute": pin.JointModelRZ,
-        "prismatic": pin.JointModelPZ,
-        "universal": lambda: pin.JointModelUniversal(_Z, _X),
-        "spherical": pin.JointModelSpherical,
-        "free": pin.JointModelFreeFlyer,
-    }[joint.kind]()
+def _composite(first: Any, *others: Any) -> Any:
+    composite = pin.JointModelComposite(first)
+    for joint in others:
+        composite.addJoint(joint)
+    return composite

@@ -62,7 +62,7 @@ class PlaneContact:
         self._on_wall, self._on_ball = self.point.joint1_placement, self.point.joint2_placement
         self._from_centre, self._foot = np.zeros((3, 4)), np.zeros(3)  # axes and contact point, in the world
         self._entries, self.axes = self._from_centre.reshape(-1), self._from_centre[:, :3]
-        self._solver, self.options, self._result = _solver(kind, tolerance)
+        self._solver, self.options, self._result = solver_of(kind, tolerance)
 
     def pose(self, place: Sequence[float], triad: Sequence[float]) -> FloatArray:
         """Poses the plane where a ball at ``place`` [m] touches, with the components of e1, e2, e3.
@@ -103,12 +103,13 @@ class PlaneContact:
         return float(self.point.getFriction())
 
 
-def _solver(kind: str, tolerance: float) -> tuple[Any, Any, Any]:
-    """Solver, its options and its result for one contact."""
+def solver_of(kind: str, tolerance: float, contacts: int = 1) -> tuple[Any, Any, Any]:
+    """Solver, its options and its result for so many contacts."""
+    size = 3 * contacts
     if kind == "pgs":
-        solver, options, result = pin.PGSConstraintSolver(3), pin.PGSSolverSettings(), pin.PGSSolverResult()
+        solver, options, result = pin.PGSConstraintSolver(size), pin.PGSSolverSettings(), pin.PGSSolverResult()
     else:
-        solver, options, result = pin.ADMMConstraintSolver(3), pin.ADMMSolverSettings(), pin.ADMMSolverResult()
+        solver, options, result = pin.ADMMConstraintSolver(size), pin.ADMMSolverSettings(), pin.ADMMSolverResult()
         options.max_iterations = _ADMM_ITERATIONS
     for name in ("feasibility", "complementarity"):
         for bound in ("absolute", "relative"):

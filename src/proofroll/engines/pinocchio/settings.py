@@ -15,9 +15,15 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 # scipy raises anything below 100 machine epsilons to it, with no more than a warning.
 TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
 
-_ORDERS = {"semi_implicit_euler": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
-OF_MECHANISMS = ("null_space", "constraint_dynamics")
+_ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
+# Formulations of mechanisms, and their integrators.
+OF_MECHANISMS = {
+    "null_space": ("rk4", "dop853"),
+    "constraint_dynamics": ("rk4", "dop853"),
+    "impulses": ("semi_implicit_euler", "midpoint"),
+}
 _OF_CONTACT = ("semi_implicit_euler", "leapfrog")
+_WITH_SOLVER = ("contact", "impulses")
 
 
 @dataclass(frozen=True)
@@ -28,12 +34,14 @@ class PinocchioSettings:
         formulation: ``composite`` (joints along the surface's generators, so the ball cannot leave it, and two rows
             of rolling), ``free_flyer`` (six freedoms, one row for the surface and two of rolling) or ``contact`` (a
             free ball against a plane posed anew in each step, by Pinocchio's solver of contact with friction); of
-            mechanisms: ``null_space`` (joint tree, loops by projection on the null space of their rows) or
-            ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints).
+            mechanisms: ``null_space`` (joint tree, loops by projection on the null space of their rows),
+            ``constraint_dynamics`` (loops as Pinocchio's own rigid constraints) or ``impulses`` (a tree whose bodies
+            touch, by Pinocchio's solver of contact with friction).
         preset: where the other values come from.
         integrator: ``semi_implicit_euler`` and ``rk4`` as they are usually written with ``pin.integrate``;
             ``rk4_dexpinv`` the same with the missing term of rotations; ``dop853`` adaptive, order 8. ``contact`` has
-            ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions.
+            ``semi_implicit_euler`` and ``leapfrog``, whose velocities are half a step ahead of the positions;
+            ``impulses`` has ``semi_implicit_euler`` and Moreau's ``midpoint``, with all terms at half a step.
         dt: step [s]; None with ``dop853``.
         rtol: relative tolerance [1] of ``dop853``; None with the others.
         orientation: integrate the orientation of the ball; None: if the scene asks for it. Its inertia is the same
@@ -41,22 +49,27 @@ class PinocchioSettings:
             ``contact`` always turns the ball: its spherical joint is part of the state.
             Mechanisms always have it.
         projection: put the state back on the constraints after each step; not in ``contact``, where the solver does.
-        solver: of ``contact``: projected Gauss-Seidel or alternating directions (ADMM); None with the others.
-        solver_tolerance: of ``contact``: feasibility [m/s] and complementarity [J], both also relative [1]; None with
-            the others.
+        solver: of ``contact`` and ``impulses``: projected Gauss-Seidel or alternating directions (ADMM); None with the
+            others.
+        solver_tolerance: of these: feasibility [m/s] and complementarity [J], both also relative [1]; None with the
+            others.
+        convex: of ``impulses``: whether the solver leaves De Saxcé's term out, so that what slips parts.
         proximal: of ``constraint_dynamics``: the term μ that makes dependent rows solvable, taken back by iteration;
             None with the others.
     """
 
-    formulation: Literal["composite", "free_flyer", "contact", "null_space", "constraint_dynamics"] = "composite"
+    formulation: Literal["composite", "free_flyer", "contact", "null_space", "constraint_dynamics", "impulses"] = (
+        "composite"
+    )
     preset: Literal["default", "matched", "tuned"] = "matched"
-    integrator: Literal["semi_implicit_euler", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
+    integrator: Literal["semi_implicit_euler", "midpoint", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
     rtol: Annotated[float, Ge(TIGHTEST_RTOL)] | None = 1e-13
     orientation: bool | None = None
     projection: bool = True
     solver: Literal["pgs", "admm"] | None = None
     solver_tolerance: Annotated[float, Gt(0)] | None = None
+    convex: bool = False
     proximal: Annotated[float, Gt(0)] | None = None
 
     def __post_init__(self) -> None:
@@ -69,21 +82,24 @@ class PinocchioSettings:
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
         contact, integrator = self.formulation == "contact", self.integrator
+        solves, own = self.formulation in _WITH_SOLVER, OF_MECHANISMS.get(self.formulation)
         for name in ("solver", "solver_tolerance"):
             given = getattr(self, name) is not None
             advice = f"{self.formulation} has no contact solver; leave it out, or take formulation=contact"
-            yield given and not contact, name, advice
-            yield contact and not given, name, "contact needs one; its presets have one"
+            yield given and not solves, name, advice
+            yield solves and not given, name, f"{self.formulation} needs one; its presets have one"
+        yield self.convex and self.formulation != "impulses", "convex", "only impulses has it; leave it out"
         if contact:
             yield integrator not in _OF_CONTACT, "integrator", f"contact has {' and '.join(_OF_CONTACT)}"
-            yield self.projection, "projection", "contact is put back by its solver; leave it out"
             yield self.orientation is False, "orientation", "contact always turns the ball; leave it out"
-        else:
-            yield integrator == "leapfrog", "integrator", "only contact has it"
-        if self.formulation in OF_MECHANISMS:
+        elif own is None:
+            only = {"leapfrog": "contact", "midpoint": "impulses"}.get(integrator)
+            yield only is not None, "integrator", f"only {only} has it"
+        yield solves and self.projection, "projection", "what touches is put back by the solver; leave it out"
+        if own is not None:
             advice = "a mechanism always has its orientations; leave it out"
             yield self.orientation is not None, "orientation", advice
-            yield integrator not in {"rk4", "dop853"}, "integrator", "mechanisms have rk4 and dop853"
+            yield integrator not in own, "integrator", f"{self.formulation} has {' and '.join(own)}"
         advice = "constraint_dynamics needs a number, and nothing else has one"
         yield (self.formulation == "constraint_dynamics") != (self.proximal is not None), "proximal", advice
         # A fixed step has dt and no rtol, an adaptive one rtol and no dt.
@@ -107,7 +123,7 @@ class PinocchioSettings:
         rk4 is of order 4 only where configurations form a vector space, that is without the orientation: see
         :mod:`proofroll.engines.pinocchio.integrators`. Where the scene decides, :func:`lowered` says the other.
         """
-        if self.formulation in OF_MECHANISMS:
+        if self.formulation in OF_MECHANISMS and self.formulation != "impulses":
             return 4 if self.integrator == "rk4" else None
         if self.integrator == "rk4" and not self.orientation:
             return 4
@@ -135,6 +151,16 @@ def _presets(formulation: Literal["composite", "free_flyer"]) -> Mapping[str, Pi
     }
 
 
+def _impulses(
+    preset: Literal["default", "matched", "tuned"],
+    integrator: Literal["semi_implicit_euler", "midpoint"],
+    tolerance: float,
+) -> PinocchioSettings:
+    return PinocchioSettings(
+        "impulses", preset, integrator, 1e-3, None, projection=False, solver="admm", solver_tolerance=tolerance
+    )
+
+
 PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
     "composite": _presets("composite"),
     "free_flyer": _presets("free_flyer"),
@@ -154,6 +180,14 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
         "matched": PinocchioSettings(
             "contact", "matched", "leapfrog", 1e-3, None, projection=False, solver="pgs", solver_tolerance=1e-12
         ),
+    },
+    "impulses": {
+        # what one writes first: the contacts where the bodies are when the step begins, the solver as it comes
+        "default": _impulses("default", "semi_implicit_euler", 1e-6),
+        # solved as far as ADMM comes in its iterations, impacts and all
+        "matched": _impulses("matched", "semi_implicit_euler", 1e-9),
+        # all terms in the middle of the step
+        "tuned": _impulses("tuned", "midpoint", 1e-9),
     },
     "null_space": {
         "default": PinocchioSettings("null_space", "default", "rk4", 1e-3, None, projection=False),

@@ -1,0 +1,118 @@
+"""Formulation ``impulses``: the motion of bodies that touch, and what is read back of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.engine import Regularised, whole_steps
+from proofroll.core.errors import Diverged
+from proofroll.elements.mechanism import WORLD, Mechanism
+from proofroll.elements.mechanism.certificate import CAPS
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
+from proofroll.engines.pinocchio.impulses import Impulses, ImpulseSteps
+from proofroll.engines.pinocchio.joint_tree import JointTree
+from proofroll.engines.pinocchio.mechanism_run import MechanismRun
+from proofroll.engines.pinocchio.null_space import LoopRows, NullSpace
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+
+# Part of a step in which the accelerations at the start are looked at, and what their errors are multiplied by.
+_PART, _MARGIN = 1 / 16, 4.0
+_PARTS = "in the convex problem what slips parts"
+_FOUND = (
+    "an impulse opposes the slip at its end, which turns, is found to solver_tolerance, and follows the turning of its "
+    "contact (J̇v) one step later"
+)
+
+
+class ImpulseRun(MechanismRun):
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
+        self._mechanism, self._settings = mechanism, settings
+        self.tree = JointTree(mechanism, apart=True)
+        self._model, self._data = self.tree.model, self.tree.model.createData()
+        self.dynamics = NullSpace(self.tree, LoopRows(self.tree))
+        self.steps, self._dt = ImpulseSteps(self.tree, settings), float(settings.dt or 0.0)
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        start, steps = self.steps.t, self.steps
+        for number in range(whole_steps(start, t, self._dt)):
+            steps.t = start + number * self._dt
+            steps.step()
+            if not np.isfinite(steps.v.sum()):
+                raise Diverged(f"the state is not finite at t = {steps.t:.6g} s")
+        steps.t = t
+
+    def _kick(self) -> tuple[Array, Array]:
+        """Accelerations v̇ and forces on body a of each contact [N] of the step that begins.
+
+        At time 0 they are those of a part of it, with what later steps find one step late.
+        """
+        steps = self.steps
+        if steps.t:
+            kick, span = steps.kick(steps.q, steps.v), self._dt
+        else:
+            span = _PART * self._dt
+            kick = steps.beginning(span, convex=self._settings.convex)
+        return (kick.v - steps.v) / span, kick.impulse / span
+
+    def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
+        """Data of the present state, q, v, and accelerations and forces of the step that begins."""
+        q, v, (acceleration, pressing) = self.steps.q, self.steps.v, self._kick()
+        found = self.steps.terms(q, v, self._dt)[-1]
+        data = self._placed(acceleration)
+        forces = self.tree.pulls(data)
+        for contact, each, force in zip(self.steps.contacts, found, pressing, strict=True):
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                if body != WORLD:
+                    frame = self.tree.body[self._mechanism.body_index[body]]
+                    self.tree.put(forces, data, frame, each.place, sign * force)
+        return data, q, v, acceleration, forces, np.zeros((2, 0, 3))
+
+    def _placed(self, acceleration: Array) -> Any:
+        """Data of the present state with an acceleration."""
+        data = self._model.createData()
+        pin.forwardKinematics(self._model, data, self.steps.q, self.steps.v, acceleration)
+        pin.updateFramePlacements(self._model, data)
+        return data
+
+    def sample(self) -> MechanismSample:
+        """See :class:`proofroll.core.engine.Engine`; the forces are those of the step that begins."""
+        return replace(super().sample(), contact_force=self._kick()[1])
+
+    def built(self) -> MechanismBuilt:
+        """See :class:`proofroll.core.engine.Engine`."""
+        found, span = super().built(), _PART * self._dt
+        hard, twice = (self._accelerations(self._beginning(length), length) for length in (span, 2 * span))
+        step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
+        softened, unsaid = dict[str, Regularised](), dict[str, None]()
+        for name, value in hard.items():
+            size = float(np.abs(value).max()) or np.finfo(float).tiny
+            others = twice[name], step[name], getattr(found, name)
+            unsure = float(self._settings.solver_tolerance or 0.0) / span / size
+            apart = sum(float(np.abs(value - other).max()) / size for other in others)
+            softened[name] = Regularised(_MARGIN * (unsure + apart), _PARTS if self._settings.convex else _FOUND)
+            if softened[name].tolerance > CAPS["acceleration"].tolerance:
+                unsaid[name] = None  # the first step of a hop tells nothing of the model
+        return replace(found, **unsaid, **self.steps.read(), regularised=softened)
+
+    def _beginning(self, span: float) -> Impulses:
+        return self.steps.beginning(span, convex=False)
+
+    def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:
+        """Accelerations of all bodies in the time of a kick [s]."""
+        data = self._placed((kick.v - self.steps.v) / span)
+        found = [
+            pin.getFrameClassicalAcceleration(self._model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+            for frame in self.tree.body
+        ]
+        return {
+            "acceleration": np.array([each.linear for each in found]),
+            "angular_acceleration": np.array([each.angular for each in found]),
+        }

@@ -1,0 +1,282 @@
+"""Steps of a mechanism whose bodies touch: Pinocchio's terms, and its solver of contact with friction.
+
+Contacts are points to Pinocchio, posed anew in each step where the shapes are nearest. Its solver finds the impulses of
+a step in the cones of friction: those of Coulomb's law (De Saxcé's term makes of the cone's dual the law), or those of
+the convex problem without it, whose contacts part as they slip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.contacts.start import TOUCHING
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.engines.pinocchio import joint_tree
+from proofroll.engines.pinocchio.joint_tree import JointTree
+from proofroll.engines.pinocchio.plane_contact import solver_of
+from proofroll.engines.pinocchio.settings import PinocchioSettings
+
+_CAPABILITY = MechanismCapability
+PROVIDES: frozenset[str] = (
+    ALL_JOINTS
+    | FORCES
+    | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+)
+_OF_A_TREE = "its steps are those of a tree with contacts"
+LACKING: Mapping[str, str] = {
+    **joint_tree.LACKING,
+    **dict.fromkeys(ALL_LOOPS | {_CAPABILITY.COUPLINGS}, _OF_A_TREE),
+}
+# An approach of less than so many steps of gravity is no impact: nothing rebounds.
+_SOFT = 5.0
+# Part of a gap that a step at its middle closes; all of it would throw what has sunk in.
+_CLOSED = 0.1
+# From this ratio of its responses along two directions of the surface on PGS returns a wrong impulse.
+_UNEQUAL = 2.0
+
+
+class Impulses(NamedTuple):
+    """Impulses of a step.
+
+    Attributes:
+        v: velocity after it, shape (nv,).
+        impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
+    """
+
+    v: Array
+    impulse: Array
+
+
+class _Solver(NamedTuple):
+    """Pinocchio's objects for some of the contacts: their points, its solver with options and result."""
+
+    points: list[Any]
+    point_datas: list[Any]
+    models: Any
+    datas: Any
+    solve: Any
+    options: Any
+    result: Any
+
+
+class ImpulseSteps:
+    """A tree with contacts, and its steps.
+
+    Attributes:
+        q, v, t: configuration, velocity, time [s].
+        restitution: of each contact [1].
+    """
+
+    def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
+        """Starts at time 0.
+
+        Raises:
+            Refused: Pinocchio's solver returns wrong impulses for such contacts.
+        """
+        self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
+        self._settings, self._dt = settings, float(settings.dt or 0.0)
+        self._midpoint = settings.integrator == "midpoint"
+        mechanism = tree.mechanism
+        self.contacts = mechanism.contacts
+        self.q, self.v, self.t = tree.q0, tree.v0, 0.0
+        self._gravity = float(np.linalg.norm(mechanism.gravity))
+        self._index = mechanism.body_index
+        self.restitution = np.array([contact.restitution for contact in self.contacts])
+        self._solvers: dict[tuple[int, ...], _Solver] = {}
+        try:
+            J, _, inverse, _ = self.terms(self.q, self.v, self._dt)
+            for k in range(len(self.contacts)):
+                self._check(k, J[k] @ inverse @ J[k].T)
+        except Diverged as error:
+            raise Refused(str(error)) from None
+
+    def _check(self, k: int, G: Array) -> None:
+        """Rejects a contact for which PGS returns wrong impulses, by what impulses do to its slide, shape (3, 3).
+
+        Raises:
+            Diverged: its responses along the surface differ too much.
+        """
+        one, two = float(G[0, 0]), float(G[1, 1])
+        if self._settings.solver == "pgs" and self.contacts[k].friction and max(one, two) > _UNEQUAL * min(one, two):
+            raise Diverged(
+                f"Pinocchio's PGS returns a wrong impulse where a contact gives way {_UNEQUAL:g} times as much in one "
+                f"direction as across it, as {self.contacts[k].name} does at {self.t:g} s; set solver=admm"
+            )
+
+    def step(self) -> None:
+        """One step from the present state.
+
+        Raises:
+            Diverged: Pinocchio's solver does not find the impulses.
+        """
+        kick = self.kick(self.q, self.v)
+        if self._midpoint:
+            middle = pin.integrate(self._model, self.q, 0.5 * self._dt * self.v)
+            self.q = pin.integrate(self._model, middle, 0.5 * self._dt * kick.v)
+        else:
+            self.q = pin.integrate(self._model, self.q, self._dt * kick.v)
+        self.v = kick.v
+
+    def kick(self, q: Array, v: Array) -> Impulses:
+        """Impulses of the step from a state; changes nothing but scratch data."""
+        if self._midpoint:
+            q = pin.integrate(self._model, q, 0.5 * self._dt * v)
+        J, free, inverse, found = self.terms(q, v, self._dt)
+        return self._solved(J, free, inverse, found, self._shifts(J, v, found), convex=self._settings.convex)
+
+    def beginning(self, span: float, *, convex: bool) -> Impulses:
+        """Impulses of a short time from the present on, with the turning of the contacts (J̇v), which steps find later.
+
+        What is apart stays apart.
+        """
+        J, free, inverse, found = self.terms(self.q, self.v, span)
+        ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
+        shifts = (ahead - J) @ self.v
+        shifts[[each.gap > TOUCHING for each in found], 2] = np.inf
+        return self._solved(J, free, inverse, found, shifts, convex=convex)
+
+    def read(self) -> dict[str, Any]:
+        """Normals, places and friction of the contacts' points as Pinocchio holds them; gaps of shapes at its poses."""
+        found = self.terms(self.q, self.v, self._dt)[-1]
+        solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
+        normal, place = np.zeros((2, len(found), 3))
+        for k, point in enumerate(solver.points):
+            normal[k] = (data.oMi[point.joint1_id] * point.joint1_placement).rotation[:, 2]
+            place[k] = (data.oMi[point.joint2_id] * point.joint2_placement).translation
+        return {
+            "contact_gap": np.array([each.gap for each in found]),
+            "contact_normal": normal,
+            "contact_place": place,
+            "contact_friction": np.array([point.getFriction() for point in solver.points]),
+            "contact_restitution": self.restitution.copy(),
+        }
+
+    def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:
+        """Rows of all contacts (contacts, 3, nv), velocity without impulses, inverse mass matrix, and the contacts.
+
+        The rows are slides along the normal's :func:`frame_of_axis`, the normal last.
+        """
+        tree, model, data = self._tree, self._model, self._data
+        pin.forwardKinematics(model, data, q, v)
+        pin.updateFramePlacements(model, data)
+        pulls = tree.pulls(data) if tree.springs else None
+        tau = tree.drives(q, v)
+        found = [
+            touch(contact, self._moving(contact.body_a), self._moving(contact.body_b)) for contact in self.contacts
+        ]
+        rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
+        free = v + span * rate
+        inverse = np.triu(pin.computeMinverse(model, data, q))
+        inverse = inverse + np.triu(inverse, 1).T
+        pin.computeJointJacobians(model, data, q)
+        J = np.zeros((len(found), 3, model.nv))
+        all_of = self._solver(tuple(range(len(found))))
+        for k, each in enumerate(found):
+            J[k] = self._posed(all_of, k, each)
+        return J, free, inverse, found
+
+    def _moving(self, body: str) -> Moving:
+        k, data = self._index[body], self._data
+        if k < 0:
+            return Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+        frame = self._tree.body[k]
+        velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
+        return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
+
+    def _posed(self, solver: _Solver, own: int, found: Touching) -> Array:
+        """Poses the ``own``-th point of a solver; its rows, shape (3, nv)."""
+        point, data = solver.points[own], self._data
+        place = pin.SE3(frame_of_axis(found.normal), found.place)
+        point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
+        point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
+        point.calc(self._model, data, solver.point_datas[own])
+        rows = point.jacobian(self._model, data, solver.point_datas[own])
+        return np.reshape(np.array(rows), (3, self._model.nv))
+
+    def _solver(self, which: tuple[int, ...]) -> _Solver:
+        if which not in self._solvers:
+            models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+            for k in which:
+                contact = self.contacts[k]
+                b, a = (self._joint(body) for body in (contact.body_b, contact.body_a))
+                point = pin.PointContactConstraintModel(self._model, b, pin.SE3.Identity(), a, pin.SE3.Identity())
+                models.append(pin.ConstraintModel(point))
+                datas.append(models[len(models) - 1].createData())
+            points = [models[i].extract() for i in range(len(which))]
+            for point, k in zip(points, which, strict=True):
+                point.setFriction(self.contacts[k].friction)
+            settings = self._settings
+            solve, options, result = solver_of(
+                settings.solver or "admm", float(settings.solver_tolerance or 0.0), len(which)
+            )
+            made = [datas[i].extract() for i in range(len(which))]
+            self._solvers[which] = _Solver(points, made, models, datas, solve, options, result)
+        return self._solvers[which]
+
+    def _joint(self, body: str) -> int:
+        k = self._index[body]
+        return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
+
+    def _shifts(self, J: Array, v: Array, found: Sequence[Touching]) -> Array:
+        """What is added to slides and to speeds of gaps [m/s], shape (contacts, 3); infinite where none can close."""
+        shifts, dt = np.zeros((len(found), 3)), self._dt
+        shifts[:, 2] = np.inf
+        for k, each in enumerate(found):
+            approach = float(J[k, 2] @ v)
+            e = float(self.restitution[k])
+            hits = e and -e * approach > _SOFT * self._gravity * dt
+            if self._midpoint:
+                if each.gap <= max(TOUCHING, self._gravity * dt**2):
+                    shifts[k, 2] = e * approach if hits else _CLOSED * each.gap / dt
+            else:
+                reached = each.gap + dt * (approach - dt * self._gravity) <= 0
+                shifts[k, 2] = e * approach if hits and reached else each.gap / dt
+        return shifts
+
+    def _solved(
+        self, J: Array, free: Array, inverse: Array, found: Sequence[Touching], shifts: Array, *, convex: bool
+    ) -> Impulses:
+        """Impulses of those contacts that would close, and of those that they close in turn."""
+        impulse, v = np.zeros((len(found), 3)), free
+        which: tuple[int, ...] = ()
+        while True:
+            closing = {k for k in range(len(found)) if np.isfinite(shifts[k, 2]) and J[k, 2] @ v + shifts[k, 2] < 0}
+            if closing <= set(which):
+                break
+            which = tuple(sorted({*which, *closing}))
+            solver = self._solver(which)
+            for own, k in enumerate(which):
+                self._posed(solver, own, found[k])
+            rows = J[list(which)].reshape(3 * len(which), -1)
+            to_joints = inverse @ rows.T
+            shift = shifts[list(which)].ravel()
+            G = rows @ to_joints
+            for own, k in enumerate(which):
+                self._check(k, G[3 * own : 3 * own + 3, 3 * own : 3 * own + 3])
+            solver.result.reset()
+            solver.options.solve_ncp = not convex
+            if not solver.solve.solve(
+                pin.DelassusOperatorDense(G),
+                rows @ free + shift,
+                solver.models,
+                solver.datas,
+                solver.options,
+                solver.result,
+            ):
+                raise Diverged(
+                    f"Pinocchio's {self._settings.solver} solver did not reach "
+                    f"solver_tolerance={self._settings.solver_tolerance:g} at {self.t:g} s"
+                )
+            got = np.array(solver.result.retrieveConstraintImpulses())
+            v = free + to_joints @ got
+            impulse[:] = 0.0
+            for own, k in enumerate(which):
+                impulse[k] = frame_of_axis(found[k].normal) @ got[3 * own : 3 * own + 3]
+        return Impulses(v, impulse)
