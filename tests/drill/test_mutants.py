@@ -21,8 +21,8 @@ from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll_drill.mutants import ball_models
-from proofroll_drill.mutants.drilling import ENOUGH
+from proofroll_drill.mutants import ball_models, joint_laws
+from proofroll_drill.mutants.drilling import ENOUGH, tried
 
 
 @functools.cache
@@ -47,12 +47,26 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
 
 
 @pytest.mark.parametrize(
+    "fault",
+    ["RoughJoint", "PushingJoint", "MovedStop", "NoArmature", "NoClamp", "SwappedGains", "Undamped", "InverseGear"],
+)
+def test_a_law_of_joints_that_is_another_is_named(fault: str) -> None:
+    """Friction, stops, armature, limits, gains and gears of joints that are not the scene's are named as such."""
+    pytest.importorskip("pinocchio")
+    found = tried(getattr(joint_laws, fault))
+    assert found.detected
+    assert found.named, found.said
+
+
+@pytest.mark.parametrize(
     ("scene", "parameters", "until"),
     [
         ("sphere_in_cylinder", {}, 0.3),
         ("sphere_in_cylinder", {"mu_static": 0.2, "mu_kinetic": 0.15}, 0.4),
         ("double_pendulum", {}, 0.3),
         ("slider_crank", {}, 0.2),
+        ("arm_pd", {}, 0.3),
+        ("pendulum_friction", {}, 0.4),
     ],
 )
 def test_small_errors_of_an_honest_engine_have_no_cause(scene: str, parameters: dict[str, float], until: float) -> None:

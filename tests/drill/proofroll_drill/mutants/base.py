@@ -53,7 +53,7 @@ class Mutant:
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         self.element: Any = scene.elements[0]
-        self.claimed = Projection.build(scene, settings)
+        self.claimed: Any = Projection.build(scene, settings)
         self.inner: Any = Projection.build(self.misread(scene), settings)
         self.t = 0.0
 

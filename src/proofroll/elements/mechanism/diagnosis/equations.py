@@ -7,6 +7,8 @@ inertias, stiffnesses, damping and gravity, and needs no reaction.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,17 +19,20 @@ from scipy.interpolate import make_interp_spline
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.diagnosis.lines import DERIVED
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews
-from proofroll.elements.mechanism.signal import varies
+from proofroll.elements.mechanism.signal import breaks, value_at
+from proofroll.elements.mechanism.switches import switched_joints
 
 _DEGREE, _ENDS, _SAMPLES = 7, 5, 16
 _DEPENDENT = 1e-7
 _GONE = 1e-9
 _TURNS = 0.1
 _CONSISTENT = 1e-3
+_AT_REST = 1e-9  # rad/s, m/s
 
 
 @dataclass(frozen=True)
@@ -35,11 +40,13 @@ class MechanismState:
     """State of a mechanism at one instant of a run, with its kinematics and accelerations.
 
     Attributes:
+        t: time [s].
         q, v: coordinates and velocities of the tree.
         motion: kinematics there.
         acceleration: of the origin of each body's frame, and turning, shape (bodies, 6).
     """
 
+    t: float
     q: FloatArray
     v: FloatArray
     motion: BodyMotion
@@ -67,21 +74,30 @@ class MechanismStates:
             v = np.linalg.lstsq(still.J[:-1].reshape(-1, mechanism.nv), twists.ravel(), rcond=None)[0]
             off = np.abs(still.J[:-1].reshape(-1, mechanism.nv) @ v - twists.ravel())
             self.consistent &= bool(np.max(off) <= _CONSISTENT * max(float(np.max(np.abs(twists))), 1e-300))
-            self.each.append(MechanismState(q, v, self.tree.at(q, v), acceleration[i]))
+            self.each.append(MechanismState(float(placed.time[i]), q, v, self.tree.at(q, v), acceleration[i]))
 
     @cached_property
     def allowed(self) -> list[FloatArray]:
-        """Directions of the tree's velocities that the loops allow, (nv, directions), at each state."""
+        """Directions of the tree's velocities that loops and couplings allow, (nv, directions), at each state."""
         return [self.free(state, ()) for state in self.each]
 
     def free(self, state: MechanismState, without: tuple[int, ...]) -> FloatArray:
         """The same at one state, without some rows of the loops."""
         rows = self.tree.loop_rows(state.motion)
-        C = np.delete(rows.C, without, axis=0)
+        C = np.concatenate([np.delete(rows.C, without, axis=0), self._geared])
         if not len(C):
             return np.eye(self.mechanism.nv)
         _, S, Vt = np.linalg.svd(C)
         return Vt[int(np.sum(_DEPENDENT * S[0] < S)) :].T
+
+    @cached_property
+    def _geared(self) -> FloatArray:
+        """Rows of the couplings on the velocities."""
+        found = np.zeros((len(self.mechanism.couplings), self.mechanism.nv))
+        for row, coupling in zip(found, self.mechanism.couplings, strict=True):
+            row[self.mechanism.place_of(coupling.joint_b)[1]] = 1.0
+            row[self.mechanism.place_of(coupling.joint_a)[1]] = -coupling.ratio
+        return found
 
     @cached_property
     def v_rates(self) -> list[FloatArray]:
@@ -136,6 +152,8 @@ class Change:
         springs, spring_damping: factors on stiffness and damping of the springs.
         weight_at_origin: whether weights act at the origins of the bodies' frames.
         added: further damping by velocity of the tree, and further armature.
+        friction: factor on the dry friction of the joints, which move.
+        effort: of an actuator at a time, a coordinate and a rate.
         gyroscopic: factor on ω × I ω.
         coupling: pairs of velocities that lose their term of the mass matrix.
     """
@@ -154,6 +172,8 @@ class Change:
     weight_at_origin: bool = False
     added_damping: FloatArray | float = 0.0
     added_armature: FloatArray | float = 0.0
+    friction: float = 1.0
+    effort: Callable[[Actuator, float, float, float], float] = Actuator.effort
     gyroscopic: float = 1.0
     coupling: FloatArray | None = None
 
@@ -185,7 +205,11 @@ class Change:
             weighted = np.concatenate([mass[:, None, None] * J[:, :3], inertia @ J[:, 3:]], axis=1)
             M = J.reshape(-1, m.nv).T @ weighted.reshape(-1, m.nv)
             terms.append(-(M * self.coupling) @ rate)
-        acts = acts + self.torque * np.array([j.constant_drive for j in by_v])
+        acts = acts + self.torque * np.array([float(value_at(j.torque, state.t)) for j in by_v])
+        acts = acts - self.friction * np.array([j.friction for j in by_v]) * np.sign(state.v)
+        for actuator in mechanism.actuators:
+            at_one, rated = m.place_of(actuator.joint)
+            acts[rated] += self.effort(actuator, state.t, float(state.q[at_one]), float(state.v[rated]))
         acts = acts - (self.damping * np.array([j.damping for j in by_v]) + self.added_damping) * state.v
         for joint, at_q, at_v in zip(mechanism.joints, m.q_slices, m.v_slices, strict=True):
             if joint.stiffness:
@@ -222,19 +246,55 @@ def is_motion(dataset: Any) -> bool:
     )
 
 
-def _known(mechanism: Mechanism) -> bool:
-    """True if the equations here have all its laws."""
-    return not mechanism.actuators and not mechanism.couplings and not any(map(varies, mechanism.signals))
+def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
+    """Mode of the laws that switch at each sample: friction, stops, efforts with a limit, stretches of tables."""
+    corners = np.array(breaks(mechanism.signals))
+    found: list[tuple[object, ...]] = []
+    joints = switched_joints(mechanism)
+    q, v = placed.of_tree() if joints or mechanism.actuators else (np.zeros((len(placed.time), mechanism.nq)),) * 2
+    for t, places, rates in zip(placed.time.tolist(), q, v, strict=True):
+        rest = tuple(
+            (
+                np.sign(rates[j.velocity]) if abs(rates[j.velocity]) > _AT_REST else 0.0,
+                j.low < places[j.coordinate] < j.high,
+            )
+            for j in joints
+        )
+        where = ((item, *mechanism.place_of(item.joint)) for item in mechanism.actuators if item.limit is not None)
+        efforts = tuple(item.mode(t, float(places[at]), float(rates[rated])) for item, at, rated in where)
+        found.append((rest, efforts, int(np.searchsorted(corners, t))))
+    return found
 
 
-def of_run(mechanism: Mechanism, dataset: Any) -> MechanismStates | None:
-    """The states of a run away from its ends; None: too few samples, not all are numbers, or unknown laws."""
-    if not _known(mechanism) or dataset.sizes["time"] <= _DEGREE + 2 * _ENDS or not is_motion(dataset):
+def _moves(mode: tuple[object, ...]) -> bool:
+    """True if each joint that may be held moves, and lies at no stop."""
+    rest: Any = mode[0]
+    return all(direction and inside for direction, inside in rest)
+
+
+def stretch(mechanism: Mechanism, *datasets: Any) -> slice | None:
+    """The longest stretch of samples in which no run has a switch, and no joint is held.
+
+    None: too few samples, or not all of them are numbers.
+    """
+    if not all(is_motion(dataset) for dataset in datasets):
         return None
+    count = min(dataset.sizes["time"] for dataset in datasets)
+    each = list(zip(*(_modes(mechanism, placed_of(mechanism, dataset)) for dataset in datasets), strict=False))
+    ends = [0, *(k for k in range(1, count) if each[k] != each[k - 1]), count]
+    free = [slice(a, b) for a, b in itertools.pairwise(ends) if all(map(_moves, each[a]))]
+    longest = max(free, key=lambda part: part.stop - part.start, default=slice(0, 0))
+    return longest if longest.stop - longest.start > _DEGREE + 2 * _ENDS else None
+
+
+def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
+    """The states of a run in a stretch, away from its ends."""
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
-    acceleration = make_interp_spline(placed.time, twists, k=_DEGREE).derivative()(placed.time)
-    which = np.unique(np.linspace(_ENDS, len(placed.time) - 1 - _ENDS, _SAMPLES).astype(int))
+    acceleration = np.zeros_like(twists)
+    time = placed.time[part]
+    acceleration[part] = make_interp_spline(time, twists[part], k=_DEGREE).derivative()(time)
+    which = np.unique(np.linspace(part.start + _ENDS, part.stop - 1 - _ENDS, _SAMPLES).astype(int))
     return MechanismStates(mechanism, placed, acceleration, which)
 
 
@@ -244,7 +304,7 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
     Those of the first steps alone if ``derived``, else where the engine does not say its own.
     """
     element = evidence.element
-    if not _known(element.mechanism):
+    if not _moves(_modes(element.mechanism, element.start)[0]):
         return None
     lines = {line["quantity"]: line for line in evidence.lines}
     rows = []

@@ -69,6 +69,13 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
         "give the joints their damping, as a moment per rad/s or a force per m/s against the motion",
     ),
     factor_of_all(
+        "joint friction",
+        "the dry friction of the joints",
+        lambda m, x: Change(m, friction=x),
+        lambda m: any(joint.friction for joint in m.joints),
+        "give the joints their dry friction, against the motion",
+    ),
+    factor_of_all(
         "joint stiffness",
         "the stiffness of the joints",
         lambda m, x: Change(m, stiffness=x),

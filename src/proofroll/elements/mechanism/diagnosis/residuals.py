@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, once
 from proofroll.core.diagnosis.lines import DERIVED, differing
-from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start
+from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start, stretch
 
 # Equations that the true run leaves more of, relative, tell nothing.
 _TELLS = 1e-4
@@ -48,8 +48,11 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
         yield balanced_at_start(start)
     if evidence.run is None or evidence.truth is None:
         return
-    seen, true = of_run(mechanism, evidence.run), of_run(mechanism, evidence.truth)
-    if seen is None or true is None or not seen.consistent:
+    part = stretch(mechanism, evidence.run, evidence.truth)
+    if part is None:
+        return
+    seen, true = of_run(mechanism, evidence.run, part), of_run(mechanism, evidence.truth, part)
+    if not seen.consistent:
         return
     own = np.abs(true.left(plain))
     tells = own < _TELLS  # of a body that spins freely about its axis nothing is left to balance but round-off

@@ -14,7 +14,7 @@ from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, h
 from proofroll.core.diagnosis.lines import DERIVED, differing, scale_of
 from proofroll.core.diagnosis.samples import both
 from proofroll.core.errors import InputError
-from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of
+from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -195,10 +195,11 @@ def _ancestry(mechanism: Mechanism) -> FloatArray:
 def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
     """A loop lacks one or more of its rows."""
     mechanism = evidence.element.mechanism
-    if not mechanism.loops or evidence.run is None:
+    part = stretch(mechanism, evidence.run) if mechanism.loops and evidence.run is not None else None
+    if part is None:
         return
-    seen = of_run(mechanism, evidence.run)
-    if seen is None or not seen.consistent:
+    seen = of_run(mechanism, evidence.run, part)
+    if not seen.consistent:
         return
     rows = [seen.tree.loop_rows(state.motion) for state in seen.each]
     opened = np.max(np.abs([row.residual for row in rows]), axis=0)

@@ -1,0 +1,150 @@
+"""Hypotheses that an engine has other gains, gears and limits of actuators, other couplings, or other stops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
+from proofroll.core.diagnosis.fitting import possible, said_factor, telling
+from proofroll.core.diagnosis.samples import both
+from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
+from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.signal import value_at
+
+Effort = Callable[[Actuator, float, float, float], float]
+_COVERS = ("motion", *COVERED, "effort")
+_STILL = 1e-9
+
+
+def _effort(kp: float = 1.0, kd: float = 1.0, gear: float = 1.0, limit: float = 1.0, clamps: str = "sum") -> Effort:
+    """Effort of actuators with factors on their numbers; ``clamps`` the sum, the part of kp, the motor, or nothing."""
+
+    def effort(a: Actuator, t: float, q: float, v: float) -> float:
+        n, target, bound = gear * a.gear, float(value_at(a.target, t)), limit * a.bound
+        gain = {"torque": 1.0, "velocity": kd * a.kd, "position": kp * a.kp}[a.kind]
+        proportional = n * gain * (target - {"torque": 0.0, "velocity": n * v, "position": n * q}[a.kind])
+        damping = n * n * kd * a.kd * v if a.kind == "position" else 0.0
+        if clamps == "part":
+            return float(np.clip(proportional, -bound, bound)) - damping
+        bound *= {"sum": 1.0, "motor": abs(n), "nothing": np.inf}[clamps]
+        return float(np.clip(proportional - damping, -bound, bound))
+
+    return effort
+
+
+def _swapped(a: Actuator, t: float, q: float, v: float) -> float:
+    """Effort with kp and kd exchanged."""
+    if a.kind != "position" or not a.kd:
+        return a.effort(t, q, v)
+    return _effort(kp=a.kd / a.kp, kd=a.kp / a.kd)(a, t, q, v)
+
+
+@hypothesis(
+    "actuators", "the equations of motion balance at every state of the run with that law, and not with the scene's"
+)
+def of_actuators(evidence: Evidence) -> Iterator[Cause]:
+    """Gains, gears and limits of all actuators."""
+    mechanism = evidence.element.mechanism
+    actuators = mechanism.actuators
+    limited = any(item.limit is not None for item in actuators)
+    rules: list[tuple[bool, str, str, Effort]] = [
+        (any(item.kp and item.kd for item in actuators), "gains", "has kp and kd swapped", _swapped),
+        (limited, "limit", "has no limit on the efforts of actuators", _effort(clamps="nothing")),
+        (limited, "limit", "clamps the part of kp alone, not the whole effort", _effort(clamps="part")),
+        (limited and _geared(actuators), "limit", "clamps efforts before the gear", _effort(clamps="motor")),
+        (
+            _geared(actuators),
+            "gear",
+            "leaves out the gears of actuators",
+            lambda a, *x: _effort(gear=1 / a.gear)(a, *x),
+        ),
+        (_geared(actuators), "gear", "has gears the other way round", lambda a, *x: _effort(gear=a.gear**-2)(a, *x)),
+    ]
+    numbers: list[tuple[bool, str, Callable[[float], Effort]]] = [
+        (any(item.kp for item in actuators), "kp", lambda x: _effort(kp=x)),
+        (any(item.kd for item in actuators), "kd", lambda x: _effort(kd=x)),
+        (any(item.kp and item.kd for item in actuators), "kp and kd", lambda x: _effort(kp=x, kd=x)),
+        (any(item.kind == "torque" for item in actuators), "the torques", lambda x: lambda a, *s: x * a.effort(*s)),
+        (limited, "the limits", lambda x: _effort(limit=x)),
+        (bool(actuators), "the gears", lambda x: _effort(gear=x)),
+    ]
+    remedy = "look at gains, gear and limit of the actuators: the limit clamps the whole effort, at the joint"
+    for held in residuals_of(evidence) if actuators else ():
+        known = [
+            held.cause(f"actuators: {name}", f"the engine {says}", Change(mechanism, effort=effort), remedy, 0)
+            for asked, name, says, effort in rules
+            if asked
+        ]
+        yield from known
+        unlimited = any(cause.proven and "no limit" in cause.says for cause in known)
+        for asked, what, law in numbers:
+            if not asked or (unlimited and what == "the limits"):  # any limit that is large enough
+                continue
+            factor, count = best(held, lambda x, law=law: Change(mechanism, effort=law(x)))  # type: ignore[misc]  # bound now
+            if what in {"the limits", "the gears"} and count:  # the equations are not linear in these
+                factor = held.fit(lambda x, law=law: Change(mechanism, effort=law(x)), 1.0)  # type: ignore[misc]  # bound now
+            if possible(factor, signed=what != "the limits"):
+                says = (
+                    f"the engine moves it with {what} of the actuators {said_factor(factor)}" if telling(factor) else ""
+                )
+                yield held.cause(f"actuators: {what}", says, Change(mechanism, effort=law(factor)), remedy, count)
+
+
+def _geared(actuators: tuple[Actuator, ...]) -> bool:
+    return any(item.gear != 1 for item in actuators)
+
+
+@hypothesis("couplings", "the rates of both joints have one ratio at every sample, which is not the scene's")
+def of_couplings(evidence: Evidence) -> Iterator[Cause]:
+    """Another ratio of a coupling; at the start, where there is one equation, one that a mistake makes."""
+    mechanism, found = evidence.element.mechanism, both(evidence)
+    if not mechanism.couplings:
+        return
+    moving: FloatArray | None = None
+    if found is not None and is_motion(found[0]):
+        moving = placed_of(mechanism, found[0]).of_tree()[1]
+    elif (start := of_start(evidence)) is not None:
+        moving = start.v_rates[0][None]
+    if moving is None:
+        return
+    for coupling in mechanism.couplings:
+        a, b = (moving[:, mechanism.place_of(joint)[1]] for joint in (coupling.joint_a, coupling.joint_b))
+        own, alone = coupling.ratio, len(a) < 2
+        square = float(a @ a)
+        known = min((1 / own, -own, -1 / own), key=lambda x: float(np.max(np.abs(b - x * a))))
+        ratio = known if alone else float(a @ b) / square if square else own
+        before, after = (float(np.max(np.abs(b - x * a))) for x in (own, ratio))
+        if not above_round_off(before, float(np.max(np.abs(b), initial=0.0))):
+            continue
+        says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {own:.6g}"
+        remedy = "the scene's ratio is that of joint_b's rate to joint_a's"
+        what = f"rate of {coupling.joint_b} by its coupling", "1/s^2" if alone else "1/s", before, after
+        yield Cause(f"ratio of {coupling.name}", says, *what, remedy, int(not alone), _COVERS)
+
+
+@hypothesis("stops", "where the true joint rests at its stop the engine's rests at one other place, at every sample")
+def of_stops(evidence: Evidence) -> Iterator[Cause]:
+    """Another place of a stop."""
+    mechanism, found = evidence.element.mechanism, both(evidence)
+    if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
+        return
+    (seen, _), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in found)
+    for joint in mechanism.joints:
+        if not joint.limits:
+            continue
+        at, rated = mechanism.place_of(joint.name)
+        for limit in joint.limits:
+            size = max(abs(limit), float(np.ptp(true[:, at])))
+            rests = (np.abs(true[:, at] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
+            off = seen[rests, at] - limit
+            if np.count_nonzero(rests) < 2 or not above_round_off(float(np.max(np.abs(off))), size):
+                continue
+            shift = float(np.median(off))
+            says = f"the joint {joint.name} rests at {limit + shift:.6g}, not at its stop at {limit:.6g}"
+            remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
+            what = f"{joint.name} at rest at its stop", "rad, m", float(np.max(np.abs(off)))
+            yield Cause(f"stop of {joint.name}", says, *what, float(np.max(np.abs(off - shift))), remedy, 1, _COVERS)
