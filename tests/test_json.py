@@ -44,7 +44,7 @@ from proofroll.robots.records import (
     UnlikeValue,
     UsedTruth,
 )
-from proofroll.robots.robot_file import LintFinding
+from proofroll.robots.robot_file import LintRemark
 from proofroll.studies.ladder.models import Ran
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.records import (
@@ -158,7 +158,7 @@ def test_two_files_of_a_robot(proofroll: Proofroll, tmp_path: Path) -> None:
     assert set(json.loads(out)) == fields("`check --json` of a robot file") | fields("`check --against --json`")
 
 
-ROBOT = (RobotCheck, LintFinding, UsedTruth, ImporterRow, HeldLayer, RobotCause, DrawnRobot, DrawnBody, DrawnJoint)
+ROBOT = (RobotCheck, LintRemark, UsedTruth, ImporterRow, HeldLayer, RobotCause, DrawnRobot, DrawnBody, DrawnJoint)
 COMPARISON = (
     ReportedComparison, ReportedRow, ReportedRun, WorstJudgement, CauseAt, Cause, Claims, ExceptAt, Cost, Line,
     ShownObservable, ShownBand,

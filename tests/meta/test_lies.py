@@ -22,7 +22,7 @@ from proofroll.core.observable import Role
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Judgement, LimitFinding, Verdict, judge_curve
+from proofroll.core.verdict import Judgement, LimitResult, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.studies.comparison.default_comparison import bounds
@@ -218,9 +218,9 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
                 magnitude=reference.magnitude(item),
             )
         )
-    assert not [item for item in judgements if item.limit is LimitFinding.ANOTHER or item.remarks]
+    assert not [item for item in judgements if item.limit is LimitResult.ANOTHER or item.remarks]
     # where the coarse steps show no limit, as of the chain, a difference is none of the model
-    assert {item.limit for item in judgements if item.verdict is Verdict.DIFFERS} <= {LimitFinding.NOT_SHOWN}
+    assert {item.limit for item in judgements if item.verdict is Verdict.DIFFERS} <= {LimitResult.NOT_SHOWN}
     assert not _causes(scene, kind, runs[1.0], judgements, {"formulation": formulation, **step})
 
 

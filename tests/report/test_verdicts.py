@@ -18,7 +18,7 @@ from proofroll.core.convergence import Limit, richardson
 from proofroll.core.verdict import Verdict, judge_curve
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.sentences import findings
+from proofroll.report.comparison.sentences import conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.comparison.verdict_matrix import counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
@@ -123,7 +123,7 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     result = Result(Status.REFUSED, "no wall, no ball")
     refused = dataclasses.replace(run, result=result, judgements=[], contradictions=[], missing=[])
     content = outcome_content(with_runs(made[0], {number: [refused]}))
-    found = findings(content, [], None)
+    found = conclusions(content, [], None)
     assert "1 refuses the scene, or some case of it, with the reason" in found.answer
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
@@ -172,13 +172,13 @@ def test_what_could_not_be_judged_is_not_said_to_be_as_expected(made: tuple[Outc
     runs = {rows.index(run.row): [answered(run)] for run in made[0].runs}
     content = outcome_content(with_runs(made[0], runs))
     assert closing_lines(content)[-1].startswith("Every verdict is as")
-    assert "All of this was expected." in findings(content, [], None).answer
+    assert "All of this was expected." in conclusions(content, [], None).answer
     assert counted(content).endswith("; as expected")
     nothing = Result(Status.NO_TRUTH, "there is no truth here")
     runs[0] = [dataclasses.replace(run, result=nothing, judgements=[]) for run in runs[0]]
     content = outcome_content(with_runs(made[0], runs))
     assert "Nothing contradicts the comparison file; 1 of its runs could not be judged." in closing_lines(content)
-    assert "Nothing of it was unexpected." in findings(content, [], None).answer
+    assert "Nothing of it was unexpected." in conclusions(content, [], None).answer
     assert counted(content).endswith("; nothing is contradicted")
 
 

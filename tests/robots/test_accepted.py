@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from robot_templates import mjcf, urdf
 
-from proofroll.robots.robot_file import LintFinding
-from proofroll.robots.terminal import finding_lines
+from proofroll.robots.robot_file import LintRemark
+from proofroll.robots.terminal import remark_lines
 
 Proofroll = Callable[..., tuple[int, str, str]]
 BOTH = '<dynamics damping="0.7" friction="0.4"/>'
@@ -69,9 +69,9 @@ def test_what_an_engine_is_fed_without(proofroll: Proofroll, tmp_path: Path) -> 
 
 def test_repeated_findings() -> None:
     """Findings that say the same of several places are one line with their number."""
-    found = [LintFinding("note", f"link l{n}", "it is turned") for n in range(138)]
-    assert list(finding_lines(found)) == ["note: link l0, link l1 and 136 more: it is turned"]
-    assert list(finding_lines(found[:2])) == ["note: link l0, link l1: it is turned"]
+    found = [LintRemark("note", f"link l{n}", "it is turned") for n in range(138)]
+    assert list(remark_lines(found)) == ["note: link l0, link l1 and 136 more: it is turned"]
+    assert list(remark_lines(found[:2])) == ["note: link l0, link l1: it is turned"]
 
 
 def test_notes_stand_below(proofroll: Proofroll, tmp_path: Path) -> None:

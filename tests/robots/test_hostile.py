@@ -102,7 +102,7 @@ def test_meshes_are_not_opened(tmp_path: Path) -> None:
     path.write_text(urdf(tool=mesh))
     file = open_robot(path)
     assert not [*file.root.iter("mesh")]
-    assert any("collision mesh was left out" in finding.what for finding in file.findings)
+    assert any("collision mesh was left out" in finding.what for finding in file.remarks)
     path = tmp_path / "robot.xml"
     path.write_text(
         mjcf(base='<geom type="mesh" mesh="m"/>').replace(

@@ -10,7 +10,7 @@ from robot_templates import inertial, mjcf, spherical, urdf
 from proofroll.robots.lint import lint
 from proofroll.robots.model import Robot
 from proofroll.robots.opening import open_robot
-from proofroll.robots.robot_file import LintFinding
+from proofroll.robots.robot_file import LintRemark
 from proofroll.robots.urdf import read_urdf
 
 MESH = '<collision><geometry><mesh filename="package://x/y.stl"/></geometry></collision>'
@@ -51,11 +51,11 @@ PLANTED = {
 }
 
 
-def _findings(text: str, folder: Path) -> list[LintFinding]:
+def _findings(text: str, folder: Path) -> list[LintRemark]:
     path = folder / "robot.urdf"
     path.write_text(text)
     file = open_robot(path)
-    return [*file.findings, *lint(file, read_urdf(file))]
+    return [*file.remarks, *lint(file, read_urdf(file))]
 
 
 @pytest.mark.parametrize("name", PLANTED)
@@ -89,7 +89,7 @@ IN_MJCF = {
 FREE = (LIFTED.format('class="k" damping="0" armature="0"'), LIFTED.format('damping="1"'), "<body><freejoint/></body>")
 
 
-def _mjcf_findings(extra: str, default: str, folder: Path) -> list[LintFinding]:
+def _mjcf_findings(extra: str, default: str, folder: Path) -> list[LintRemark]:
     path = folder / "robot.xml"
     path.write_text(mjcf(extra=extra).replace("<worldbody>", default + "<worldbody>"))
     return [item for item in lint(open_robot(path), Robot("r", {}, ())) if item.where == "joint f"]

@@ -93,6 +93,6 @@ def test_root(tmp_path: Path) -> None:
 def test_what_is_missing(tmp_path: Path) -> None:
     """A mesh that would give mass and does not exist is a warning, which counts it."""
     path = _file(tmp_path, '<mesh name="t" file="tet.obj"/>', '<geom size="1"/><geom type="mesh" mesh="t"/>')
-    (finding,) = open_robot(path).findings
+    (finding,) = open_robot(path).remarks
     assert finding.level == "warning"
     assert "1 mesh shape that would give it mass: no such file" in finding.what

@@ -38,11 +38,11 @@ class Verdict(StrEnum):
     NOT_JUDGED = "not-judged"  # there is no truth, or its own error bar exceeds the tolerance; nobody can be judged
     ANOTHER_SCENE = "another-scene"  # what was run is of another kind than the scene; it is shown and not judged
     REFUSED = "refused"  # the engine says that it cannot do this scene, or not with these settings: it has not failed
-    DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitFinding
+    DIFFERS = "differs"  # not this model at this step; what the ladder says is in LimitResult
     FAILED = "failed"  # there is no result
 
 
-class LimitFinding(StrEnum):
+class LimitResult(StrEnum):
     """Finding of a ladder of steps about the limit of small steps."""
 
     NO_LADDER = "no ladder"  # only one step was run
@@ -73,7 +73,7 @@ class Judgement:
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
         limit_error_bar: uncertainty of that distance.
-        limit: what the ladder says, see :class:`LimitFinding`.
+        limit: what the ladder says, see :class:`LimitResult`.
         reason: why this verdict, as a clause with numbers.
         remarks: what a reader must know though it does not change the verdict, one clause each.
     """
@@ -88,7 +88,7 @@ class Judgement:
     order: float | None = None
     limit_error: float | None = None
     limit_error_bar: float | None = None
-    limit: LimitFinding = LimitFinding.NO_LADDER
+    limit: LimitResult = LimitResult.NO_LADDER
     reason: str = ""
     remarks: tuple[str, ...] = ()
 
@@ -138,11 +138,11 @@ def judge_curve(
     hidden = off_grid > max(tolerance, _BETWEEN * error)
     round_off = round_off_of(precision, max(scale, magnitude, float(np.max(np.abs(true), initial=0.0))))
     shown_unit = "" if unit == "1" else f" {unit}"
-    rungs = _Ladder(LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER, lost=lost)
+    rungs = _Ladder(LimitResult.NOT_SHOWN if ladder else LimitResult.NO_LADDER, lost=lost)
     if limit is not None:
         rungs = _read(limit, largest_difference(limit.values, true), tolerance, truth_error_bar, round_off, shown_unit)
     if hidden:
-        rungs = replace(rungs, finding=LimitFinding.NOT_SHOWN if ladder else LimitFinding.NO_LADDER)
+        rungs = replace(rungs, finding=LimitResult.NOT_SHOWN if ladder else LimitResult.NO_LADDER)
     on_grid, error = error, max(error, off_grid)
     verdict = _verdict(error, tolerance, rungs, doubt)
     vague, own_bar = own_bar > tolerance, min(own_bar, sampled_bar)
@@ -191,7 +191,7 @@ class _Ladder:
         lost: without a limit, which step has no curve, and why.
     """
 
-    finding: LimitFinding
+    finding: LimitResult
     error: float | None = None
     bar: float | None = None
     order: float | None = None
@@ -208,13 +208,13 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
     far_inside = error + _SEVERAL * bar <= tolerance  # scatter, but none that could leave the tolerance
     doubted = bar + limit.beside + round_off
     drifted = doubted - limit.error_bar + limit.error_bar / _FLAT  # twenty further halvings that change as much
-    finding, leaves = LimitFinding.NOT_SHOWN, error - doubted > tolerance
+    finding, leaves = LimitResult.NOT_SHOWN, error - doubted > tolerance
     if far_inside or (settled and error <= tolerance and bar <= tolerance):
-        finding = LimitFinding.WITHIN
+        finding = LimitResult.WITHIN
     elif leaves and not limit.saturated and (limit.shown or error - drifted > tolerance):
-        finding = LimitFinding.ANOTHER
+        finding = LimitResult.ANOTHER
     shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
-    wrong = shown and finding == LimitFinding.WITHIN and error > _SHOWN_WRONG * (bar + round_off) + limit.beside
+    wrong = shown and finding == LimitResult.WITHIN and error > _SHOWN_WRONG * (bar + round_off) + limit.beside
     told = "no order" if order is None else f"order {order:.3g}"
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
     if not np.isfinite(error):
@@ -233,9 +233,9 @@ def _verdict(error: float, tolerance: float, rungs: _Ladder, doubt: Doubt) -> Ve
     if doubt == Doubt.EVERYTHING:
         return Verdict.ILL_POSED
     if error <= tolerance and not rungs.leaves:
-        known = rungs.finding in {LimitFinding.NO_LADDER, LimitFinding.WITHIN}
+        known = rungs.finding in {LimitResult.NO_LADDER, LimitResult.WITHIN}
         return Verdict.AGREES if known else Verdict.UNCONFIRMED
-    if rungs.finding == LimitFinding.WITHIN and np.isfinite(error):
+    if rungs.finding == LimitResult.WITHIN and np.isfinite(error):
         return Verdict.CONVERGES
     return Verdict.DIFFERS if doubt == Doubt.NONE else Verdict.ILL_POSED
 
@@ -256,12 +256,12 @@ def _reason(
     text = f"error {shown_error}{unit} {'within' if error <= tolerance else 'beyond'} {allowed}{unit}"
     if not np.isfinite(error):
         text = "not finite, or not as many values as the truth"
-    if rungs.finding == LimitFinding.NO_LADDER:
+    if rungs.finding == LimitResult.NO_LADDER:
         text += "; one step only, so the limit is unknown"
     elif not rungs.text:
         text += f"; no limit shown: {rungs.lost or 'not every step of the ladder gave this curve'}"
     else:
-        text += f"; {'limit ' if rungs.finding == LimitFinding.WITHIN else ''}{rungs.finding}: {rungs.text}"
+        text += f"; {'limit ' if rungs.finding == LimitResult.WITHIN else ''}{rungs.finding}: {rungs.text}"
     return f"the question is ill-posed here; {text}" if verdict == Verdict.ILL_POSED else text
 
 

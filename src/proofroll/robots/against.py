@@ -25,7 +25,7 @@ from proofroll.robots.meaning import meaning, opened
 from proofroll.robots.model import Array, Mimic, Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.records import AgainstCheck, ImporterRow, UnlikeValue, UsedTruth
-from proofroll.robots.robot_file import LintFinding, RobotFile
+from proofroll.robots.robot_file import LintRemark, RobotFile
 from proofroll.robots.states import random_states
 from proofroll.robots.two_formulations import passive, poses
 from proofroll.running.asking import lent_workers
@@ -80,7 +80,7 @@ def against(
         file=str(path),
         kind=file.kind,
         base=base if "urdf" in {file.kind, second.kind} else "as in the file",
-        lint=[*_lint(file, robot), *(_of_file(other, finding) for finding in _lint(second, other_robot))],
+        lint=[*_lint(file, robot), *(_of_file(other, remark) for remark in _lint(second, other_robot))],
         truth=UsedTruth(by, bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=[_as_file(row) for row in rows],
@@ -106,12 +106,12 @@ def _meant(
     return file, robot, f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
 
 
-def _lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
-    return [*file.findings, *lint(file, robot)]
+def _lint(file: RobotFile, robot: Robot) -> list[LintRemark]:
+    return [*file.remarks, *lint(file, robot)]
 
 
-def _of_file(path: Path, finding: LintFinding) -> LintFinding:
-    return dataclasses.replace(finding, where=f"{path.name}: {finding.where}")
+def _of_file(path: Path, remark: LintRemark) -> LintRemark:
+    return dataclasses.replace(remark, where=f"{path.name}: {remark.where}")
 
 
 def _answer(robot: Robot, truth: RobotTruth) -> reading.ReaderAnswer:

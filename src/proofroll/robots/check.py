@@ -131,7 +131,7 @@ def check(
         file=str(path),
         kind=file.kind,
         base=base if file.kind == "urdf" else "as in the file",
-        lint=[*file.findings, *lint(file, robot)],
+        lint=[*file.remarks, *lint(file, robot)],
         truth=UsedTruth(by, bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=rows,

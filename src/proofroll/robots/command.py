@@ -74,7 +74,7 @@ def check(
         write_text(out / "check.html", page(content))
         write_text(out / "check.json", options.json_text(content))
     options.show(content, as_json, lambda: check_parts(content), widest=WIDTH)
-    if any(row.differs for row in content.engines) or any(finding.level == "error" for finding in content.lint):
+    if any(row.differs for row in content.engines) or any(remark.level == "error" for remark in content.lint):
         raise typer.Exit(options.CONTRADICTED)
     raise typer.Exit(options.OK if any(row.layers for row in content.engines) else options.ENGINE)
 

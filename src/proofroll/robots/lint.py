@@ -11,9 +11,9 @@ import numpy as np
 
 from proofroll.robots.model import Robot, RobotJoint
 from proofroll.robots.plausibility import implausible
-from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
+from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
-# Level, where and what of a :class:`LintFinding`.
+# Level, where and what of a :class:`LintRemark`.
 _Noticed = tuple[str, str, str]
 # An axis written with six digits is off its length by less.
 _UNIT = 1e-6
@@ -24,13 +24,13 @@ _KNOWN = {
 }
 
 
-def lint(file: RobotFile, robot: Robot) -> list[LintFinding]:
-    """Findings in a file and in its meaning, errors first."""
+def lint(file: RobotFile, robot: Robot) -> list[LintRemark]:
+    """Remarks on a file and on its meaning, errors first."""
     own = _urdf(file, robot) if file.kind == "urdf" else _mjcf(file)
-    findings = [
-        LintFinding(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))
+    remarks = [
+        LintRemark(*noticed) for noticed in (*own, *_bodies(file, robot), *_joints(robot), *implausible(file, robot))
     ]
-    return sorted(findings, key=lambda finding: ("error", "warning", "note").index(finding.level))
+    return sorted(remarks, key=lambda remark: ("error", "warning", "note").index(remark.level))
 
 
 def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:

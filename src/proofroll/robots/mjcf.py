@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
 from proofroll.robots.mjcf_meshes import Shapes, remove_height_fields, remove_meshes
-from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintFinding, names_files_inside, read_xml, required_file
+from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintRemark, names_files_inside, read_xml, required_file
 
 # How deep files may include files.
 _DEEPEST = 8
@@ -39,7 +39,7 @@ _MACROS = {"replicate", "attach", "composite"}
 
 def stripped(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
-) -> tuple[Element, list[LintFinding], bool]:
+) -> tuple[Element, list[LintRemark], bool]:
     """A copy that names no file but meshes that exist in the folder ``inside``, and what was left out.
 
     The third is true if all files that are named, looks included, lie in that folder.
@@ -48,7 +48,7 @@ def stripped(
         InputError: it includes a file outside the folder, or holds what the check does not cover.
     """
     parts: dict[str, Element] = {}
-    findings, contained = _add(root, path, path.resolve(), inside, parts)
+    remarks, contained = _add(root, path, path.resolve(), inside, parts)
     root = next(iter(parts.values()))
     macros = [name for name in sorted(_MACROS) if any(part.find(f".//{name}") is not None for part in parts.values())]
     if macros:
@@ -58,9 +58,9 @@ def stripped(
         if sum(map(_written_out, parts.values())) > MOST_ELEMENTS:
             raise InputError("file", path, f"{names}: written out these are more than {MOST_ELEMENTS} elements")
         root = expand(parts)
-        findings.append(LintFinding("note", names, "written out by the engine that defines the format, to six digits"))
+        remarks.append(LintRemark("note", names, "written out by the engine that defines the format, to six digits"))
     name_all(root)
-    return root, findings, contained
+    return root, remarks, contained
 
 
 def _written_out(element: Element) -> float:
@@ -75,10 +75,10 @@ def _written_out(element: Element) -> float:
 
 def _add(
     root: Element, path: Path, place: Path, inside: Path, parts: dict[str, Element]
-) -> tuple[list[LintFinding], bool]:
+) -> tuple[list[LintRemark], bool]:
     """Adds a file without looks and named files, and those that it attaches, by names that are free in one folder.
 
-    The findings, and whether all files that are named lie in the folder ``inside``.
+    The remarks, and whether all files that are named lie in the folder ``inside``.
     """
     root = copy.deepcopy(root)
     root.tag = "mujoco"
@@ -99,7 +99,7 @@ def _add(
                 parent.remove(child)
         parent.attrib.pop("material", None)
     remove_height_fields(root, shapes)
-    findings = [*remove_meshes(root, shapes, place.parent, inside), *_gravity_compensations(root)]
+    remarks = [*remove_meshes(root, shapes, place.parent, inside), *_gravity_compensations(root)]
     parts[f"{len(parts)}.xml"] = root
     for model in root.iter("model"):
         target = required_file(place.parent, model, inside)
@@ -108,8 +108,8 @@ def _add(
         model.attrib.setdefault("name", target.stem)
         model.set("file", f"{len(parts)}.xml")
         noticed, within = _add(read_xml(target), path, target, inside, parts)
-        findings, contained = [*findings, *noticed], contained and within
-    return findings, contained
+        remarks, contained = [*remarks, *noticed], contained and within
+    return remarks, contained
 
 
 def _include(element: Element, path: Path, folder: Path, inside: Path, open_files: tuple[Path, ...]) -> None:
@@ -153,12 +153,12 @@ def _merge_defaults(root: Element) -> None:
         root.remove(other)
 
 
-def _gravity_compensations(root: Element) -> Iterator[LintFinding]:
+def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
     """Leaves out what carries bodies against gravity, as actuators are."""
     for body in root.iter("body"):
         if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
             words = "its gravity compensation is left out, as actuators are; all engines read it without"
-            yield LintFinding("note", f"body {body.get('name', '')}", words)
+            yield LintRemark("note", f"body {body.get('name', '')}", words)
 
 
 def name_all(root: Element) -> None:

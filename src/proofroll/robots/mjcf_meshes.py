@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.number_format import counted
-from proofroll.robots.robot_file import LintFinding, file_inside, required_file
+from proofroll.robots.robot_file import LintRemark, file_inside, required_file
 
 # The default class of what names none.
 _MAIN = "main"
@@ -59,7 +59,7 @@ def remove_height_fields(root: Element, shapes: Shapes) -> None:
     _forget(root, "hfield", set())
 
 
-def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> Iterator[LintFinding]:
+def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> Iterator[LintRemark]:
     """Leaves out meshes that weigh nothing or do not exist; others are named by their whole path.
 
     Args:
@@ -94,7 +94,7 @@ def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> 
             lost[body] += weighed
     for body, number in (+lost).items():
         words = f"{counted(number, 'mesh shapes')} that would give it mass: no such file; all engines read it without"
-        yield LintFinding("warning", f"body {body.get('name', '')}", words)
+        yield LintRemark("warning", f"body {body.get('name', '')}", words)
     _forget(root, "mesh", used)
     for asset in root.iter("asset"):
         for mesh in asset.findall("mesh"):

@@ -42,15 +42,15 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
         if base == "free":
             urdf.rename_world(root)
         contained = names_files_inside(root, path.resolve().parent, inside)
-        kind, (root, findings), body = "urdf", urdf.stripped(root), "link"
+        kind, (root, remarks), body = "urdf", urdf.stripped(root), "link"
     elif root.tag in {"mujoco", "mujocoinclude"}:
-        kind, (root, findings, contained), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
+        kind, (root, remarks, contained), body = "mjcf", mjcf.stripped(root, path, inside, expand), "body"
     else:
         raise InputError("file", path, f"<{root.tag[:40]}> is neither a URDF (<robot>) nor an MJCF (<mujoco>)")
     count = sum(1 for _ in root.iter(body))
     if count > MOST_BODIES:
         raise InputError("file", path, f"it has {count} {body}s; at most {MOST_BODIES} are checked")
-    return RobotFile(path, kind, root, base, tuple(findings), contained)
+    return RobotFile(path, kind, root, base, tuple(remarks), contained)
 
 
 def _require_plain(root: Element, path: Path) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from proofroll.robots.explain import RobotCause
 from proofroll.robots.protocol import Whole
-from proofroll.robots.robot_file import LintFinding
+from proofroll.robots.robot_file import LintRemark
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class RobotCheck:
     file: str
     kind: str
     base: str
-    lint: list[LintFinding]
+    lint: list[LintRemark]
     truth: UsedTruth
     layers: Mapping[str, str]
     engines: list[ImporterRow]

@@ -17,7 +17,7 @@ LARGEST, DEEPEST, MOST_ELEMENTS = 32 * 2**20, 400, 200_000
 
 
 @dataclasses.dataclass(frozen=True)
-class LintFinding:
+class LintRemark:
     """Finding in a file.
 
     Attributes:
@@ -40,7 +40,7 @@ class RobotFile:
         kind: ``urdf`` or ``mjcf``.
         root: the content that engines get; of MJCF with all includes.
         base: ``fixed`` or ``free``: what carries the root of a URDF; of MJCF the file says so itself.
-        findings: what was left out or changed on the way.
+        remarks: what was left out or changed on the way.
         contained: whether all files that it names, looks included, lie in the folder that files are read from.
     """
 
@@ -48,7 +48,7 @@ class RobotFile:
     kind: str
     root: Element
     base: str = "fixed"
-    findings: tuple[LintFinding, ...] = ()
+    remarks: tuple[LintRemark, ...] = ()
     contained: bool = True
 
 

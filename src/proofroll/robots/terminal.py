@@ -14,7 +14,7 @@ from proofroll.report.labels import SYMBOLS
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal.tables import STYLES
 from proofroll.robots.records import AgainstCheck, GalleryContent, HeldLayer, ImporterRow, RobotCheck
-from proofroll.robots.robot_file import LintFinding
+from proofroll.robots.robot_file import LintRemark
 
 WIDTH = 80
 SHORT = {
@@ -75,14 +75,14 @@ def lines(content: RobotCheck) -> Iterator[str]:
     said = f"{content.file}: {content.kind.upper()}{base}, {moves}, {states}"
     yield from wrapped(said)
     yield from wrapped(f"true is {truth.by}; its two formulations differ by {amount(truth.difference)}")
-    yield from finding_lines([finding for finding in content.lint if finding.level != "note"])
+    yield from remark_lines([remark for remark in content.lint if remark.level != "note"])
 
 
-def finding_lines(findings: Sequence[LintFinding]) -> Iterator[str]:
-    """Lines of findings; equal ones at several places are one line with their number."""
+def remark_lines(remarks: Sequence[LintRemark]) -> Iterator[str]:
+    """Lines of remarks; equal ones at several places are one line with their number."""
     places: dict[tuple[str, str], list[str]] = {}
-    for finding in findings:
-        places.setdefault((finding.level, finding.what), []).append(finding.where)
+    for remark in remarks:
+        places.setdefault((remark.level, remark.what), []).append(remark.where)
     for (level, what), where in places.items():
         more = f" and {len(where) - 2} more" if len(where) > 3 else ""
         yield from wrapped(f"{level}: {', '.join(where[: 2 if more else 3])}{more}: {what}")
@@ -100,7 +100,7 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
     for row in content.engines:
         for sentence in sentences(row):
             yield from wrapped(sentence)
-    yield from finding_lines([finding for finding in content.lint if finding.level == "note"])
+    yield from remark_lines([remark for remark in content.lint if remark.level == "note"])
 
 
 def against_lines(content: AgainstCheck) -> Iterator[str]:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, told_of
 from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
-from proofroll.robots.robot_file import LintFinding, RobotFile, numbers
+from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
 # What carries the root; no name in a file begins so.
 BASE_JOINT = "(base)"
@@ -22,18 +22,16 @@ _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
 
 
-def stripped(root: Element) -> tuple[Element, list[LintFinding]]:
+def stripped(root: Element) -> tuple[Element, list[LintRemark]]:
     """A copy without what needs other files or speaks to one engine alone, and what that was."""
-    root, findings = copy.deepcopy(root), []
+    root, remarks = copy.deepcopy(root), []
     for child in list(root):
         if child.tag not in {"link", "joint"}:
             root.remove(child)
             if child.tag in {"gazebo", "mujoco", "transmission", "drake:proximity_properties"}:
-                findings.append(LintFinding("note", child.tag, "options for one program; left out for every engine"))
+                remarks.append(LintRemark("note", child.tag, "options for one program; left out for every engine"))
             elif child.tag not in {"material", "group_state", "link_state"}:
-                findings.append(
-                    LintFinding("warning", str(child.tag), "the specification has no such element; left out")
-                )
+                remarks.append(LintRemark("warning", str(child.tag), "the specification has no such element; left out"))
     meshes = 0
     for link in root.iter("link"):
         removed = 0
@@ -48,11 +46,11 @@ def stripped(root: Element) -> tuple[Element, list[LintFinding]]:
             words = (
                 "its collision mesh was left out, and it has no <inertial>: engines that weigh shapes find less mass"
             )
-            findings.append(LintFinding("warning", f"link {link.get('name')}", words))
+            remarks.append(LintRemark("warning", f"link {link.get('name')}", words))
     if meshes:
         words = f"{meshes} collision meshes left out for every engine: masses come from <inertial> alone"
-        findings.append(LintFinding("note", "links", words))
-    return root, findings
+        remarks.append(LintRemark("note", "links", words))
+    return root, remarks
 
 
 def rename_world(root: Element) -> None:

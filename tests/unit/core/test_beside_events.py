@@ -7,7 +7,7 @@ import pytest
 
 from proofroll.core.beside_events import beside_events
 from proofroll.core.convergence import richardson
-from proofroll.core.verdict import LimitFinding, judge_curve
+from proofroll.core.verdict import LimitResult, judge_curve
 
 T = np.linspace(0, 1, 51)
 BRAKE, ROLLS = 3.0, 5 / 7
@@ -56,7 +56,7 @@ def test_honest_engines_whose_events_end_with_steps_have_no_other_limit() -> Non
             found = judge_curve(
                 "x", "m", curves[-1], true, truth_error_bar=1e-15, tolerance=1e-4, scale=1.0, limit=limit, ladder=True
             )
-            if found.limit is LimitFinding.ANOTHER or found.remarks:
+            if found.limit is LimitResult.ANOTHER or found.remarks:
                 accused.append((speed, beside > 0))
     assert any(not barred for _, barred in accused), "the ladders are those that share ends of steps"
     assert not any(barred for _, barred in accused)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.convergence import Limit, richardson, tightest
-from proofroll.core.verdict import Doubt, Judgement, LimitFinding, Verdict, judge_curve
+from proofroll.core.verdict import Doubt, Judgement, LimitResult, Verdict, judge_curve
 
 T = np.linspace(0, 2, 21)
 TRUE = np.sin(3 * T)
@@ -36,7 +36,7 @@ def errors(*off: float, declared: int | None = 1) -> Limit:
 def test_agrees_within_tolerance() -> None:
     """An error up to the tolerance agrees where one step is all there is."""
     found = verdict_of(0.999e-3)
-    assert (found.verdict, found.limit) == (Verdict.AGREES, LimitFinding.NO_LADDER)
+    assert (found.verdict, found.limit) == (Verdict.AGREES, LimitResult.NO_LADDER)
     assert "one step only" in found.reason
 
 
@@ -74,7 +74,7 @@ def test_an_error_that_vanishes_by_luck_at_one_step_is_no_agreement(declared: in
     off = [50e-3 * (1 - h) for h in (1.0, 0.5, 0.25)]
     found = verdict_of(off[0], errors(*off, declared=declared))
     assert found.error < 1e-15
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
     assert "within 1e-3 m" in found.reason
     assert "another limit: off by" in found.reason
 
@@ -83,7 +83,7 @@ def test_a_clean_ladder_of_another_order_than_declared_shows_its_limit() -> None
     """Off by 1.5 mm (1 - h/1 ms) where 1 mm is allowed, declared of order 2: order 1 is seen, and the limit differs."""
     off = [1.5e-3 * (1 - h) for h in (1.0, 0.5, 0.25)]
     found = verdict_of(off[0], errors(*off, declared=2))
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
     assert found.limit_error == pytest.approx(1.5e-3)
     assert found.order == pytest.approx(1)
 
@@ -91,7 +91,7 @@ def test_a_clean_ladder_of_another_order_than_declared_shows_its_limit() -> None
 def test_a_ladder_that_does_not_tell_the_limit_confirms_nothing() -> None:
     """Within tolerance, with a limit known less well than the tolerance: agreement at this step, no more."""
     found = verdict_of(0.5e-3, errors(0.5e-3, 4e-3, -2e-3))
-    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitResult.NOT_SHOWN)
     assert found.limit_error_bar is not None
     assert found.limit_error_bar > MILLIMETRE
 
@@ -99,20 +99,20 @@ def test_a_ladder_that_does_not_tell_the_limit_confirms_nothing() -> None:
 def test_runs_that_walk_away_do_not_confirm() -> None:
     """Each halving adds as much as the one before: no limit shows although the bar is below the tolerance."""
     found = verdict_of(0.4e-3, errors(0.1e-3, 0.4e-3, 0.7e-3))
-    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitResult.NOT_SHOWN)
 
 
 def test_a_ladder_that_was_asked_for_and_is_not_there_confirms_nothing() -> None:
     """Where a rung of the ladder gave no such curve, agreement stays one of this step."""
     found = verdict_of(0.5e-3, None, ladder=True)
-    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitResult.NOT_SHOWN)
     assert "not every step of the ladder" in found.reason
 
 
 def test_scatter_far_inside_the_tolerance_confirms() -> None:
     """A ladder without an order whose curves all stay far inside the tolerance leaves no doubt."""
     found = verdict_of(1e-5, errors(1e-5, -1e-5, 2e-5))
-    assert (found.verdict, found.limit, found.order) == (Verdict.AGREES, LimitFinding.WITHIN, None)
+    assert (found.verdict, found.limit, found.order) == (Verdict.AGREES, LimitResult.WITHIN, None)
 
 
 def shifted_in_time(t: np.ndarray) -> np.ndarray:
@@ -167,7 +167,7 @@ def test_a_term_of_lower_order_is_no_other_limit(declared: int | None) -> None:
     """The errors 4 mm x² + 1.5 mm x vanish with the step x; no ladder of them shows another limit than the truth."""
     off = [4e-3 * x**2 + 1.5e-3 * x for x in (4.0, 2.0, 1.0)]
     found = verdict_of(off[-1], errors(*off, declared=declared), tolerance=1e-4)
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
     assert found.limit_error is not None
     assert found.limit_error_bar is not None
     assert found.limit_error <= found.limit_error_bar
@@ -176,7 +176,7 @@ def test_a_term_of_lower_order_is_no_other_limit(declared: int | None) -> None:
 def test_changes_that_grow_confirm_nothing() -> None:
     """Off by 20 µm and by twice as much after each halving, 0.1 mm is left soon: no limit is confirmed."""
     found = verdict_of(2e-5, errors(0.5e-5, 1e-5, 2e-5), tolerance=1e-4)
-    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitResult.NOT_SHOWN)
     jumped = verdict_of(2e-5, errors(0, 1e-7, 2e-5), tolerance=1e-4)
     assert jumped.verdict is Verdict.AGREES, "one run that jumps far inside the tolerance is scatter"
 
@@ -184,14 +184,14 @@ def test_changes_that_grow_confirm_nothing() -> None:
 def test_a_drift_that_never_shrinks_is_no_limit() -> None:
     """Runs that drift towards the truth by a hundredth of the tolerance each show no other limit at 1.05 of it."""
     found = verdict_of(1.05e-3, errors(1.07e-3, 1.06e-3, 1.05e-3))
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
-    assert verdict_of(2e-3, errors(2.02e-3, 2.01e-3, 2e-3)).limit is LimitFinding.ANOTHER
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
+    assert verdict_of(2e-3, errors(2.02e-3, 2.01e-3, 2e-3)).limit is LimitResult.ANOTHER
 
 
 def test_converges_if_the_limit_is_the_truth() -> None:
     """Beyond the tolerance, with the truth as the limit of small steps, the step alone is too coarse."""
     found = verdict_of(0.011, ladder(1))
-    assert (found.verdict, found.limit) == (Verdict.CONVERGES, LimitFinding.WITHIN)
+    assert (found.verdict, found.limit) == (Verdict.CONVERGES, LimitResult.WITHIN)
     assert found.order == pytest.approx(1, abs=0.1)
     assert found.limit_error is not None
     assert found.limit_error_bar is not None
@@ -202,7 +202,7 @@ def test_a_ladder_is_never_too_clean() -> None:
     """An order of 1 to ten digits with a limit off by round-off converges, though its bar is smaller than that."""
     for off in (2.7e-14, 5e-13):  # 3 and 50 of its bars, below the truth's own
         found = verdict_of(0.01, Limit(TRUE + off, 9.3e-15, 0.99999999994))
-        assert (found.verdict, found.limit) == (Verdict.CONVERGES, LimitFinding.WITHIN)
+        assert (found.verdict, found.limit) == (Verdict.CONVERGES, LimitResult.WITHIN)
         assert found.remarks == (), "round-off of a curve is no other limit"
 
 
@@ -230,18 +230,18 @@ def test_an_adaptive_method_converges_by_its_tightest_curve() -> None:
 def test_an_adaptive_method_that_hardly_settles_is_not_confirmed() -> None:
     """Tightenings that change 1 mm, then 0.9 mm, may change nine times that in all: no agreement within 1 mm."""
     found = verdict_of(0.5e-3, tightest([TRUE + 2.4e-3, TRUE + 1.4e-3, TRUE + 0.5e-3]))
-    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.UNCONFIRMED, LimitResult.NOT_SHOWN)
     assert found.limit_error_bar == pytest.approx(8.1e-3)
 
 
 def test_another_limit_and_no_limit_are_two_answers() -> None:
     """Both differ, and say which of the two it is, with order, limit error and bar."""
     other = verdict_of(0.061, ladder(1, offset=0.05))
-    assert (other.verdict, other.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+    assert (other.verdict, other.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
     assert other.reason.startswith("error 0.061 m beyond 1e-3 m; another limit: off by 0.05 ± ")
     assert other.reason.endswith("order 1.04")
     scattered = verdict_of(0.05, errors(0.05, -0.04, 0.06))
-    assert (scattered.verdict, scattered.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert (scattered.verdict, scattered.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
     assert scattered.reason.endswith("no limit shown: off by 0.06 ± 0.1 m, no order")
 
 
@@ -249,16 +249,16 @@ def test_a_flat_ladder_far_away_shows_another_limit() -> None:
     """Three equal curves, or ones that differ by round-off, are their own limit, order or not."""
     for off in [(0.05, 0.05, 0.05), (0.05, 0.05 + 1e-14, 0.05 - 1e-14)]:
         found = verdict_of(0.05, errors(*off))
-        assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+        assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
 
 
 @pytest.mark.parametrize("scatter", [0.0, 1e-16, 1e-14, 2e-13, 3e-13, 1e-11, 1e-8])
 @pytest.mark.parametrize(
     ("off", "verdict", "limit"),
-    [(0.8e-3, Verdict.AGREES, LimitFinding.WITHIN), (1.5e-3, Verdict.DIFFERS, LimitFinding.ANOTHER)],
+    [(0.8e-3, Verdict.AGREES, LimitResult.WITHIN), (1.5e-3, Verdict.DIFFERS, LimitResult.ANOTHER)],
 )
 def test_scatter_far_below_the_tolerance_decides_nothing(
-    scatter: float, off: float, verdict: Verdict, limit: LimitFinding
+    scatter: float, off: float, verdict: Verdict, limit: LimitResult
 ) -> None:
     """A ladder is flat against the tolerance, however little it scatters and however well its truth is known."""
     found = verdict_of(off, errors(off, off + scatter, off - scatter), bar=1e-4)
@@ -268,7 +268,7 @@ def test_scatter_far_below_the_tolerance_decides_nothing(
 def test_differs_without_a_ladder() -> None:
     """Without a limit nothing speaks for convergence."""
     found = verdict_of(0.01)
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NO_LADDER)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NO_LADDER)
     assert (found.order, found.limit_error, found.limit_error_bar) == (None, None, None)
 
 
@@ -284,7 +284,7 @@ def test_differs_without_a_ladder() -> None:
 def test_a_scattered_ladder_does_not_converge(limit: Limit) -> None:
     """Runs that do not settle show no limit, even where the last of them is within tolerance."""
     found = verdict_of(1.2e-3, limit)
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
 
 
 @pytest.mark.parametrize("error", [0.0, 1e-14, 1e-13, 1.0])
@@ -331,7 +331,7 @@ def test_a_wide_bracket_excuses_no_more_than_the_samples_do() -> None:
 def test_tolerances_that_give_the_same_run_show_no_limit(off: tuple[float, float, float]) -> None:
     """Where every sample ends a step looser tolerances change nothing: that is no other limit than the truth."""
     found = verdict_of(off[0], tightest([TRUE + value for value in off]), ladder=True)
-    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.NOT_SHOWN)
+    assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.NOT_SHOWN)
     assert "two tolerances give the same run" in found.reason
     assert verdict_of(1e-5, tightest([TRUE + 1e-5] * 3), ladder=True).verdict is Verdict.AGREES
 

@@ -23,7 +23,7 @@ from proofroll.core.errors import InputError
 from proofroll.core.first_steps import certificate
 from proofroll.core.multi_element import build
 from proofroll.core.truth import truth
-from proofroll.core.verdict import LimitFinding, Verdict, judge_curve
+from proofroll.core.verdict import LimitResult, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll.studies.judging.judge import judge as judge_run
@@ -121,7 +121,7 @@ def test_nobody_has_another_limit_by_a_floor(truncation: float, noise: float, to
         "x", "m", curves[0], np.cos(TIMES), truth_error_bar=1e-15, tolerance=tolerance, scale=1.0, limit=limit,
         ladder=True, precision="single",
     )  # fmt: skip
-    assert found.limit != LimitFinding.ANOTHER
+    assert found.limit != LimitResult.ANOTHER
 
 
 def test_another_motion_is_another_limit_in_single_precision_too() -> None:
@@ -133,7 +133,7 @@ def test_another_motion_is_another_limit_in_single_precision_too() -> None:
             "x", "m", curves[0], np.cos(TIMES), truth_error_bar=1e-15, tolerance=1e-4, scale=1.0, limit=limit,
             ladder=True, precision="single",
         )  # fmt: skip
-        assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitFinding.ANOTHER)
+        assert (found.verdict, found.limit) == (Verdict.DIFFERS, LimitResult.ANOTHER)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Findings of a comparison, as sentences written from the data alone."""
+"""Conclusions of a comparison, as sentences written from the data alone."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from proofroll.report.labels import names, off_by, unjudged, with_caveat
 
 
 @dataclass(frozen=True)
-class Findings:
+class Conclusions:
     """The answer in one paragraph, sentences, and what to use at each accuracy."""
 
     answer: str
@@ -32,10 +32,10 @@ class Findings:
     recommendation: list[RowAdvice]
 
 
-def findings(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Findings:
-    """Findings of a comparison; its kind of scene adds a sentence about its truths."""
+def conclusions(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Conclusions:
+    """Conclusions of a comparison; its kind of scene adds a sentence about its truths."""
     found = scores(content)
-    return Findings(
+    return Conclusions(
         _answer(content, found),
         [
             _closest(content),

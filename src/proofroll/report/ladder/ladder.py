@@ -129,7 +129,7 @@ def ladder_content(study: Ladder) -> LadderContent:
         machine=machine(),
         findings=[],
     )
-    return replace(content, findings=list(_findings(content)))
+    return replace(content, findings=list(_conclusions(content)))
 
 
 def _rung(study: Ladder, rung: Rung) -> RungFound:
@@ -191,7 +191,7 @@ def label(row: RungFound | TermFound) -> str:
     return " ".join(filter(None, (row.engine, row.formulation, variant)))
 
 
-def _findings(content: LadderContent) -> Iterator[str]:
+def _conclusions(content: LadderContent) -> Iterator[str]:
     """Conclusions of the ladder, in sentences."""
     name, unit = content.quantity, content.unit
     empty = [rung.level for rung in content.rungs if rung.ran.status == "empty"]

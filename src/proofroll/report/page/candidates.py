@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from proofroll.core.verdict import LimitFinding, Verdict
+from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.report.labels import step
 from proofroll.report.long_table import TableLine
 
 # What a ladder of steps may say, from what leaves the most hope to what leaves none.
-_FINDINGS = (LimitFinding.WITHIN, LimitFinding.NO_LADDER, LimitFinding.NOT_SHOWN, LimitFinding.ANOTHER)
+_FINDINGS = (LimitResult.WITHIN, LimitResult.NO_LADDER, LimitResult.NOT_SHOWN, LimitResult.ANOTHER)
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Candidate:
     cost: float | None
     clean: bool
     blame: Verdict | None
-    motion_limit: LimitFinding
-    forces_limit: LimitFinding
+    motion_limit: LimitResult
+    forces_limit: LimitResult
     href: str
     message: str
 
@@ -45,7 +45,7 @@ class Candidate:
             return self.motion
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
 
-    def limit(self, forces: bool) -> LimitFinding:
+    def limit(self, forces: bool) -> LimitResult:
         """Finding of its ladder about all that is asked for."""
         both = (self.motion_limit, self.forces_limit) if forces else (self.motion_limit,)
         return max(both, key=_FINDINGS.index)
@@ -74,7 +74,7 @@ def _candidate(
     value: float | None,
     at: dict[str, list[TableLine]],
     *,
-    limits: tuple[LimitFinding, LimitFinding],
+    limits: tuple[LimitResult, LimitResult],
     anchors: dict[str, str],
 ) -> Candidate:
     name, href = _name(first, value), anchors.get("", "")
@@ -119,10 +119,10 @@ def _shown(lines: Sequence[TableLine], role: str) -> list[TableLine]:
     return [line for line in of_role if line.headline] or of_role
 
 
-def _limit(lines: Sequence[TableLine], role: str) -> LimitFinding:
+def _limit(lines: Sequence[TableLine], role: str) -> LimitResult:
     """The worst that the ladder of a row says of a role."""
     said = [item for line in _shown(lines, role) for item in _FINDINGS if line.limit == item]
-    return max(said, key=_FINDINGS.index, default=LimitFinding.NO_LADDER)
+    return max(said, key=_FINDINGS.index, default=LimitResult.NO_LADDER)
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:

@@ -11,7 +11,7 @@ from itertools import groupby, product
 from typing import NamedTuple
 
 from proofroll.core.number_format import error, number
-from proofroll.core.verdict import LimitFinding, Verdict
+from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
 from proofroll.report.pages import packed
@@ -26,10 +26,10 @@ NEEDS = ("motion", "motion and forces")
 NOT_RUN = "none"
 SEVERITY = list(map(str, Verdict))
 _WHY = {
-    LimitFinding.WITHIN: "finer steps come closer",
-    LimitFinding.NO_LADDER: "the closest of what was run",
-    LimitFinding.NOT_SHOWN: "no limit of small steps is shown",
-    LimitFinding.ANOTHER: "its limit of small steps is another",
+    LimitResult.WITHIN: "finer steps come closer",
+    LimitResult.NO_LADDER: "the closest of what was run",
+    LimitResult.NOT_SHOWN: "no limit of small steps is shown",
+    LimitResult.ANOTHER: "its limit of small steps is another",
 }
 
 
@@ -189,7 +189,7 @@ def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
     if told:
         size, item = min(told, key=lambda entry: entry[0])
         limit = item.limit(forces)
-        state = Verdict.CONVERGES if limit == LimitFinding.WITHIN else Verdict.DIFFERS
+        state = Verdict.CONVERGES if limit == LimitResult.WITHIN else Verdict.DIFFERS
         title, why = f"{item.name}: off by {error(size)}; {_WHY[limit]}", f"off by {error(size, 1)}, {_WHY[limit]}"
         return ChoiceCell(state, error(size, 1), title, item.href, name=item.name, why=why)
     if whole:

@@ -16,7 +16,7 @@ from proofroll.report.against import Against
 from proofroll.report.comparison.growth import Growth, growth
 from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.sentences import Findings, findings
+from proofroll.report.comparison.sentences import Conclusions, conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
@@ -61,7 +61,7 @@ class ComparisonEvidence:
 
     truths: list[ReportedTruth]
     sheet: SceneSheet
-    findings: Findings
+    findings: Conclusions
     growth: Growth | None
 
 
@@ -171,7 +171,7 @@ def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
     content = dataclasses.replace(content, runs=runs)
     points = outcome.points.values()
     sheet = sheet_of(outcome.file, [item.case.parameters for item in points], [item.scene for item in points])
-    evidence = ComparisonEvidence(truths, sheet, findings(content, truths, kind), growth(content, truths))
+    evidence = ComparisonEvidence(truths, sheet, conclusions(content, truths, kind), growth(content, truths))
     return dataclasses.replace(content, evidence=evidence)
 
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.number_format import counted
-from proofroll.core.verdict import LimitFinding
+from proofroll.core.verdict import LimitResult
 from proofroll.files.json_data import MERGED
 from proofroll.report.kinds import group_of
 from proofroll.report.long_table import TableLine
@@ -146,9 +146,9 @@ class TradeoffPart(Part):
 def _limit(budget: CurveBudget) -> str:
     """Finding of a curve about its limit of small steps: not shown, beyond both bars of the truth, or within them."""
     if budget.model_form is None:
-        return LimitFinding.NOT_SHOWN
+        return LimitResult.NOT_SHOWN
     known = (budget.model_form_bar or 0.0) + (budget.truth or 0.0) + (budget.floor or 0.0)
-    return LimitFinding.ANOTHER if budget.model_form > _SHOWN * known else LimitFinding.WITHIN
+    return LimitResult.ANOTHER if budget.model_form > _SHOWN * known else LimitResult.WITHIN
 
 
 def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:

@@ -79,7 +79,7 @@ def stability_study(found: StabilityMap) -> StabilityStudy:
         step_symbols={item.name: item.symbol for item in step_numbers(scene)},
         points=points,
         explanations=_explanations(points),
-        findings=_scale_findings(found, points),
+        findings=_scale_conclusions(found, points),
         places=found.places,
         absent=found.absent,
         hosts=hosts(result for point in found.points for result in point.results.values()),
@@ -158,7 +158,7 @@ def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
     return explained
 
 
-def _scale_findings(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
+def _scale_conclusions(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
     """Sentences on results that depend on an axis along which the dimensionless problem is the same."""
     sentences = []
     for axis in (axis for axis in found.axes if axis.scale_free):

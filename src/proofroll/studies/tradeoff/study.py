@@ -1,4 +1,4 @@
-"""A trade-off as it is kept: its points, error budgets, fronts and findings."""
+"""A trade-off as it is kept: its points, error budgets, fronts and conclusions."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
         pareto_engines=_fronts(found, [curve for curve in found.curves if not by_hand(curve.level)], numbers),
         truth=TruthCost(**_cost(found.truth_timing), route=reference.dataset.attrs.get("route", "")),
         over=found.over,
-        findings=_findings(found, budgets),
+        findings=_conclusions(found, budgets),
         brief=found.brief,
         measured=measured(),
     )
@@ -186,8 +186,8 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
     }
 
 
-def _findings(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
-    """Findings of the study, as sentences."""
+def _conclusions(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
+    """Conclusions of the study, as sentences."""
     said = told_hosts(hosts(point.result for point in found.points))
     quantity = found.question.quantity
     scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit

@@ -19,7 +19,7 @@ from proofroll.core.comparison import Band, Comparison, ExceptAt, Row, Tolerance
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
-from proofroll.core.verdict import Judgement, LimitFinding, Verdict
+from proofroll.core.verdict import Judgement, LimitResult, Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
@@ -366,7 +366,7 @@ def test_events_that_are_late_alike_in_every_run_are_no_other_limit(tmp_path: Pa
     (run,) = judged(tmp_path, comparison, late(1.0), rungs={factor: late(factor) for factor in (2.0, 0.5)}).runs
     (found,) = run.judgements
     assert found.error == pytest.approx(3e-4)
-    assert found.limit is not LimitFinding.ANOTHER
+    assert found.limit is not LimitResult.ANOTHER
     assert not found.remarks
 
 
