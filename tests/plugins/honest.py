@@ -44,16 +44,21 @@ class HonestSettings:
     @property
     def order(self) -> int | None:
         """See :class:`proofroll.core.engine.Settings`."""
-        return None if self.formulation == "adaptive" else int(self.formulation[-1])
+        return None if self.formulation == "adaptive" else min(self.orders)
+
+    @property
+    def orders(self) -> tuple[int, ...]:
+        """Orders of the steps in turn."""
+        return (1, 4) if self.formulation == "mixed" else (int(self.formulation[-1]),)
 
 
 def _stepped(x: FloatArray, rates: Any, settings: HonestSettings, t: float, until: float) -> FloatArray:
-    """The state at a later time, by a method of fixed step or by DOP853."""
+    """The state at a later time, by methods of fixed step in turn or by DOP853."""
     if settings.formulation == "adaptive":
         found = solve_ivp(lambda _, y: rates(y), (t, until), x, "DOP853", rtol=settings.rtol, atol=settings.rtol)
         return np.asarray(found.y[:, -1])
-    stages, weights = TABLEAUS[int(settings.formulation[-1])]
-    for _ in range(whole_steps(t, until, settings.dt)):
+    for step in range(whole_steps(t, until, settings.dt)):
+        stages, weights = TABLEAUS[settings.orders[step % len(settings.orders)]]
         slopes: list[FloatArray] = []
         for before in stages:
             moved = (settings.dt * w * k for w, k in zip(before, slopes, strict=True))
@@ -62,17 +67,17 @@ def _stepped(x: FloatArray, rates: Any, settings: HonestSettings, t: float, unti
     return x
 
 
-_FORMULATIONS = (*(f"order_{order}" for order in TABLEAUS), "adaptive")
+FORMULATIONS = (*(f"order_{order}" for order in TABLEAUS), "adaptive", "mixed")
 
 
 class Rolling(Tiny):
     """A rolling ball in the reduced coordinates."""
 
     name: ClassVar[str] = "rolling"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(_FORMULATIONS, Tiny.provides["midpoint"])
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(FORMULATIONS, Tiny.provides["midpoint"])
     settings: ClassVar[type[Any]] = HonestSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = {
-        name: {"matched": HonestSettings(name)} for name in _FORMULATIONS
+        name: {"matched": HonestSettings(name)} for name in FORMULATIONS
     }
 
     def __init__(self, scene: Scene, settings: Any) -> None:
@@ -90,7 +95,7 @@ class Jointed:
 
     name: ClassVar[str] = "jointed"
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(
-        _FORMULATIONS, Projection.provides["dependent"] - {"dry friction in joints", "stops of joints"}
+        FORMULATIONS, Projection.provides["dependent"] - {"dry friction in joints", "stops of joints"}
     )
     settings: ClassVar[type[Any]] = HonestSettings
     presets: ClassVar[Mapping[str, Mapping[str, Any]]] = Rolling.presets
