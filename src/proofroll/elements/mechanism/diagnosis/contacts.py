@@ -33,7 +33,7 @@ _COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleratio
 
 
 @dataclass(frozen=True)
-class Touch:
+class SeenContact:
     """Contacts of a run with its forces; arrays over (time, contacts)."""
 
     evidence: Evidence
@@ -76,7 +76,7 @@ class Touch:
 
 
 @once
-def touch_of(evidence: Evidence) -> Iterator[Touch]:
+def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
     """The contacts of the run, if it has any and tells their forces."""
     pair, element = both(evidence), evidence.element
     if pair is None or not element.mechanism.contacts or "contact_forces" not in pair[0] or not is_motion(pair[0]):
@@ -92,7 +92,7 @@ def touch_of(evidence: Evidence) -> Iterator[Touch]:
     slides = presses & np.asarray(found.slip > SLIDES * element.speed)
     true = followed(placed_of(element.mechanism, truth))
     u_n = np.sum(found.normal * found.slide, axis=-1)
-    yield Touch(
+    yield SeenContact(
         evidence,
         run["time"].to_numpy(),
         found,
@@ -301,7 +301,7 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
         )
 
 
-def _met(touch: Touch, c: int) -> Iterator[tuple[float, float]]:
+def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float]]:
     """Delay [s] and restitution of each impact of a contact between two flights, of two samples each at least."""
     t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
     for k in range(1, len(t) - 2):
