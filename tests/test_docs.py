@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import re
 import shlex
 import subprocess
@@ -12,7 +13,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from proofroll.cli.report import report
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism, Point, Spring
+from proofroll.files.comparison_file import comparison_names, further_comparison_names
 
 ROOT = Path(__file__).resolve().parents[1]
 # README.md and the pages whose snippets have tests of their own.
@@ -114,6 +117,21 @@ def test_the_workflow_runs_the_two_commands() -> None:
     assert {word for line in made for word in line.split()} >= {"check", "docs", "test"}
     for line in [*commands[1:], *made]:
         subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
+
+
+def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
+    """Its YAML and its scripts parse, its commands have the options that they use, and its comparisons exist."""
+    workflow = yaml.safe_load((ROOT / "docs" / "nightly.yml").read_text(encoding="utf-8"))
+    assert workflow[True]["schedule"]  # YAML reads "on" as true
+    (job,) = workflow["jobs"].values()
+    scripts = [step["run"] for step in job["steps"] if "run" in step]
+    for script in scripts:
+        subprocess.run(["bash", "-n", "-c", script], check=True)
+    (names,) = re.findall(r"proofroll report ([a-z_ ]+) --out", scripts[-1])
+    assert set(names.split()) <= {*comparison_names(), *(Path(name).name for name in further_comparison_names())}
+    options = {f"--{name.replace('_', '-')}" for name in inspect.signature(report).parameters}
+    assert set(re.findall(r"--(?:against|history|out)", scripts[-1])) <= options
+    assert "://" not in (ROOT / "docs" / "nightly.yml").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("kind", [Mechanism, Body, Joint, Loop, Spring, Point])

@@ -127,7 +127,7 @@ def outcomes_of(
     start, reused = time.monotonic(), runner.reused
 
     def end(key: str = "") -> None:
-        """Judges each comparison of which this case was the last."""
+        """Judges each comparison whose last case this was."""
         for number in [number for number, keys in missing.items() if keys <= {key}]:
             del missing[number]
             ended[number] = evaluate(plans[number], results, runner)

@@ -48,6 +48,10 @@ def report(
         Path | None,
         typer.Option(help="An earlier report.json: tells what changed; exit 1 if a verdict, an error or a cost did."),
     ] = None,
+    history: Annotated[
+        Path | None,
+        typer.Option(help="Runs nothing: draws the reports in this folder over time, in history.html."),
+    ] = None,
     as_json: options.Json = False,
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
@@ -69,6 +73,9 @@ def report(
     from proofroll.running.store import alone_in
     from proofroll.running.worker_pool import Workers
 
+    if history:
+        _show_history(history, out, as_json=as_json)
+        return
     earlier = EarlierReport.read(against) if against else None
     names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
     if only:
@@ -114,6 +121,16 @@ def report(
                 made.write(out)
         options.show(made.content, as_json, lambda: _shown(made.content, out))
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
+
+
+def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
+    """Writes the history of the reports in a folder, and says what changed when."""
+    from proofroll.report.history import read_history, write_history
+
+    found = read_history(folder)
+    write_history(found, out)
+    where = f"The history is in {out / 'history.html'}, the same content in {out / 'history.json'}."
+    options.show(found, as_json, lambda: [*found.lines(), where])
 
 
 class _Growing:

@@ -124,7 +124,7 @@ def _known(values: dict[str, Any]) -> dict[str, Any]:
 
 def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versions: dict[str, str]) -> Against:
     """Holds an earlier report against the lines of this one, in the studies that both have."""
-    before, after = _runs(old.lines), _runs(lines)
+    before, after = runs_of(old.lines), runs_of(lines)
     shared = {study for study, *_ in before} & {study for study, *_ in after}
     costs = old.machine == machine
     drift = _drift((_first(before[key]), _first(run)) for key, run in after.items() if key in before)
@@ -150,7 +150,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
     return Against(str(old.path), old.date, others, costs, drift, both, changes)
 
 
-def _runs(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
+def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
     """Lines by quantity of each run; runs of equal settings are kept apart by their order."""
     rows: dict[tuple[str, str, str], dict[int, dict[str, TableLine]]] = defaultdict(dict)
     for line in lines:
