@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from simpleeval import InvalidExpression, SimpleEval
 
@@ -24,8 +24,14 @@ _OPERATORS = {
 _LONGEST = 500  # characters: what a person writes is far shorter, and nesting stays shallow enough to be parsed
 
 
-def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = "") -> float:
-    """The number of an expression of parameters with + - * / ^ ** ( ) and ``pi``; it cannot call functions.
+def evaluated(
+    field: str,
+    text: str,
+    names: Mapping[str, Quantity],
+    unit: str = "",
+    functions: Mapping[str, Callable[[float], float]] | None = None,
+) -> float:
+    """The number of an expression of parameters with + - * / ^ ** ( ) and ``pi``.
 
     Args:
         field: where it stands, for the message.
@@ -33,6 +39,7 @@ def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = 
         names: the parameters, with their units.
         unit: that its result must have, as scene files write it; "": not checked. A formula of plain numbers alone is
             a plain number, as one that stands there itself.
+        functions: that it can call, of ratios; what they give is a plain number.
 
     Raises:
         InputError: it cannot be read, names an unknown parameter, calls a function, divides by zero, overflows, adds
@@ -41,7 +48,8 @@ def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = 
     if len(text) > _LONGEST:
         raise InputError(field, text, f"an expression may have at most {_LONGEST} characters")
     known = {"pi": Quantity(math.pi), **names}
-    evaluator = SimpleEval(operators=_OPERATORS, functions={}, names=known)
+    called = {name: _of_ratio(name, function) for name, function in (functions or {}).items()}
+    evaluator = SimpleEval(operators=_OPERATORS, functions=called, names=known)
     del evaluator.nodes[ast.Attribute]
     try:
         quantity = Quantity(0.0) + evaluator.eval(text.replace("^", "**").strip())
@@ -61,6 +69,18 @@ def evaluated(field: str, text: str, names: Mapping[str, Quantity], unit: str = 
         advice = f"this number is in {unit}, the formula gives {quantity.unit}; a bare number in a product has no unit"
         raise InputError(field, text, f"{advice}: make a parameter of what has one")
     return number
+
+
+def _of_ratio(name: str, function: Callable[[float], float]) -> Callable[[Quantity | float], Quantity]:
+    """A function for numbers without a unit."""
+
+    def called(argument: Quantity | float) -> Quantity:
+        given = Quantity(0.0) + argument
+        if given.powers:
+            raise UnitsDiffer(f"{name} is of a ratio, and this is in {given.unit}")
+        return Quantity(float(function(given.value)))
+
+    return called
 
 
 def _list(names: Mapping[str, Quantity]) -> str:

@@ -63,15 +63,16 @@ class Parameters:
                 raise InputError(where, content, f"this number is in {own}, that parameter in {given}")
             return self.values[content[1:]]
         if content.startswith("="):
-            return evaluated(where, content[1:], self._quantities, own)
-        return _NUMBERED.sub(lambda found: f"{evaluated(where, found[1], self._quantities):g}", content)
+            return evaluated(where, content[1:], self.quantities, own)
+        return _NUMBERED.sub(lambda found: f"{evaluated(where, found[1], self.quantities):g}", content)
 
     def beside(self, name: str, value: float) -> Parameters:
         """These numbers and a plain one of this name."""
         return Parameters({**self.values, name: value}, self.units)
 
     @cached_property
-    def _quantities(self) -> dict[str, Quantity]:
+    def quantities(self) -> dict[str, Quantity]:
+        """The parameters with their units."""
         units = {name: self.units.get(name, "1") for name in self.values}
         return {
             name: Quantity(float(value), None if units[name] == "1" else powers_of(units[name]))

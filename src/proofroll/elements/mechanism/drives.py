@@ -15,6 +15,12 @@ from proofroll.elements.mechanism.signal import Formula, Table, checked, value_a
 ActuatorKind = Literal["torque", "velocity", "position"]
 # Which gains a kind has.
 _GAINS: Mapping[str, tuple[str, ...]] = {"torque": (), "velocity": ("kd",), "position": ("kp", "kd")}
+# Units that a target can have, about an axis or along one; a gear may turn one into the other.
+TARGET_UNITS: Mapping[str, tuple[str, ...]] = {
+    "torque": ("N m", "N"),
+    "velocity": ("rad/s", "m/s"),
+    "position": ("rad", "m"),
+}
 MODES = ("least", "linear", "greatest")  # of an effort with a limit
 
 

@@ -53,6 +53,11 @@ _PART = 1e-4
 _AXES = "xyz"
 
 
+# Laws of joints that the ladder of models can leave out, by their key.
+_OPTIONAL = {"armature": "armature of joints", "friction": "dry friction of joints", "damping": "damping of joints"}
+_FAR = 1000.0  # limits of efforts times this bound nothing
+
+
 @dataclass(frozen=True)
 class MechanismElement:
     """Bodies that joints, loops, springs and contacts connect. See :class:`proofroll.core.element.Element`.
@@ -359,8 +364,17 @@ class MechanismElement:
         return program(self, failed, engine, gain, OPEN * self.length)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
-        """None yet."""
-        return []
+        """Laws of joints and limits of efforts whose parameter has the name of their key."""
+        joints, because = self.mechanism.joints, "the scene has it"
+        terms = [
+            OptionalTerm(name, because, {}, {key: 0.0})
+            for key, name in _OPTIONAL.items()
+            if parameters.get(key) and any(getattr(joint, key) for joint in joints)
+        ]
+        if "limit" in parameters and any(item.limit is not None for item in self.mechanism.actuators):
+            because = f"the scene has them; here without, as {_FAR:g} times what they are"
+            terms.append(OptionalTerm("limits of efforts", because, {}, {"limit": _FAR * parameters["limit"]}))
+        return terms
 
 
 def the_mechanism(scene: Scene) -> MechanismElement:

@@ -14,7 +14,9 @@ import numpy as np
 from simpleeval import InvalidExpression, SimpleEval
 
 from proofroll.core.errors import InputError, no_such_key
+from proofroll.core.expressions import evaluated
 from proofroll.core.parameters import Parameters
+from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism import checks
 
 TIME = "t"
@@ -128,18 +130,20 @@ def checked(field: str, given: Any) -> Signal:
     return given if isinstance(given, Formula | Table) else checks.number(field, given)
 
 
-def read_signal(field: str, given: Any, numbers: Parameters) -> Any:
-    """Signal of a file; a number or a formula without time stays what it is.
+def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str] = ()) -> Any:
+    """Signal of a file, in one of these units; a number or a formula without time stays what it is.
 
     Raises:
-        InputError: a formula or a table is wrong.
+        InputError: a formula or a table is wrong, or a formula has another unit.
     """
     try:
         if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
             used = _names(given[1:])
             if TIME in used:
                 own = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
-                return Formula(given[1:].strip(), own)
+                made = Formula(given[1:].strip(), own)
+                _check_unit(field, made.text, numbers, units)
+                return made
         if isinstance(given, dict):
             for key in given:
                 if key not in {"times", "values"}:
@@ -150,6 +154,21 @@ def read_signal(field: str, given: Any, numbers: Parameters) -> Any:
         inside = "" if error.field == "formula" else f".{error.field}"
         raise InputError(f"{field}{inside}", error.value, error.advice) from None
     return given
+
+
+def _check_unit(field: str, text: str, numbers: Parameters, units: Sequence[str]) -> None:
+    """Check of a formula's unit, with the time in seconds, or as a plain number beside other plain numbers."""
+    wrong: InputError | None = None
+    for unit in filter(None, units):
+        for time in (Quantity(0.0, {"s": 1.0}), Quantity(0.0)):
+            try:
+                evaluated(field, text, {**numbers.quantities, TIME: time}, unit, FUNCTIONS)
+            except InputError as error:
+                wrong = wrong or error
+            else:
+                return
+    if wrong is not None:
+        raise wrong
 
 
 def _names(text: str) -> set[str]:

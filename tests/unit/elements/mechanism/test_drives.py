@@ -165,6 +165,32 @@ def test_bad_drives_are_one_line(tmp_path: Path, more: str, said: str) -> None:
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize(
+    ("target", "fits"),
+    [
+        ("= $size*sin(2*pi*t)", False),
+        ("= size*sin(2*pi*t)", True),
+        ("= 0.3*sin(2*pi*t)", True),
+        ("= speed*t + size", True),
+        ("= size*sin(speed*t/size)", True),
+        ("= speed*sin(2*pi*t)", False),
+        ("= size*sin(speed*t)", False),
+        ("= size + speed*sin(t)", False),
+    ],
+)
+def test_a_formula_of_time_has_the_unit_of_its_place(tmp_path: Path, target: str, fits: bool) -> None:
+    """Parameters in a target of a place give metres or radians, with the time in seconds or beside plain numbers."""
+    speed = '[parameters.speed]\nvalue = 2\nunit = "m/s"\nmeaning = "rate"\nsource = "s"\n[gravity]'
+    more = PLAIN.replace("[gravity]", speed, 1)
+    servo = f'[[actuators]]\nname = "a"\njoint = "j"\nkind = "position"\nkp = 1\ntarget = "{target}"'
+    (tmp_path / "scene.toml").write_text(more + servo)
+    if fits:
+        load_scene(str(tmp_path))
+    else:
+        with pytest.raises(InputError, match=r"actuators\.0\.target"):
+            load_scene(str(tmp_path))
+
+
 @pytest.mark.parametrize("text", ["t.real", "__import__('os')", "9**9**9**9*t", "sin(t", "foo(t)"])
 def test_formulas_do_nothing_but_compute(text: str) -> None:
     """What is no smooth formula of numbers is refused, quickly."""
@@ -203,3 +229,22 @@ def test_a_step_is_measured_by_dampers_and_servos(scene: str, damper: float | No
     servo = np.sqrt(servo) if scene == "arm_pd" and servo else servo
     expected = {name: value for name, value in (("damper", damper), ("servo", servo)) if value}
     assert {name: numbers[name] for name in ("damper", "servo") if name in numbers} == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("scene", "taken"),
+    [
+        ("arm_pd", {"armature of joints": {"armature": 0.0}}),
+        ("spring_friction", {"dry friction of joints": {"friction": 0.0}}),
+        ("saturated_servo", {"limits of efforts": {"limit": 20000.0}}),
+        ("double_pendulum", {}),
+    ],
+)
+def test_the_ladder_of_models_can_leave_a_law_out(scene: str, taken: dict[str, dict[str, float]]) -> None:
+    """A law whose parameter has the name of its key is a term, and the scene without it is one."""
+    loaded = load_scene(scene)
+    (element,) = loaded.elements
+    terms = element.optional_terms(loaded.parameters, None)
+    assert {term.name: dict(term.taken) for term in terms} == taken
+    for term in terms:
+        load_scene(scene, **term.taken)
