@@ -13,11 +13,12 @@ from proofroll.core.observable import Role
 from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
+from proofroll.elements.mechanism.report.drawing import drawn
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
 from proofroll.report.kinds import kind_of
-from proofroll.report.pen import Disc
+from proofroll.report.pen import Disc, Lettering
 from proofroll.running.simulation import simulate
 
 SCENES = ("pendulum", "slider_crank", "bricard", "heavy_top", "andrews_squeezer", "free_body", "gyroscope_cart")
@@ -260,3 +261,19 @@ def test_a_change_of_energy_is_an_error_where_a_law_keeps_it(scene: str, name: s
     run = simulate(scene, "projection", until=0.1)
     assert {"energy_error", "energy_change"} & set(map(str, run.data_vars)) == {name}
     assert simulate(scene, until=0.1)[name].attrs["error_bar"] > 0
+
+
+@pytest.mark.parametrize(("scene", "marks"), [("gear_pair", ["gear"]), ("arm_pd", ["servo1", "servo2"]), ("stop", [])])
+def test_drives_and_stops_are_drawn(scene: str, marks: list[str]) -> None:
+    """An actuator has a ring and a coupling a line, both with their name; a stop has a stroke at its place."""
+    element = load_scene(scene).elements[0]
+    without = dataclasses.replace(
+        element.mechanism,
+        joints=tuple(dataclasses.replace(joint, limits=None) for joint in element.mechanism.joints),
+        actuators=(),
+        couplings=(),
+    )
+    full, bare = drawn(element), drawn(dataclasses.replace(element, mechanism=without))
+    letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
+    assert set(marks) <= set(letters)
+    assert len(full.marks) > len(bare.marks)

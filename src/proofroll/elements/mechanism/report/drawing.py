@@ -1,8 +1,9 @@
-"""A mechanism at its start, drawn from its own data: bodies, joints, loops, springs and tracked points."""
+"""A mechanism at its start, drawn from its own data: bodies, joints with their laws, loops, springs, tracked points."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.element import MechanismElement
@@ -13,6 +14,8 @@ _JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of what marks them [px]
 _GRAVITY = 44.0  # length of the arrow [px]
 _MOST_NAMES = 12  # of joints and loops: more would cover the drawing
 _OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer of what is not plane, world axes with z up
+_STROKE = 10.0  # half of the stroke that marks a stop [px]
+_FARTHEST = 10.0  # place of a stop that is drawn, over the mechanism's length, or its angle [rad]
 _TEETH = 8  # of the zigzag of a spring
 
 
@@ -49,8 +52,43 @@ def drawn(element: MechanismElement) -> Drawing:
         here = at(place(point.body, point.position))
         picture.disc(here.tolist(), _POINT, "motion")
         _name(picture, here, point.name, "motion-letter", (0.0, 16.0))
+    _laws(picture, at, element)
     _gravity(picture, at, element)
     return picture
+
+
+def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
+    """A ring with its name for an actuator, a dashed line for a coupling, a stroke where the child is at a stop."""
+    mechanism, start = element.mechanism, element.start
+
+    def place(name: str) -> FloatArray:
+        joint = mechanism.joints[mechanism.joint_index[name]]
+        return np.asarray(start.point(joint.child, joint.child_position)[0])
+
+    for actuator in mechanism.actuators:
+        here = at(place(actuator.joint))
+        picture.disc(here.tolist(), 2.0 * _JOINT, "force")
+        _name(picture, here, actuator.name, "force-letter", (0.0, 2.0 * _JOINT + 12.0))
+    for coupling in mechanism.couplings:
+        ends = at(np.stack([place(coupling.joint_a), place(coupling.joint_b)]))
+        picture.path(ends, "hidden")
+        apart = np.linalg.norm(ends[1] - ends[0]) > _GRAVITY  # else below the names of joint and actuator
+        _name(picture, ends.mean(axis=0), coupling.name, "letter", (0.0, -6.0 if apart else 36.0))
+    for number, joint in enumerate(mechanism.joints):
+        axis, here = _axis(element, number), place(joint.name)
+        for limit in joint.limits or ():
+            if abs(limit) * (element.length if joint.kind == "revolute" else 1.0) > _FARTHEST * element.length:
+                continue  # beyond the drawing
+            if joint.kind == "prismatic":
+                there = at(here + (limit - joint.q0[0]) * axis)
+                along = at(axis)
+                across = np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
+                picture.path(np.stack([there - _STROKE * across, there + _STROKE * across]), "line")
+                continue
+            com = mechanism.bodies[mechanism.body_index[joint.child]].com
+            arm = np.asarray(start.point(joint.child, com)[0]) - here
+            turned = Rotation.from_rotvec((limit - joint.q0[0]) * axis).apply(arm)
+            picture.path(at(np.stack([here, here + turned])), "faint")
 
 
 def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
