@@ -68,6 +68,7 @@ class Generic(ExudynModel):
             # Whether the contact depends on the coordinates themselves, and not on their rates alone.
             self.place_matters = weight_turns(body, self.local)
             self._needed, self._local_gravity = needed_function(body), weight_function(body, self.local, np.eye(3))
+            self._steady_gravity = None if self.place_matters else self._local_gravity([])[:3]
             self._tangents: tuple[float, ...] = tuple(self.local.tangents[1:].ravel().tolist())
             self.integration = SwitchedIntegration(self, body, settings)
 
@@ -167,7 +168,7 @@ class Generic(ExudynModel):
         """N, and the friction along e2 and e3 that it takes to roll on [N]; as in :meth:`touch`."""
         _, rate1, rate2, w1, _, _ = q_t.tolist()
         t2u, t2v, t3u, t3v = self._tangents
-        g1, g2, g3 = self._local_gravity(q)[:3]
+        g1, g2, g3 = self._steady_gravity or self._local_gravity(q)[:3]
         return self._needed(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, g1, g2, g3)
 
     def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:

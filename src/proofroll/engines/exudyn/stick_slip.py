@@ -56,6 +56,7 @@ class SwitchedIntegration:
         self.model, self.system, self.settings = model, model.system, settings
         data = self.system.systemData
         self._q, self._q_t = data.GetODE2Coordinates, data.GetODE2Coordinates_t  # looked up once: asked at every step
+        self._needed = model.needed
         self.mu_static, self.mu_kinetic = body.contact.mu_static, body.contact.mu_kinetic
         self.beta = mobility(body)
         self.t = 0.0
@@ -64,7 +65,7 @@ class SwitchedIntegration:
         self.state = self._state(exu.ConfigurationType.Initial)
         self._before, self._before_t = self.state, 0.0
         self._last_step: tuple[Touch, Touch, float] | None = None  # its end, its start and its length [s]
-        # What _roll_on read after the last step and the one before it; not the coordinates where they do not matter.
+        # What _watch read after the last step and the one before it; not the coordinates where they do not matter.
         self._latest: tuple[float, FloatArray, FloatArray] = (0.0, self.state.q, self.state.q_t)
         self._earlier: tuple[float, FloatArray, FloatArray] | None = None
         self._place_matters, self._shortest = model.place_matters, 0.5 * settings.dt
@@ -96,9 +97,17 @@ class SwitchedIntegration:
         """Called by Exudyn after each step, and once where it starts; False stops it."""
         if not self._watching:
             return True
-        if self.sticking:
-            return self._roll_on(t)
         elapsed = t - self.t
+        if self.sticking:  # in as few calls as can be, for a step takes microseconds
+            if elapsed <= self._shortest:
+                return True
+            q_t = self._q_t()
+            q = self._q() if self._place_matters else q_t
+            N, need2, need3 = self._needed(q, q_t)
+            if self.mu_static * N > math.hypot(need2, need3) and N > 0:
+                self._earlier, self._latest, self.t = self._latest, (t, q, q_t), t
+                return True
+            return self._begin_to_slip(t)
         if elapsed > 0.5 * self.settings.dt:
             self._before, self._before_t = self.state, self.t
             self.state, self.t = self._state(exu.ConfigurationType.Current), t
@@ -111,16 +120,8 @@ class SwitchedIntegration:
         self._aim(self.settings.dt)
         return True
 
-    def _roll_on(self, t: float) -> bool:
-        """Fast form of :meth:`_watch` while the ball rolls: only whether it goes on, for a step takes microseconds."""
-        if t - self.t <= self._shortest:
-            return True
-        q_t = self._q_t()
-        q = self._q() if self._place_matters else q_t
-        N, need2, need3 = self.model.needed(q, q_t)
-        if self.mu_static * N > math.hypot(need2, need3) and N > 0:
-            self._earlier, self._latest, self.t = self._latest, (t, q, q_t), t
-            return True
+    def _begin_to_slip(self, t: float) -> bool:
+        """Ends the step in which more friction is needed than there is."""
         if self._earlier is not None:
             (now, *latest), (before, *earlier) = self._latest, self._earlier
             self._last_step = self.model.touch(*latest), self.model.touch(*earlier), now - before
