@@ -173,6 +173,11 @@ def test_a_run_of_which_variables_were_left_out(scene: str, tmp_path: Path) -> N
         found = proofroll.judge(str(path), scene)
         assert found.agrees, found
         assert set(names) <= {item.judgement.observable for item in found.compared} | {"q_WB"}
+    for lost in {"N", "F2", "needed_friction"} & set(run):  # some of the forces, and not all
+        write(run.drop_vars(lost), path)
+        assert {"N", "F2", "F3"} - {lost} <= {
+            item.judgement.observable for item in proofroll.judge(path, scene).compared
+        }
 
 
 @pytest.mark.parametrize("scene", ["inclined_plane", "double_pendulum"])

@@ -108,7 +108,7 @@ def _first_problem(
     """One line about the first thing that pydantic found wrong in ``where``."""
     problem = error.errors()[0]
     absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
-    location = ".".join(_place(problem["loc"], content) + [str(problem["loc"][-1])] * absent)
+    location = ".".join(_place(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
     if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
         return no_such_key(f"{where}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], own))
     if absent:
@@ -141,7 +141,7 @@ def units_of(*types: type) -> dict[str, str]:
 def units_of_kind(table: type, kind: object) -> dict[str, Unit]:
     """Unit of each number of a dataclass, whose fields may carry one for each ``kind`` that a file can name."""
     units = {item.name: item.metadata.get("unit", "") for item in fields(table)}
-    return {name: unit.get(kind, "") if isinstance(unit, Mapping) else unit for name, unit in units.items()}
+    return {name: unit.get(str(kind), "") if isinstance(unit, Mapping) else unit for name, unit in units.items()}
 
 
 def all_units_of(*types: type) -> dict[str, str]:

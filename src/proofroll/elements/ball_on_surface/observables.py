@@ -123,17 +123,17 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
     """
     names = [*body.surface.coordinates, *({"attitude"} & set(dataset))]
     curves = {name: dataset[name].to_numpy() for name in names}
-    if "N" in dataset:
-        curves |= {name: dataset[name].to_numpy()[1:] for name in ("N", "F2", "F3", "needed_friction")}
+    whole = set(_FORCES) <= set(dataset)  # a file of somebody's may have some of them
+    curves |= {name: dataset[name].to_numpy()[1:] for name in (*_FORCES, "needed_friction") if name in dataset}
     curves["gap"] = dataset["gap"].to_numpy()
     curves["slip"] = dataset["slip"].to_numpy()
     if dataset.sizes["time"] > 2 * (DEGREE + 1) + 2 * ENDS:
         # What impacts take of the energy nobody tells.
         dissipates = body.contact.rolling_resistance or body.wall_rate is not None or "sticking" in dataset
-        told = "N" in dataset or not dissipates
+        told = whole or not dissipates
         if told and not body.flies:
             curves["energy_balance"] = energy_balance(body, dataset)
-        if "N" in dataset:
+        if whole:
             audited = force_audit(body, dataset)
             if audited.size:
                 curves["force_audit"] = audited

@@ -60,6 +60,8 @@ def _check_inertia(mechanism: Mechanism, M: Array) -> None:
     Raises:
         InputError: one does not, so that forces do not tell how it changes.
     """
+    if not np.isfinite(M).all():
+        raise InputError("mass matrix", "infinite", "masses, moments or lengths are too large to be computed with")
     size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
     values, vectors = np.linalg.eigh(M / np.outer(size, size))
     if len(values) and values[0] < _STILL:

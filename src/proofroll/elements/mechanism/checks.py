@@ -127,7 +127,7 @@ def inertia(field: str, value: Any) -> Matrix:
     # 1e-9: digits of a file; a flat body fulfils the triangle inequality with equality, so round-off must pass.
     if np.abs(found - found.T).max() > 1e-9 * size:
         raise InputError(field, value, "must be symmetric")
-    found = (found + found.T) / 2
+    found = found / 2 + found.T / 2  # whose sum could overflow
     low, middle, high = np.linalg.eigvalsh(found)
     if low < -1e-9 * size:
         raise InputError(field, value, f"has a negative principal moment, {low:g} kg m^2")

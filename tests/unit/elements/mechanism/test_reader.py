@@ -167,6 +167,15 @@ def joint(parent, child, kind="revolute", more=""):
 
 BAD = {
     "joint without its body": (SLIDER_CRANK + joint("crank", "ghost"), "joints.extra.child = 'ghost'.*no such body"),
+    "kind of no kind": (SLIDER_CRANK.replace('kind = "revolute"', "kind = [[1]]", 1), r"joints.1.kind = \[\[1\]\]"),
+    "moments beyond numbers": (
+        SLIDER_CRANK + ROD.replace("[1, 1, 1]", "[1, 1e308, 1]"),
+        "inertia.*triangle inequality",
+    ),
+    "mass beyond numbers": (
+        SLIDER_CRANK + ROD.replace("mass = 1", "mass = 1e308\ncom = [1e9, 0, 0]") + joint("rod", "extra"),
+        "mass matrix = 'infinite': masses, moments or lengths are too large",
+    ),
     "body without a joint": (SLIDER_CRANK + ROD, "bodies.extra.*no joint"),
     "two parents": (SLIDER_CRANK + joint("slider", "rod"), "two parents, through pin and extra"),
     "cycle": (
@@ -292,6 +301,7 @@ BAD = {
 }
 
 
+@pytest.mark.filterwarnings("ignore:.*(overflow|invalid value):RuntimeWarning")
 @pytest.mark.parametrize("name", BAD)
 def test_bad_input_is_one_clear_line(read, name):
     """Each mistake is an InputError of one line that names the field."""
