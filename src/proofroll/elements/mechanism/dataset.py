@@ -13,9 +13,11 @@ from proofroll.core.columns import UNCERTAIN, Columns, Variable, axes
 from proofroll.core.errors import Diverged
 from proofroll.core.turns import doubt
 from proofroll.elements.mechanism.contacts.observables import (
+    LAWS,
     RESIDUALS,
     followed,
     given_forces,
+    kept_laws,
     normal_forces,
     residuals,
 )
@@ -157,6 +159,12 @@ def columns(
     # Where something drives or damps, no law keeps the energy: then it is no error.
     gained = "energy_error" if element.conservative else "energy_change"
     put(gained, energy - energy[0], "J", "energy now minus energy at the start", **unsure)
+    kept = kept_laws(mechanism)
+    if kept:
+        changes = (np.maximum(energy - energy[0], 0.0), *(part - part[0] for part in placed.momentum()))
+        for (name, unit, meaning), value in zip(LAWS, changes, strict=True):
+            if name in kept:
+                put(name, value, unit, meaning, *(("xyz",) if value.ndim > 1 else ()))
     put("drift", placed.drift(), "m", "how far joints and loops are open")
     return Columns(found | axes(placed.time) | {"body": Variable(("body",), np.array(element.bodies, dtype=str))})
 

@@ -21,7 +21,7 @@ from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
-from proofroll.elements.mechanism.contacts.observables import RESIDUALS, contact_observables
+from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
@@ -179,6 +179,14 @@ class MechanismElement:
         return mass * max(float(np.linalg.norm(self.mechanism.gravity)), self.speed**2 / self.length)
 
     @cached_property
+    def _sizes(self) -> dict[str, float]:
+        """Natural size of what has one of these units."""
+        length, speed, force = self.length, self.speed, self.force
+        momentum = sum(body.mass for body in self.mechanism.bodies) * speed
+        sizes = {"m": length, "m/s": speed, "N": force, "J": force * length}
+        return sizes | {"N s": momentum, "N m s": momentum * length, "1": 1.0}
+
+    @cached_property
     def conservative(self) -> bool:
         """True if nothing in it drives or damps."""
         if self.mechanism.actuators:
@@ -224,7 +232,7 @@ class MechanismElement:
         if np.any(self.analysis.determinate[:, 3:]):
             meaning = "determinate components of the moments on children at their joints"
             found.append(Observable("torques", "N m", meaning, Role.REACTION, floor=force * self.length))
-        found += contact_observables(self.mechanism, a, speed, force)
+        found += contact_observables(self.mechanism, self._sizes, _LEAST)
         for item in named_forces(self.mechanism):
             floor = force if item.unit == "N" else force * self.length
             found.append(Observable(item.name, str(item.unit), item.meaning, Role.REACTION, floor=floor))
@@ -319,10 +327,8 @@ class MechanismElement:
 
     def scales(self, truth: xr.Dataset) -> dict[str, float]:
         """See the protocol: ranges, largest reactions, and natural sizes of what should be zero."""
-        natural = {"attitudes": 1.0, "energy_error": self.force * self.length, "drift": self.length, "unpressed": 1.0}
-        natural |= {
-            name: {"m": self.length, "m/s": self.speed, "N": self.force, "1": 1.0}[unit] for name, unit, _ in RESIDUALS
-        }
+        natural = {"attitudes": 1.0, "energy_error": self.force * self.length, "drift": self.length}
+        natural |= {name: self._sizes[unit] for name, unit, _ in (*RESIDUALS, *LAWS)} | {"unpressed": 1.0}
         sizes = {}
         for item in self.observables:
             if item.role == Role.EVENT:

@@ -142,6 +142,16 @@ class Placed:
                 total += 0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1)
         return total
 
+    def momentum(self) -> tuple[FloatArray, FloatArray]:
+        """Momentum [N s] and moment of momentum about the world's origin [N m s], shapes (time, 3)."""
+        linear, angular = np.zeros((len(self.time), 3)), np.zeros((len(self.time), 3))
+        for body in self.mechanism.bodies:
+            R, own = self.R_WB[:, self.mechanism.body_index[body.name]], body.mass * self.velocity(body.name, body.com)
+            local = np.einsum("tji,tj->ti", R, self.spin(body.name)) @ np.array(body.inertia)
+            linear += own
+            angular += cross(self.point(body.name, body.com), own) + np.einsum("tij,tj->ti", R, local)
+        return linear, angular
+
     def drift(self) -> FloatArray:
         """Largest separation [m] or cosine [1] that a joint or a loop should not have, shape (time,)."""
         worst = np.zeros(len(self.time))

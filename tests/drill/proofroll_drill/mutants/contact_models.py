@@ -1,4 +1,4 @@
-"""Bodies that touch otherwise than in the scene: an exact motion of another mechanism, or another report of it."""
+"""Mechanisms whose contacts differ from the scene's, followed exactly or reported wrongly."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class FrictionOff(ContactMutant):
     named = ("friction of all contacts is off",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """Without friction."""
+        """Smooth pairs."""
         return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.0))
 
 
@@ -101,7 +101,7 @@ class FrictionOnePercent(ContactMutant):
     named = ("friction of all contacts is 1.01",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """With a hundredth more."""
+        """A hundredth more of each pair."""
         return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.01 * pair.friction))
 
 
@@ -112,7 +112,7 @@ class ContactLeftOut(ContactMutant):
     named = ("the contact back is left out",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """Without the last pair."""
+        """All pairs but the last."""
         return dataclasses.replace(mechanism, pairs=mechanism.pairs[:-1])
 
     def misreport(self, sample: MechanismSample) -> MechanismSample:
@@ -143,7 +143,7 @@ class NormalTurned(ContactMutant):
     named = ("normals of contact",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """With another floor."""
+        """Another floor."""
         return of_geometry(mechanism, "floor", normal=(1e-3, 0.0, 1.0))
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
+from proofroll.core.observable import Role
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.joint import Joint
@@ -264,3 +265,23 @@ def test_a_disc_rolls_on_its_edge_without_loss() -> None:
     assert energy == pytest.approx(energy[0], abs=DIGITS)
     assert found.pressed is not None
     assert (found.pressed[:, 0, 2] > 0).all()
+
+
+def test_a_row_of_balls_is_ill_posed_and_keeps_momentum_and_energy() -> None:
+    """Whichever of two impacts at once comes first decides where balls go: only what no order changes can be judged."""
+    scene = load_scene("cradle")
+    found = truth(scene, np.linspace(0.0, 0.2, 5))
+    assert "which contacts hold, slide or open" in found.attrs["ill_posed"]
+    element = scene.elements[0]
+    laws = [item for item in element.observables if item.role is Role.RESIDUAL]
+    assert {"momentum_error", "angular_momentum_error", "energy_gain", "penetration"} <= {item.name for item in laws}
+    for item in laws:
+        assert not item.hangs_on_events  # so they are judged though the truth is ill-posed
+        assert np.abs(found[item.name].to_numpy()).max() < 1e-9
+
+
+def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
+    """Where a normal force would tear, the scene is refused with the reason, and below that friction it is not."""
+    with pytest.raises(Refused, match="not unique or not possible \\(Painlevé\\)"):
+        truth_of(mechanism_of("painleve_rod"), np.array([0.0, 0.01]))
+    motion("painleve_rod", [0.0, 0.01], friction=0.5)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from proofroll.core.errors import Diverged
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.observable import Observable, Role
 from proofroll.elements.mechanism.contacts.touching import Moving, touch
+from proofroll.elements.mechanism.signal import varies
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.model import Mechanism
@@ -27,6 +28,12 @@ RESIDUALS = (
     ("friction_direction", "1", "1 + T·u/(μN|u|): friction that is less than its bound or not against the slip u"),
     ("hop_speed", "m/s", "speed along the normal of what presses"),
     ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
+)
+# Laws that no impact breaks, of bodies that nothing drives, and of those on which nothing acts but each other.
+LAWS = (
+    ("energy_gain", "J", "energy beyond that at the start"),
+    ("momentum_error", "N s", "momentum now minus that at the start"),
+    ("angular_momentum_error", "N m s", "moment of momentum about the origin now minus that at the start"),
 )
 # Parts of a mechanism's weight and speed below which nothing presses and nothing slides; softened contacts creep.
 PRESSES, SLIDES = 1e-6, 1e-2
@@ -70,10 +77,31 @@ def followed(placed: Placed) -> Followed:
     return Followed(gap, slip, normal, slide)
 
 
-def contact_observables(mechanism: Mechanism, length: float, speed: float, force: float) -> Iterator[Observable]:
-    """Observables of a mechanism with contacts; sizes below which nothing shows [m, m/s, N]."""
+def kept_laws(mechanism: Mechanism) -> frozenset[str]:
+    """Names of the ``LAWS`` that hold for a mechanism with contacts, whatever an impact does."""
+    if not mechanism.contacts or mechanism.actuators or any(joint.torque for joint in mechanism.joints):
+        return frozenset()
+    if any(varies(signal) for signal in mechanism.signals):
+        return frozenset()
+    ends = {name for contact in mechanism.contacts for name in (contact.body_a, contact.body_b)}
+    ends |= {name for spring in mechanism.springs for name in (spring.body_a, spring.body_b)}
+    ends |= {name for loop in mechanism.loops for name in (loop.body_a, loop.body_b)}
+    held = any(joint.kind != "free" and "world" in {joint.parent, joint.child} for joint in mechanism.joints)
+    held = held or "world" in ends or bool(np.any(mechanism.gravity))
+    return frozenset(name for name, _, _ in (LAWS[:1] if held else LAWS))
+
+
+def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least: float) -> Iterator[Observable]:
+    """Observables of a mechanism with contacts.
+
+    Args:
+        mechanism: whose.
+        sizes: natural size of what has a unit.
+        least: part of it below which nothing shows.
+    """
     if not mechanism.contacts:
         return
+    length, speed, force = (least * sizes[unit] for unit in ("m", "m/s", "N"))
     yield Observable("gaps", "m", "distances between what may touch", Role.MOTION, floor=length)
     yield Observable("slips", "m/s", "speeds of slip of what may touch", Role.MOTION, floor=speed, asked_for=False)
     meaning = "normal forces between what may touch"
@@ -85,9 +113,13 @@ def contact_observables(mechanism: Mechanism, length: float, speed: float, force
     yield Observable("event_times", "s", "times of all events of contacts", Role.EVENT, asked_for=False)
     meaning = "events of another kind than the truth's"
     yield Observable(EVENT_ORDER, "events", meaning, Role.EVENT, asked_for=False)
-    floors = {"m": length, "m/s": speed, "N": force, "1": 1.0}
-    for name, unit, meaning in RESIDUALS:
-        yield Observable(name, unit, meaning, Role.RESIDUAL, floor=floors[unit], asked_for=False, hangs_on_events=False)
+    laws = [law for law in LAWS if law[0] in kept_laws(mechanism)]
+    for name, unit, meaning in (*RESIDUALS, *laws):
+        difference = "energy" if unit == "J" else ""
+        yield Observable(
+            name, unit, meaning, Role.RESIDUAL, floor=1.0 if unit == "1" else least * sizes[unit],
+            asked_for=False, hangs_on_events=False, difference_of=difference,
+        )  # fmt: skip
 
 
 def residuals(

@@ -49,7 +49,7 @@ class SeenContact:
 
     @property
     def mechanism(self) -> Mechanism:
-        """Whose."""
+        """Mechanism of the contacts."""
         mechanism: Mechanism = self.evidence.element.mechanism
         return mechanism
 

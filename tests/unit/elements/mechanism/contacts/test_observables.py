@@ -63,3 +63,13 @@ def test_the_truth_leaves_nothing_and_says_normal_forces_at_rest() -> None:
         normal: FloatArray = found["normal_forces"].to_numpy()
         assert normal.sum(axis=1) == pytest.approx(2 * 9.81, abs=0.2)
         assert np.all(found["unpressed"].to_numpy() == 0)
+
+
+@pytest.mark.parametrize(
+    ("scene", "passive", "closed"), [("cradle", True, True), ("sled", True, False), ("pendulum", False, False)]
+)
+def test_laws_that_no_impact_breaks_are_judged_where_they_hold(scene: str, passive: bool, closed: bool) -> None:
+    """Energy does not grow where nothing drives, and momentum stays where bodies touch each other alone."""
+    names = {item.name for item in load_scene(scene).elements[0].observables}
+    assert ("energy_gain" in names) == passive
+    assert ({"momentum_error", "angular_momentum_error"} <= names) == closed
