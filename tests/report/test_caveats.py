@@ -12,6 +12,7 @@ from invented import stability_study, tradeoff_study
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.plugins import engine_names, load_engine
+from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.report.labels import caveat_lines, with_caveat
 from proofroll.report.stability.tables import silent_lines
 from proofroll.report.tradeoff.tables import answer_lines
@@ -57,9 +58,59 @@ def test_a_caveat_is_one_clause() -> None:
     assert told
 
 
+@pytest.mark.parametrize(
+    ("engine", "words"),
+    [
+        ("mujoco[formulation=geoms,preset=default]", "contact by a pyramid of friction, time constant = 0.02 s"),
+        ("mujoco[formulation=geoms,preset=matched]", "contact by a convex cone, whose sliding parts"),
+        ("mujoco[formulation=geoms,preset=tuned]", "hard contact by Coulomb's law"),
+        ("pinocchio[formulation=impulses,preset=tuned]", "hard contact by Coulomb's law"),
+        ("pinocchio[formulation=impulses,convex=true]", "contact by a convex cone, whose sliding parts"),
+        ("exudyn[formulation=spheres]", "softened contact, k = 1e+06 N/m, v_reg = 0.0001 m/s"),
+        ("mujoco[formulation=joints]", ""),
+    ],
+)
+def test_an_engine_says_which_law_of_contact_it_has(engine: str, words: str) -> None:
+    """The family of a row's law is in its facts, with the numbers that soften it; without contact there is none."""
+    name, _, options = engine.rstrip("]").partition("[")
+    (facts,) = resolve([(name, dict(option.split("=") for option in options.split(",")))])
+    assert isinstance(facts, EngineFacts)
+    assert facts.family == words
+
+
+def test_formulations_of_contact_say_which_law_they_have() -> None:
+    """No formulation that is made for bodies that touch is silent about its law, in any preset."""
+    for name in engine_names():
+        kind = load_engine(name)
+        for formulation, needs in getattr(kind, "made_for", {}).items():
+            if MechanismCapability.CONTACT in needs:
+                assert all(kind.family(settings) for settings in kind.presets[formulation].values()), (
+                    name,
+                    formulation,
+                )
+
+
+def test_families_stand_under_the_rows() -> None:
+    """Rows of one law share a sentence, which names them; caveats follow."""
+    row = SimpleNamespace(name="machine", formulation="free", setting="default", caveat="", family="soft contact")
+    other = replace_all(row, setting="matched", family="hard contact", caveat="somebody else's steps")
+    assert caveat_lines([row, other]) == [
+        "Soft contact: machine free default.",
+        "Hard contact: machine free matched.",
+        "Somebody else's steps: machine free matched.",
+    ]
+
+
+def replace_all(row: Any, **changes: str) -> Any:
+    """A copy of a row with these changes."""
+    return SimpleNamespace(**{**vars(row), **changes})
+
+
 def test_a_caveat_stands_beside_verdicts_and_advice() -> None:
     """Below the table once for all of its settings, beside a name that is blamed, and in a recommendation."""
-    row = SimpleNamespace(name="machine", formulation="free", setting="default", caveat="somebody else's steps")
+    row = SimpleNamespace(
+        name="machine", formulation="free", setting="default", caveat="somebody else's steps", family=""
+    )
     changed = [SimpleNamespace(**vars(row) | change) for change in ({"setting": "matched"}, {"caveat": ""})]
     rows: list[Any] = [row, *changed]
     assert caveat_lines(rows) == ["Somebody else's steps: machine free default, free matched."]

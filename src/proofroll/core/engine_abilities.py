@@ -85,6 +85,18 @@ class TellsCaveats(Protocol):
 
 
 @runtime_checkable
+class TellsFamily(Protocol):
+    """Ability of an engine whose formulations solve laws of different families, which have limits of their own.
+
+    As short steps do not bring one family to another, whoever reads a verdict must know which it is.
+    """
+
+    @staticmethod
+    def family(settings: Any) -> str:
+        """Law that a model with these settings has: a clause without a full stop; empty: there is one family alone."""
+
+
+@runtime_checkable
 class LowersOrder(Protocol):
     """Ability of an engine whose order of convergence drops with something in a scene."""
 

@@ -138,12 +138,13 @@ def with_caveat(name: str, caveat: str) -> str:
 
 
 def caveat_lines(rows: Sequence[Setting]) -> list[str]:
-    """Caveats of settings: one sentence for each, with the settings that have it."""
+    """Families and caveats of settings: one sentence for each, with the settings that have it."""
     found: dict[str, list[str]] = {}
-    for row in rows:
-        if row.caveat:
-            where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
-            found.setdefault(f"{row.caveat}: {row.name}", []).append(where)
+    for told in ([row.family for row in rows], [row.caveat for row in rows]):
+        for row, said in zip(rows, told, strict=True):
+            if said:
+                where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
+                found.setdefault(f"{said}: {row.name}", []).append(where)
     return [f"{said[0].upper()}{said[1:]} {', '.join(dict.fromkeys(where))}." for said, where in found.items()]
 
 

@@ -86,6 +86,7 @@ class EngineFacts:
             :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: what of these settings is not the engine's own, shown beside its verdicts; empty: nothing.
+        family: of the laws that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`; empty: none.
         precision: in which it computes, see :func:`proofroll.core.engine.precision_of`.
         libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
             hash of all its packages.
@@ -100,6 +101,7 @@ class EngineFacts:
     lowered: dict[str, int] = field(default_factory=dict)
     shares: list[str] = field(default_factory=list)
     caveat: str = ""
+    family: str = ""
     precision: str = "double"
     libraries: dict[str, str] = field(default_factory=dict)
 

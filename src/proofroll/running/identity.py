@@ -74,7 +74,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         code = digest(sorted({place for truth in load_truths() for place in _of(truth)}))
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine import precision_of
-    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats
+    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, TellsFamily
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.loading import load
 
@@ -90,6 +90,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
+        family=kind.family(settings) if isinstance(kind, TellsFamily) else "",
         precision=precision_of(settings),
         libraries=libraries(engine),
     )

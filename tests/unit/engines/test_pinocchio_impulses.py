@@ -65,6 +65,7 @@ def test_a_start_is_certified(name: str, preset: str) -> None:
     assert [str(line) for line in lines if not line.holds] == []
     told = {line.quantity for line in lines if line.difference is not None}
     assert {"gaps", "normals of contact", "places of contact", "friction of contacts"} <= told
+    assert "law of contact: hard contact by Coulomb's law" in told
     # what runs over a surface begins with J̇v alone, which a step finds one step late: softened to nothing
     assert "acceleration" in told or name in {"free_turntable", "tilted_disc"}
 

@@ -86,7 +86,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     if len(mechanism.joints):
         compare("joint positions", "m", places, built.joint_position, size)
         compare("joint axes", "1", axes, built.joint_axis, 1.0)
-    _compare_contacts(element, built, compare)
+    _compare_contacts(element, built, compare, lines)
     compare("mobility", "1", element.analysis.mobility, built.mobility, 1.0)
     compare("error of the mass matrix", "1", 0.0, built.mass_matrix_error, 1.0)
     compare("position", "m", start.p_WB[0], sample.p_WB, size)
@@ -104,9 +104,12 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
 
 
 def _compare_contacts(
-    element: MechanismElement, built: MechanismBuilt, compare: Callable[[str, str, Any, Any, float], None]
+    element: MechanismElement,
+    built: MechanismBuilt,
+    compare: Callable[[str, str, Any, Any, float], None],
+    lines: list[Line],
 ) -> None:
-    """Compares gaps, normals, places and coefficients of contacts."""
+    """Compares gaps, normals, places and coefficients of contacts; the law that the model has is told."""
     contacts = element.mechanism.contacts
     if not contacts:
         return
@@ -117,6 +120,8 @@ def _compare_contacts(
     friction = [contact.friction for contact in contacts]
     compare("friction of contacts", "1", friction, built.contact_friction, max(friction) or 1.0)
     restitution = [contact.restitution for contact in contacts]
+    if built.contact_family:
+        lines.append(Line(f"law of contact: {built.contact_family}", "", (), (), 0.0, COMPOSED))
     compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
 
 

@@ -126,6 +126,8 @@ class Exudyn:
             return ""
         return "Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"
 
+    family = staticmethod(spheres.family)
+
     @staticmethod
     def version() -> str:
         """Version of the installed package; the extension module names another one on some platforms."""

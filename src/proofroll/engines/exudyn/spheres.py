@@ -19,6 +19,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -44,6 +45,13 @@ _DIFFERENCED = 1e-5
 _CORNERS = ((-1.0, -1.0, 0.0), (2.0, -1.0, 0.0), (-1.0, 2.0, 0.0))
 
 
+def family(settings: ExudynSettings) -> str:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; of balls there is none."""
+    if settings.formulation != "spheres":
+        return ""
+    return family_text(Family.SOFTENED, stiffness=settings.stiffness, zone=settings.friction_zone)
+
+
 class _Made(NamedTuple):
     """One contact in Exudyn: its object, the sign of its force on body a, and how deep it starts [m]."""
 
@@ -61,6 +69,7 @@ class Spheres(Redundant):
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Contacts that start as deep as they are pressed; the spheres are as much larger."""
         self._contacts: list[_Made] = []
+        self._contact_settings = settings
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
         if not mechanism.contacts:
             return
@@ -144,6 +153,7 @@ class Spheres(Redundant):
             contact_place=np.array(places),
             contact_friction=np.array([self.system.GetObject(made.item)["dynamicFriction"] for made in self._contacts]),
             contact_restitution=np.zeros(len(self._contacts)),
+            contact_family=family(self._contact_settings),
         )
         larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by as much as it is pressed in")
         if self._builds_up:  # then the first accelerations tell nothing of what holds

@@ -112,6 +112,8 @@ class Mujoco(SteppedModel):
             return ""
         return "the normal row of each contact is corrected between mj_step1 and mj_step2"
 
+    family = staticmethod(mechanism_geoms.family)
+
     @staticmethod
     def version() -> str:
         """Version of MuJoCo."""

@@ -93,6 +93,8 @@ class Pinocchio:
         terms = "contact solver" if settings.solver else "terms"
         return f"proofroll's own integrator on Pinocchio's {terms}, for Pinocchio brings none"
 
+    family = staticmethod(impulses.family)
+
     @staticmethod
     def version() -> str:
         """See :class:`proofroll.core.engine.Engine`."""

@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
+from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -40,6 +41,13 @@ _SOFT = 5.0
 _CLOSED = 0.1
 # From this ratio of its responses along two directions of the surface on PGS returns a wrong impulse.
 _UNEQUAL = 2.0
+
+
+def family(settings: PinocchioSettings) -> str:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; of balls there is none."""
+    if settings.formulation != "impulses":
+        return ""
+    return family_text(Family.CONVEX if settings.convex else Family.HARD)
 
 
 class Impulses(NamedTuple):
@@ -156,6 +164,7 @@ class ImpulseSteps:
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
+            "contact_family": family(self._settings),
         }
 
     def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:

@@ -77,6 +77,7 @@ class Setting:
     resolution_value: float | None
     declared_order: int | None
     caveat: str
+    family: str
     precision: str
 
 

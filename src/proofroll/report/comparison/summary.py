@@ -195,6 +195,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "resolution_value": facts.settings.get(facts.resolution or ""),
         "declared_order": facts.order,
         "caveat": facts.caveat,
+        "family": facts.family,
         "precision": facts.precision,
     }
 

@@ -1,0 +1,24 @@
+"""Families of contact: the laws that engines solve where bodies touch, and the words for one with its numbers."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+
+class Family(StrEnum):
+    """Law of contact that a model has, which steps that get shorter do not change."""
+
+    HARD = "hard contact by Coulomb's law"
+    CONVEX = "contact by a convex cone, whose sliding parts"
+    PYRAMID = "contact by a pyramid of friction"
+    ANISOTROPIC = "contact by an anisotropic cone of friction"
+    SOFTENED = "softened contact"
+
+
+def family_text(
+    family: Family, *, stiffness: float | None = None, zone: float | None = None, time: float | None = None
+) -> str:
+    """A family with what softens it: stiffness [N/m], slip below which friction is less [m/s], time constant [s]."""
+    parts = (("k", stiffness, "N/m"), ("v_reg", zone, "m/s"), ("time constant", time, "s"))
+    said = [f"{name} = {value:g} {unit}" for name, value, unit in parts if value is not None]
+    return f"{family.value}, {', '.join(said)}" if said else family.value
