@@ -49,6 +49,23 @@ def test_public_names_are_there(module: str) -> None:
     assert [name for name in NAMES[module] if not hasattr(found, name)] == []
 
 
+@pytest.mark.parametrize("module", NAMES)
+def test_type_checkers_see_public_names(module: str) -> None:
+    """Each is defined in its module, or handed on by name: strict checkers take no other from a typed package."""
+    found = importlib.import_module(module)
+    defined = set(getattr(found, "__all__", ()))
+    for node in ast.parse(Path(str(found.__file__)).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            defined.add(node.name)
+        elif isinstance(node, ast.Assign):
+            defined |= {target.id for target in node.targets if isinstance(target, ast.Name)}
+        elif isinstance(node, ast.AnnAssign):
+            defined.add(ast.unparse(node.target))
+        elif isinstance(node, ast.ImportFrom):
+            defined |= {alias.name for alias in node.names if alias.asname == alias.name}
+    assert sorted(NAMES[module] - defined) == []
+
+
 def imported(file: Path) -> set[tuple[str, str]]:
     """Modules of proofroll that a file imports, each with the name that it takes from there."""
     found = set()

@@ -6,10 +6,14 @@ import json
 import os
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
+from packaging.metadata import Metadata
+
+import proofroll
 
 REPOSITORY = Path(__file__).parents[2]
 
@@ -129,3 +133,22 @@ def test_types_are_announced(wheel: Path) -> None:
     """The package says that it is typed."""
     with zipfile.ZipFile(wheel) as archive:
         assert "proofroll/py.typed" in archive.namelist()
+
+
+def test_the_source_archive_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+    """The archive builds without the repository; its wheel has the same files, and the metadata of both are valid."""
+    command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(tmp_path)]
+    subprocess.run([*command, "--sdist", str(REPOSITORY)], check=True, capture_output=True)
+    with tarfile.open(next(tmp_path.glob("*.tar.gz"))) as tar:
+        tar.extractall(tmp_path / "source", filter="data")
+    (source,) = (tmp_path / "source").iterdir()
+    assert not {path.name for path in source.iterdir()} & {"out", "dist", ".venv"}
+    subprocess.run([*command, "--wheel", str(source)], check=True, capture_output=True)
+    with zipfile.ZipFile(wheel) as one, zipfile.ZipFile(next(tmp_path.glob("*.whl"))) as other:
+        assert set(one.namelist()) == set(other.namelist())
+        (name,) = [name for name in one.namelist() if name.endswith(".dist-info/METADATA")]
+        metadata = Metadata.from_email(one.read(name), validate=True)
+    archived = Metadata.from_email((source / "PKG-INFO").read_bytes(), validate=True)
+    assert str(metadata.version) == str(archived.version) == proofroll.__version__
+    assert metadata.description_content_type == "text/markdown"
+    assert metadata.description

@@ -1,0 +1,61 @@
+"""Needs of a release: one version everywhere, a workflow that parses, a checklist that points at files."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+import proofroll
+from proofroll.files.comparison_file import comparison_names
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def test_the_first_line_of_the_readme_tells_the_truth() -> None:
+    """Version, maturity, Pythons, licence and types are those of the package."""
+    (said,) = re.findall(r"^\*Version (.*)\*$", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    version, maturity, pythons, licence, typed = said.split(" · ")
+    classifiers = PROJECT["classifiers"]
+    assert version == PROJECT["version"] == proofroll.__version__
+    assert any(item.startswith("Development Status") and item.endswith(f"- {maturity}") for item in classifiers)
+    known = [item.rpartition(" ")[2] for item in classifiers if re.fullmatch(r"Programming .* 3\.\d+", item)]
+    assert pythons == f"Python {', '.join(known)}"
+    assert licence == PROJECT["license"]
+    assert typed == "typed"
+    assert (ROOT / "src" / "proofroll" / "py.typed").is_file()
+
+
+def test_the_workflow_of_platforms_asks_for_what_there_is() -> None:
+    """Its YAML and scripts parse; extras, comparisons, folders of tests and Pythons that it names exist."""
+    text = (ROOT / ".github" / "workflows" / "platforms.yml").read_text(encoding="utf-8")
+    jobs = yaml.safe_load(text)["jobs"]
+    scripts = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
+    for script in scripts:
+        subprocess.run(["bash", "-n", "-c", script], check=True)
+    matrix = jobs["two-commands"]["strategy"]["matrix"]
+    assert {item["os"] for item in matrix["include"]} == set(matrix["os"])
+    assert {name for item in matrix["include"] for name in item["extras"].split(",")} <= {
+        *PROJECT["optional-dependencies"]
+    }
+    assert all(f"Programming Language :: Python :: {python}" in PROJECT["classifiers"] for python in matrix["python"])
+    (names,) = [re.findall(r"proofroll report ([a-z_ ]+) --out", script) for script in scripts if "report" in script][
+        -1:
+    ]
+    assert set(names[0].split()) <= set(comparison_names())
+    (tested,) = [script.partition("pytest ")[2].split() for script in scripts if "-m pytest" in script]
+    assert all((ROOT / folder).is_dir() for folder in tested)
+    assert "://" not in text
+
+
+@pytest.mark.parametrize("name", ["release", "every_night"])
+def test_files_that_a_page_names_are_there(name: str) -> None:
+    """Each file that the checklist and the page about nights point at exists."""
+    text = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    for found in re.findall(r"`(\.github/[\w./]+|src/[\w./]+|pyproject\.toml|CITATION\.cff)`", text):
+        assert (ROOT / found).is_file(), found
