@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from rolling_scenes import rolling_scene
 
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
@@ -15,7 +16,6 @@ from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import BallOnSurface
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.rolling_rows import rolling_scene
 
 TIMES = np.linspace(0, 2, 9)
 # Of the witness, relative to sizes of 1 m, 1 N, 1 rad/s and more: where both routes say exactly zero, it says 1e-17.

@@ -1,0 +1,77 @@
+"""Scenes with balls that roll, as one mechanism and the contacts that its balls roll on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from proofroll.core.errors import Refused
+from proofroll.core.scene import Scene
+from proofroll.elements.ball_on_surface.element import BallOnSurface
+from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.truth.mechanism.rolling_rows import RollingContact
+
+
+def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:
+    """All elements of a scene as one mechanism, its balls as free bodies, and what these roll on.
+
+    Raises:
+        Refused: an element, or a law of contact, that such rows do not have; the text names it.
+    """
+    bodies: list[Body] = []
+    joints: list[Joint] = []
+    others: dict[str, list[Any]] = {
+        name: [] for name in ("loops", "springs", "points", "unmodelled", "actuators", "couplings")
+    }
+    contacts = []
+    gravity = None
+    for element in scene.elements:
+        if isinstance(element, MechanismElement):
+            bodies += element.mechanism.bodies
+            joints += element.mechanism.joints
+            for name in others:
+                others[name] += getattr(element.mechanism, name)
+            gravity = element.mechanism.gravity
+        elif isinstance(element, BallOnSurface):
+            contacts.append(_contact(element.rolling))
+            body, joint = _free(element.rolling)
+            bodies.append(body)
+            joints.append(joint)
+            gravity = _vector(element.rolling.gravity)
+        else:
+            raise Refused(f"{element.name} ({type(element).__name__}) has no rows in maximal coordinates")
+    assert gravity is not None  # a scene has an element
+    return Mechanism(tuple(bodies), tuple(joints), gravity=gravity, **{k: tuple(v) for k, v in others.items()}), (
+        *contacts,
+    )
+
+
+def _contact(ball: RollingBall) -> RollingContact:
+    name, law = ball.ball.name, ball.contact
+    if not math.isinf(law.mu_static):
+        raise Refused(f"mu_static = {law.mu_static:g} bounds the friction of {name}; rows that always hold do not slip")
+    if law.rolling_resistance:
+        raise Refused(f"rolling resistance of {name} is a moment that its normal force makes; no row gives it")
+    if ball.flies:
+        raise Refused(f"{name} may leave its wall; rows that always hold do not let it")
+    if ball.wall_rate is not None:
+        raise Refused(f"the wall of {name} moves; rows here are those of walls that stand")
+    return RollingContact(name, float(ball.ball.radius), ball.surface, _vector(ball.p0))
+
+
+def _free(ball: RollingBall) -> tuple[Body, Joint]:
+    """The ball as a body whose axes are the world's at the start."""
+    name, inertia = ball.ball.name, float(ball.ball.inertia)
+    start = (*_vector(ball.p0), 1.0, 0.0, 0.0, 0.0)
+    body = Body(name, ball.ball.mass, inertia=(inertia, inertia, inertia))  # type: ignore[arg-type]  # three moments
+    return body, Joint(f"{name} is free", "free", WORLD, name, q0=start, v0=(*_vector(ball.v0), *_vector(ball.w0)))
+
+
+def _vector(values: Any) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z
