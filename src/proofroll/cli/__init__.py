@@ -90,7 +90,7 @@ def start(
 
 
 def _told(error: typer.TyperException) -> str:
-    """Message of a usage error; with the value of a wrong number, or the names there are, which typer leaves out."""
+    """Message of a usage error, with what typer leaves out: the wrong value, or the names to choose from."""
     said = str(error.format_message())
     lacking: Any = error  # typer tells no type of one that names its parameter
     if said.startswith("Missing ") and getattr(error, "param", None) is not None:

@@ -134,7 +134,7 @@ def _now_and_then(line: Callable[[], str]) -> Iterator[None]:
 
 
 def _waited_for() -> str:
-    """Engines that have not yet answered what they were asked, as the end of a line."""
+    """Names of engines whose answer is still awaited, for the end of a line of progress."""
     asking = sys.modules.get("proofroll.running.asking")  # if nothing has imported it nobody was asked
     names = dict.fromkeys(asking.waited_for) if asking else ()
     what = "what they are" if len(names) > 1 else "what it is"

@@ -26,7 +26,7 @@ def package_of(kind: type) -> Path | None:
 
 
 def code_of(item: Any) -> list[str]:
-    """Hash of each package, other than this one, whose dataclasses ``item`` holds at any depth."""
+    """Hash of each package whose dataclasses ``item`` holds, at any depth; of other packages than this one alone."""
     places = {package_of(kind) for kind in set(_kinds(item))}
     return sorted(hash_of(with_imports(place)) for place in places - {None, OWN} if place is not None)
 

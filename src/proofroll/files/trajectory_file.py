@@ -50,7 +50,7 @@ def import_xarray() -> None:
 
 @contextlib.contextmanager
 def _dask_aside() -> Iterator[None]:
-    """Meanwhile dask is not found, unless it is imported already."""
+    """Context in which xarray does not find dask, unless dask is imported already."""
     hidden = "dask" not in sys.modules
     if hidden:
         sys.modules["dask"] = None  # type: ignore[assignment]  # what Python documents to make an import fail

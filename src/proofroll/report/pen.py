@@ -120,7 +120,7 @@ class Drawing:
         self.marks.append(Polyline(np.round(places, 1).tolist(), closed, look))
 
     def disc(self, centre: Sequence[float], radius: float, look: str) -> None:
-        """A circle of the picture; a ball looks so from everywhere."""
+        """A circle in the plane of the picture, the outline of a ball from any side."""
         (x, y), r = centre, radius
         self._bounds.append(np.array([[x - r, y - r], [x + r, y + r]]))
         self.marks.append(Disc([round(x, 1), round(y, 1)], round(r, 1), look))

@@ -36,7 +36,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _require_untouched(engine: str) -> None:
-    """Looks whether what judges engines is what it was; an error ends the process, so that no other row is judged so.
+    """Checks that the engine has not replaced any code that judges it; an error ends the process, before the next row.
 
     Raises:
         ProofrollError: the engine has put something else in its place.
@@ -153,7 +153,7 @@ class _TimeAccounts:
         self._since = time.perf_counter(), now
 
     def on(self, cause: str, **parts: tuple[float, float]) -> None:
-        """Books the time since the last call on ``cause``, but for ``parts`` of it with causes of their own.
+        """Adds the time since the last call to ``cause``, less ``parts`` of it, which are added to causes of their own.
 
         Each part is a pair of wall and processor seconds [s].
         """

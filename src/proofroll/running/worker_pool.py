@@ -52,7 +52,7 @@ class Workers:
             old.close()
 
     def rename(self, asked: str, engine: str) -> None:
-        """An idle worker that was taken as ``asked``, before its engine was known, is that of ``engine``."""
+        """Enters an idle worker under its ``engine``; it was started as ``asked``, before that was known."""
         with self._lock:
             self._idle[:] = [(engine if name == asked else name, worker) for name, worker in self._idle]
 

@@ -172,7 +172,7 @@ def _rivals(cause: Cause, first: Cause) -> bool:
 
 
 def _unsure(cause: Cause, other: Cause) -> bool:
-    """True if a fitted cause is one of several that explain the same as well."""
+    """True if a fitted cause is one of several with equally good explanations."""
     return cause.fitted > 0 and _rivals(other, cause)
 
 

@@ -36,7 +36,7 @@ _START = 1e-6
 
 
 def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
-    """Run and truth, if they are of the same times and of some."""
+    """Run and truth, if both have samples, at the same times."""
     run, truth = evidence.run, evidence.truth
     if run is None or truth is None or run.sizes["time"] != truth.sizes["time"] or run.sizes["time"] < _FEWEST:
         return None

@@ -66,7 +66,7 @@ def gap(p):
 
 
 def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
-    """An engine's part that asks proofroll to run it, where what fails is, in part or as a whole, proofroll's."""
+    """An engine's part that runs it through proofroll, for failures of code that is at least in part proofroll's."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
     return head + assigned(**ball_numbers(body)) + "\n" + asking(failed, "p_WB", "v_WB", "w_WB") + _GEOMETRY

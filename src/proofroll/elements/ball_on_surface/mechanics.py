@@ -140,7 +140,7 @@ def _slipping_force(body: RollingBall) -> FloatArray:
 
 
 def _way(body: RollingBall) -> FloatArray:
-    """Velocity at time 0 [m/s], or, of a ball at rest that does not stay, the one with which it sets off."""
+    """Velocity at time 0 [m/s]; of a ball that rests but will not stay, a tiny one along its coming motion."""
     return setting_off(body, body.p0) if stands(body, body.v0) else body.v0
 
 

@@ -236,7 +236,7 @@ def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
 
 def _with_forces(dataset: xr.Dataset) -> xr.Dataset:
-    """Without time 0 if the engine defines reactions only after a first step."""
+    """Values without time 0, if the engine defines reactions only after a first step."""
     late = "N" in dataset and bool(np.isnan(dataset["N"][0]))
     return dataset.isel(time=slice(1, None)) if late else dataset
 

@@ -67,7 +67,7 @@ class Spheres(Redundant):
     lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
-        """Contacts that start as deep as they are pressed; the spheres are as much larger."""
+        """Contacts that start at the depth of their load; the spheres are larger by that depth."""
         self._contacts: list[_Made] = []
         self._contact_settings = settings
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False

@@ -199,7 +199,7 @@ class BoundedFriction:
             aref[0] -= lift
 
     def _near_cone(self, data: Any, N: float) -> bool:
-        """True if the friction of the evaluation before was near its bound, by its torque: that needs no frame."""
+        """True if the torque of friction was near its bound in the evaluation before; its force needs a frame."""
         t1, t2, t3 = data.qfrc_constraint[self._spin].tolist()
         lever = self._radius + 0.5 * float(data.efc_pos[0])  # MuJoCo's contact point lies midway in the depth
         return math.hypot(t1, t2, t3) >= NEAR_CONE * self._mu * N * lever

@@ -37,7 +37,7 @@ class MujocoRobots:
 
     @property
     def tolerances(self) -> dict[str, float]:
-        """Until 3.13 principal axes are found to about the root of double precision: half angles from 1 − cos."""
+        """Tolerances by layer: up to 3.13 half angles from 1 − cos give principal axes to the root of precision."""
         if tuple(int(part) for part in self.version().split(".")[:2]) >= (3, 14):
             return {}
         torques = ("mass matrix", "gravity", "bias", "inverse dynamics", "forward dynamics")

@@ -141,7 +141,7 @@ class BallWithRows(ABC):
         return self.last_excess(data, mu_static)
 
     def last_excess(self, data: Any, mu_static: float) -> tuple[float, float]:
-        """The same at the state of the last :meth:`accelerate`."""
+        """:meth:`excess` at the state of the last :meth:`accelerate`."""
         *_, F2, F3 = data.lambda_c.tolist()
         needed, normal_force = math.hypot(F2, F3), self.normal_force(data)
         available = mu_static * normal_force

@@ -87,7 +87,7 @@ class KnownFinding:
 
 @dataclass(frozen=True)
 class Sentences:
-    """Three, for the whole report."""
+    """Three sentences for the whole report."""
 
     sentences: list[str]
 

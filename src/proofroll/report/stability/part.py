@@ -22,7 +22,7 @@ from proofroll.studies.study_store import kept
 
 @dataclass(frozen=True)
 class JudgedBoundary:
-    """A claim in one sentence, what speaks ``against`` it, or why it is ``untested``; ``holds``: None of the latter."""
+    """A claim in one sentence, what speaks ``against`` it, or why it is ``untested``; ``holds`` is None if untested."""
 
     says: str
     because: str

@@ -87,7 +87,7 @@ def verdict_table(content: ReportedComparison) -> Table:
 
 
 def _before(content: ReportedComparison) -> dict[int, float]:
-    """Row -> longest time before the first step [s]; empty unless some engine takes so long that it must compile."""
+    """Row -> longest time before the first step [s]; empty unless an engine takes as long as only compilers do."""
     found: dict[int, float] = {}
     for run in content.runs:
         found[run.row] = max(found.get(run.row, 0.0), run.build_seconds or 0.0)

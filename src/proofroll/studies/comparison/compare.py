@@ -148,7 +148,7 @@ def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
 
 
 def _without_truth(run: Planned, point: ComparedPoint, result: Result) -> Run:
-    """A row at a point where the truth refuses, which says nothing about the engine; or where it was lost."""
+    """Row at a point without a truth: it was refused, which says nothing about the engine, or its run was lost."""
     truth = point.result
     lasts = truth.status in LASTING
     status = Status.NO_TRUTH if lasts else truth.status

@@ -78,7 +78,7 @@ def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolut
 
 
 def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absolute: float) -> str | None:
-    """Reason of a tolerance that holds only because a step ends at each of many samples; None if it holds otherwise."""
+    """Sentence on a setting that holds its tolerance by the density of samples alone; None if it holds it without."""
     dense, rare, unit = sparse.dense_error.get(name), sparse.error.get(name), study.quantities[name].unit
     if dense is None or dense * MARGIN > absolute or (rare is not None and rare * MARGIN <= absolute):
         return None

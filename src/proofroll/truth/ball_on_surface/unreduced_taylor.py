@@ -101,7 +101,7 @@ def _stopped(series: Any) -> Diverged:
 
 
 def _integrator(body: RollingBall, bounded: bool) -> Any:
-    """The integrator with the body's numbers; one that is bounded ends where the friction is used up."""
+    """The integrator with the body's numbers; with bounded friction it ends where the bound is reached."""
     surface = body.surface
     if not hasattr(_local, "integrators"):
         _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads

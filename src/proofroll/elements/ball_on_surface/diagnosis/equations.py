@@ -152,7 +152,7 @@ def response(
 
 @once
 def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
-    """The certificate, if something in it differs; the run, unless the equations hold there as for the truth.
+    """Residuals of the certificate if a line of it differs, and of the run unless its equations hold as for the truth.
 
     Nothing where the certificate names a number that was built otherwise: that is the cause.
     """

@@ -154,7 +154,7 @@ def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -
 
 
 def _reachable(motion: Placed, true: Placed, length: float) -> Placed:
-    """The frames until a mechanism leaves the picture for good: what grows without bound draws nothing."""
+    """The frames until a mechanism leaves the picture for good, as a motion without bound does."""
     count = motion.time.size
     last = in_sight(np.linalg.norm(motion.p_WB - true.p_WB[:count], axis=-1).max(axis=-1) > _FAR * length)
     kept = {name: getattr(motion, name)[:last] for name in ("time", *_MOTION[1:])}

@@ -68,7 +68,7 @@ def seen():
 
 
 def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
-    """The program's part that runs the formulation's ``model``, at time 0, to whose system markers are added."""
+    """The program's part that runs a formulation; adds markers to the system of its ``model``, which is at time 0."""
     followed = [(point.body, point.position) for point in mechanism.points]
     followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
     com = {body.name: body.com for body in mechanism.bodies}
