@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import json
+import re
 import sys
 from pathlib import Path
 
-from markdown_tables import caveat_list, remark_list, verdict_table
+from markdown_tables import caveat_list, choice_table, remark_list, verdict_table
 
 from proofroll.core.comparison import Comparison
 from proofroll.core.number_format import number
@@ -15,8 +17,10 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import read_scene_file, scene_names
 from proofroll.files.toml import study_of
+from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
+from proofroll.report.page.choice import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
 from proofroll.report.page.scene_sheet import scene_sheet
 from proofroll.running.runner import Runner
@@ -39,7 +43,14 @@ Scenes with what they ask, what is true of them, and what each engine makes of t
 from real runs of the comparisons, with the values that a brief report has; do not edit it. Errors are the largest over
 all points of the parameters; what the words mean: [read a verdict](read_a_verdict.md). What each costs says the
 [trade-off](tradeoff.md).
+
+```{include} gallery/matrix.inc
+```
 """
+# Part of the path that the matrix asks for.
+TOLERANCE = 1e-4
+# Line of a section that the matrix is made from: what each formulation is at that tolerance, by group of scenes.
+KEPT = re.compile(r"^<!-- at 1e-4: (.*) -->$", flags=re.MULTILINE)
 
 
 def comparisons() -> dict[str, Comparison]:
@@ -96,6 +107,26 @@ def truth(outcome: Outcome) -> str:
     return said
 
 
+def standings(outcome: Outcome) -> str:
+    """What each formulation is at the tolerance of the matrix, as a line that no reader sees."""
+    name = outcome.comparison.name
+    matrix = choice_matrix(lines_of(outcome), {name: ChoiceStudy(outcome.comparison.title, "")})
+    column = next(item for item in matrix.columns if item.whole)
+    rows = [row for row in matrix.rows if not row.setting]
+    found = {row.name: matrix.cell(row, column, TOLERANCE, False).state for row in rows}
+    return f"<!-- at 1e-4: {json.dumps({column.group: found})} -->\n"
+
+
+def write_matrix(text: str) -> None:
+    """Writes the matrix of the gallery's sections, which the first page of the documentation shows, too."""
+    groups: dict[str, dict[str, list[str]]] = {}
+    for kept in KEPT.findall(text):
+        for group, rows in json.loads(kept).items():
+            for row, state in rows.items():
+                groups.setdefault(group, {}).setdefault(row, []).append(state)
+    (PICTURES / "matrix.inc").write_text(choice_table(groups), encoding="utf-8")
+
+
 def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     """One scene."""
     file = read_scene_file(scene)
@@ -106,6 +137,7 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
     outcome = compare(comparison, runner)
     content = outcome_content(outcome)
     path = f"comparisons: {comparison.name}"
+    parts.append(standings(outcome))
     parts += [f"**Asked** ({path}): {comparison.question}\n", f"**True**: {truth(outcome)}\n"]
     # Without costs, which are measured in turns where that is asked.
     table = "".join(line.rstrip("\n").rsplit("|", 2)[0] + "|\n" for line in verdict_table(content).splitlines())
@@ -126,6 +158,7 @@ def main(names: list[str]) -> None:
         kept[scene] = section(scene, known.get(scene), runner)
         text = "\n".join([HEAD, *(kept[name] for name in scene_names() if name in kept)])
         target.write_text(text, encoding="utf-8")
+        write_matrix(text)
         sys.stderr.write(f"{scene}\n")
 
 

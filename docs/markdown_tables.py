@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.core.number_format import number
+from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.tables import remarks
 from proofroll.report.labels import SYMBOLS, caveat_lines, name_of, step, verdict_text
@@ -14,6 +15,30 @@ from proofroll.report.terminal.tables import columns
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
+
+
+def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
+    """One line per formulation, one column per group of scenes, from the standing in each of its scenes.
+
+    All scenes held: the sign alone; some: how many; none: the sign of the best standing.
+    """
+    order = [str(item) for item in Verdict]
+    rows = dict.fromkeys(name for rows in groups.values() for name in rows)
+    lines = ["| engine | " + " | ".join(groups) + " |", "|---" * (len(groups) + 1) + "|"]
+    for name in rows:
+        cells = []
+        for group in groups.values():
+            states = group.get(name, [])
+            held = sum(state == Verdict.AGREES for state in states)
+            sign = SYMBOLS[min(states, key=order.index)] if states else ""
+            cells.append(f"{sign} {held} of {len(states)}" if 0 < held < len(states) else sign)
+        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+    scenes = max((len(states) for rows in groups.values() for states in rows.values()), default=0)
+    many = "; of several scenes in how many" if scenes > 1 else ""
+    said = f"Motion to 1e-4 of the path with some setting and step that was run: {SYMBOLS[Verdict.AGREES]} held{many}"
+    rest = f"{SYMBOLS[Verdict.CONVERGES]} finer steps come closer, {SYMBOLS[Verdict.DIFFERS]} another limit or none"
+    last = f"{SYMBOLS[Verdict.REFUSED]} refused, {SYMBOLS[Verdict.FAILED]} no result; empty: not run."
+    return "\n".join(lines) + f"\n\n{said}, {rest}, {last}\n"
 
 
 def verdict_table(content: ReportedComparison) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import inspect
 import re
 import shlex
@@ -117,6 +118,22 @@ def test_the_workflow_runs_the_two_commands() -> None:
     assert {word for line in made for word in line.split()} >= {"check", "docs", "test"}
     for line in [*commands[1:], *made]:
         subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
+
+
+def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Both pages include the matrix, which is that of the records in the gallery's own sections."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    gallery = importlib.import_module("gallery")
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    written = (ROOT / "docs" / "gallery" / "matrix.inc").read_text(encoding="utf-8")
+    monkeypatch.setattr(gallery, "PICTURES", tmp_path)
+    gallery.write_matrix(text)
+    assert (tmp_path / "matrix.inc").read_text(encoding="utf-8") == written
+    for page in ("index", "gallery"):
+        assert "{include} gallery/matrix.inc" in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    two = {"trees": {"alpha": ["agrees", "differs"], "beta": ["converges"]}, "loops": {"alpha": ["agrees"]}}
+    lines = gallery.choice_table(two).splitlines()
+    assert lines[2:4] == ["| alpha | ✓ 1 of 2 | ✓ |", "| beta | ≈ |  |"]
 
 
 def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
