@@ -54,7 +54,7 @@ class RobotTruth:
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        """By the first formulation."""
+        """Values by the first formulation."""
         if self.like is not None and _moves_alike(self.robot, self.like.robot):
             return self.like.dynamics
         return world_jacobians(self.robot, self.states, self.frames)

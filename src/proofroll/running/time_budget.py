@@ -51,7 +51,7 @@ class TimeBudget:
             return share if share > _LEAST else 0.0
 
     def end(self, case: str, *, lost: bool = False) -> None:
-        """A case has ended; one that was lost told no processor time, and counts as long as it was under way."""
+        """Counts a case that has ended; one that was lost has no processor time, and counts by its wall time."""
         with self._lock:
             begun = self._begun.pop(case)
             self._lost += time.monotonic() - begun if lost else 0.0

@@ -109,7 +109,7 @@ def _compare_contacts(
     compare: Callable[[str, str, Any, Any, float], None],
     lines: list[Line],
 ) -> None:
-    """Compares gaps, normals, places and coefficients of contacts; the law that the model has is told."""
+    """Compares gaps, normals, places and coefficients of contacts, and names the law that the model has."""
     contacts = element.mechanism.contacts
     if not contacts:
         return

@@ -234,7 +234,7 @@ class ImpulseSteps:
         return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
 
     def _shifts(self, J: Array, v: Array, found: Sequence[Touching]) -> Array:
-        """What is added to slides and to speeds of gaps [m/s], shape (contacts, 3); infinite where none can close."""
+        """Terms added to slides and to speeds of gaps [m/s], shape (contacts, 3); infinite where none can close."""
         shifts, dt = np.zeros((len(found), 3)), self._dt
         shifts[:, 2] = np.inf
         for k, each in enumerate(found):

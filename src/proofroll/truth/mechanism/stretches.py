@@ -33,7 +33,7 @@ class StretchLaw(NamedTuple):
 
 
 class Stretches(ABC, Generic[ModeT]):
-    """What routes share: no equations. See :class:`proofroll.truth.hybrid.HybridRoute` for the methods."""
+    """Integration that routes share, without equations. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
     def __init__(self, size: int, tolerance: float) -> None:
         """Takes the length of a state, and the tolerance of each step."""

@@ -34,7 +34,7 @@ class OfJoint(MechanismMutant):
         return of_joints(mechanism, lambda j: dataclasses.replace(j, **{self.key: self.factor * getattr(j, self.key)}))
 
     def events(self) -> list[Event]:
-        """Of its model."""
+        """Mutant of its model."""
         return list(self.inner.events())
 
 
@@ -115,7 +115,7 @@ class SwappedGains(Driven):
     named = ("kp and kd swapped",)
 
     def actuator(self, actuator: Any) -> Any:
-        """With its gains exchanged."""
+        """Servo with its gains exchanged."""
         return dataclasses.replace(actuator, kp=actuator.kd, kd=actuator.kp)
 
 
@@ -150,7 +150,7 @@ class TightClamp(Driven):
     named = ("the limits of the actuators halved",)
 
     def actuator(self, actuator: Any) -> Any:
-        """With half of its limit."""
+        """Servo with half of its limit."""
         return dataclasses.replace(actuator, limit=0.5 * actuator.limit)
 
 

@@ -110,7 +110,7 @@ class MechanismLoop:
         return into, into @ Vt[: self.rank].T, U[:, : self.rank].T / S[: self.rank, None]
 
     def acceleration(self, q: Array, v: Array) -> Array:
-        """Of the joints."""
+        """Acceleration of the joints."""
         model, data = self.model, self.data
         if self.loops or self.springs:
             self.place(q, v)
@@ -125,7 +125,7 @@ class MechanismLoop:
         return np.asarray(free - locked @ (back @ (drift + C @ free)))
 
     def rates(self, y: Array) -> Array:
-        """Of configuration and velocity together."""
+        """Rates of configuration and velocity together."""
         q, v = pin.normalize(self.model, y[: self.model.nq]), y[self.model.nq :]
         return np.concatenate([pin.tangentMap(self.model, q) @ v, self.acceleration(q, v)])
 
@@ -181,7 +181,7 @@ class MechanismLoop:
 
 
 def steps(solver: Any, times: Iterable[float], accept: Callable[[Any], None]) -> Iterator[Any]:
-    """States at each time by scipy's DOP853, of which a step ends at each; accept may change that of the solver."""
+    """States at each time by scipy's DOP853, whose steps end there; ``accept`` may change the solver's state."""
     for t in times:
         solver.t_bound, solver.status = t, "running" if t > solver.t else "finished"
         while solver.status == "running":
