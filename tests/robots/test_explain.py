@@ -94,3 +94,15 @@ def test_what_holds_at_a_few_states_is_proven_at_all(tmp_path: Path) -> None:
     reading.forward[-1] += 0.5
     _, unexplained = Search(file, reading, "planted", TOLERANCES).causes(truth)
     assert unexplained == "forward dynamics"
+
+
+@pytest.mark.parametrize("shape", ['<sphere radius=" "/>', '<box size="1 2"/>', "<box/>", '<box size="1 b 2"/>'])
+def test_a_shape_without_size_gives_no_cause(shape: str, tmp_path: Path) -> None:
+    """Sizes of shapes are read by hypotheses alone: what is none ends no search."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(TEXT.replace("</inertial>", f"</inertial><collision><geometry>{shape}</geometry></collision>"))
+    file = open_robot(path)
+    robot = read_urdf(file)
+    truth = RobotTruth.of(robot, random_states(robot, 2, 1))
+    causes, left = Search(file, reading_of(_lighter(robot), truth), "planted", TOLERANCES).causes(truth)
+    assert (causes, left) == ((), "mass")

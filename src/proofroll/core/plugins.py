@@ -13,7 +13,7 @@ from typing import Any
 
 from proofroll.core.announced import announced, loaded
 from proofroll.core.element import ElementKind
-from proofroll.core.engine_abilities import SupportsFrom
+from proofroll.core.engine_abilities import MadeFor, SupportsFrom, offered
 from proofroll.core.errors import InputError, Missing, ProofrollError, place, require_known
 
 GROUP = "proofroll.engines"
@@ -168,7 +168,8 @@ def parse_engine(text: str) -> EngineSpec:
 def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collection[str] = ()) -> Any:
     """Complete settings of an engine's class: the preset of the formulation, with the given options put over it.
 
-    Where no formulation is given it is the first that provides what the scene ``requires``.
+    Where no formulation is given it is the first that provides what the scene ``requires``, of those that are made for
+    such scenes if there is one.
 
     Raises:
         InputError: unknown or ill-typed option.
@@ -178,8 +179,10 @@ def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collecti
     fields = [field.name for field in dataclasses.fields(engine.settings)]
     for key, value in options.items():
         require_known(f"{engine.name}: {key}", key, fields, "there is no such setting; choose from", value)
-    able = (name for name in engine.presets if set(requires) <= engine.provides[name])
-    formulation = options.get("formulation") or next(able, next(iter(engine.presets)))
+    purposes = engine.made_for if isinstance(engine, MadeFor) else {}
+    able = [name for name in engine.presets if set(requires) <= engine.provides[name]]
+    able.sort(key=lambda name: not offered(name, requires, purposes))
+    formulation = options.get("formulation") or next(iter([*able, *engine.presets]))
     require_known(f"{engine.name}: formulation", formulation, engine.presets)
     presets = engine.presets[formulation]
     preset = options.get("preset", "matched" if "matched" in presets else next(iter(presets)))

@@ -13,6 +13,7 @@ from annotated_types import Gt
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, load_engine, parse_engine, resolve_settings
+from proofroll.files.scene_file import load_scene
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,13 @@ def test_settings_without_options_are_matched() -> None:
     """An engine without brackets takes its first formulation with the preset matched, or the first preset there is."""
     assert resolve_settings(Toy, {}) == ToySettings("free", "matched", 1e-3)
     assert resolve_settings(Toy, {"formulation": "chart"}) == ToySettings("chart", "default", 4e-3)
+
+
+@pytest.mark.parametrize(("scene", "formulation"), [("pendulum", "null_space"), ("sled", "impulses")])
+def test_a_formulation_made_for_other_scenes_is_not_taken_unasked(scene: str, formulation: str) -> None:
+    """Without a formulation it is one that is made for such scenes, if there is one, in whatever order they stand."""
+    engine = pytest.importorskip("proofroll.engines.pinocchio.adapter").Pinocchio
+    assert resolve_settings(engine, {}, load_scene(scene).requires).formulation == formulation
 
 
 def test_options_go_over_the_preset() -> None:

@@ -20,9 +20,12 @@ _MARGIN = 1e-3
 
 def _half(kind: str, sizes: dict[str, str]) -> Array | None:
     """Half lengths of a shape's own box; None: not known here."""
-    if kind == "box":
-        return np.array([float(part) / 2 for part in sizes["size"].split()])
-    return np.full(3, float(sizes["radius"])) if kind == "sphere" else None
+    name, count, part = {"box": ("size", 3, 0.5), "sphere": ("radius", 1, 1.0)}.get(kind, ("", 0, 0.0))
+    try:
+        lengths = [part * float(length) for length in sizes.get(name, "").split()]
+    except ValueError:
+        return None
+    return np.full(3, lengths) if count and len(lengths) == count else None
 
 
 def _box(mass: float, shapes: list[Any], com: Array, frame: Array) -> Array | None:
