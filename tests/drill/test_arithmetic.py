@@ -66,7 +66,7 @@ def test_numbers_of_the_truth_hang_on_no_processor(tmp_path: Path) -> None:
 
 def record(**changes: Any) -> dict[str, Any]:
     """A record of one run whose truth has no file."""
-    run = {"verdict": "agrees", "causes": [], "events": {"ball": ["slip", "stick"]}}
+    run = {"status": "done", "verdict": "agrees", "causes": [], "events": {"ball": ["slip", "stick"]}}
     return {
         "claim": {
             "decisions": {"engine point 0 #0": run | changes},
@@ -87,6 +87,13 @@ def test_a_decision_that_differs_is_told(changes: dict[str, Any], tmp_path: Path
     assert (found.kind, found.comparison, found.what) == ("zen", "claim", place)
     assert found.found == str(instead["ball"] if what == "events" else instead)
     assert found.reference != found.found
+
+
+def test_a_run_whose_package_is_missing_is_no_difference(tmp_path: Path) -> None:
+    """A row that needs what one kind lacks is compared with nothing."""
+    assert (
+        list(differences("no-heyoka", tmp_path, tmp_path, (record(), record(status="missing", verdict="failed")))) == []
+    )
 
 
 @pytest.mark.parametrize(

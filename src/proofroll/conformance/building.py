@@ -15,7 +15,7 @@ from proofroll.core.element import Element
 from proofroll.core.element_abilities import HasOptionalCapabilities
 from proofroll.core.engine import Sample
 from proofroll.core.engine_abilities import require_provided
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Missing, Refused
 from proofroll.core.multi_element import REQUIRED
 from proofroll.core.scene import Scene
 
@@ -24,7 +24,7 @@ def builds_or_refuses(subject: Subject) -> None:
     """The engine builds the scene, or refuses it in one line that says why."""
     try:
         subject.engine.build(subject.scene.for_an_engine, subject.settings)
-    except Refused as refusal:
+    except (Refused, Missing) as refusal:
         text = str(refusal)
         require(text.strip() and "\n" not in text, f"a refusal must be one line that says why, not {text!r}")
     except Exception as error:
@@ -57,7 +57,7 @@ def _refusal(engine: Any, formulation: str, scene: Scene) -> str:
         try:
             require_provided(engine, formulation, scene)
             engine.build(scene.for_an_engine, settings)
-        except Refused as refusal:
+        except (Refused, Missing) as refusal:
             why = str(refusal)
         else:
             return ""

@@ -18,7 +18,7 @@ from proofroll.core.dataset import from_samples
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.engine import EPSILON, Sample, precision_of
 from proofroll.core.engine_abilities import MadeFor, offered
-from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.multi_element import build
 from proofroll.core.plugins import load_element_kinds
 from proofroll.core.scene import Scene
@@ -80,7 +80,7 @@ class Subject:
         """The engine at time 0; the check has nothing to look at if it refuses."""
         try:
             return build(self.engine, self.scene, self.settings)
-        except Refused as refusal:
+        except (Refused, Missing) as refusal:
             raise SkipTest(f"refused: {refusal}") from None
 
     def at(self, t: float) -> Any:
@@ -185,7 +185,7 @@ def explained(error: UnlikeSceneError) -> str:
         if not causes:
             run = from_samples(scene, times, subject.samples(times))
             causes = diagnosed(scene, lines, run, truth(scene, times), step)
-    except (Diverged, Refused, InputError):
+    except (Diverged, Missing, Refused, InputError):
         return sentence  # the check has said what it found; there is no run that tells more
     except Exception as behind:  # anybody's engine, on a longer run than the check made
         return f"{sentence}\nno cause was found: {type(behind).__name__}: {behind}"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.compiled import library
@@ -169,5 +169,5 @@ def test_without_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without heyoka the refusal names the extra."""
     monkeypatch.setattr(library, "available", lambda: False)
     for call in (lambda: first_slip(PAPER, UNTIL), lambda: first_slips(PAPER, UNTIL, 4.0, 0.35, 5e-4)):
-        with pytest.raises(Refused, match=r"needs heyoka.*proofroll\[fast\]"):
+        with pytest.raises(Missing, match=r"needs heyoka.*proofroll\[fast\]"):
             call()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
@@ -117,5 +117,5 @@ def test_what_taylor_cannot_do_is_refused(monkeypatch: pytest.MonkeyPatch) -> No
     with pytest.raises(Refused, match="rolls without slip only"):
         build(load_scene("sphere_in_cylinder", mu_static=0.35), "projection[integrator=taylor]")
     monkeypatch.setattr(library, "available", lambda: False)
-    with pytest.raises(Refused, match=r"needs heyoka.*proofroll\[fast\]"):
+    with pytest.raises(Missing, match=r"needs heyoka.*proofroll\[fast\]"):
         build(RESISTING, "projection[integrator=taylor]")

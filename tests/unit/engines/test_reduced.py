@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from proofroll.core.engine_abilities import Level, TellsLevels
-from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.errors import Diverged, InputError, Missing, Refused
 from proofroll.core.gravity import Gravity
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
@@ -108,7 +108,7 @@ def test_closed_form_is_refused_where_there_is_none(scene: Scene, why: str) -> N
 def test_taylor_without_heyoka_is_refused_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without heyoka the refusal names the extra, and the version tells it from an installation that has it."""
     monkeypatch.setattr(library, "available", lambda: False)
-    with pytest.raises(Refused, match=r"^integrator=taylor needs heyoka.*proofroll\[fast\].*$"):
+    with pytest.raises(Missing, match=r"^integrator=taylor needs heyoka.*proofroll\[fast\].*$"):
         build(SCENES["cylinder"], TAYLOR)
     assert "heyoka" not in Reduced.version()
     build(SCENES["cylinder"], "reduced").advance(0.1)

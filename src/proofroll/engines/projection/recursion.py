@@ -72,7 +72,8 @@ def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[
     """Rates of the state, and the state without violations: :class:`DependentCoordinates` in machine code.
 
     Raises:
-        Refused: heyoka is missing, or the mechanism has what these formulas do not.
+        Missing: heyoka is not installed.
+        Refused: the mechanism has what these formulas do not.
     """
     if mechanism.loops:
         raise Refused("singular values of loops are not compiled; choose preset=matched")

@@ -37,7 +37,8 @@ class TaylorSeries(Series):
         ``accepted`` is the state from which the motion goes on, see ``Renewed`` of :mod:`compiled.series`.
 
         Raises:
-            Refused: heyoka is missing, or the scene is not one of its equations.
+            Missing: heyoka is not installed.
+            Refused: the scene is not one of its equations.
         """
         if np.isfinite(body.contact.mu_static):
             raise Refused(

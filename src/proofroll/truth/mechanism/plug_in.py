@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
 from proofroll.core.events import with_events
+from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES
 from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.named_forces import FIELDS
@@ -22,7 +23,8 @@ _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
     "energy_change": "energy", "drift": "drift", "gaps": "p_WB", "slips": "v_WB", "normal_forces": "pressed",
-    "contact_forces": "pressed",
+    "contact_forces": "pressed", "penetration": "p_WB", "contact_pull": "pressed", "cone_excess": "pressed",
+    "hop_speed": "v_WB", "energy_gain": "energy",
 }  # fmt: skip
 _PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
@@ -69,7 +71,10 @@ class MechanismTruth:
             if field is None and str(name).rpartition(".")[0] in points:
                 field = "points"
             size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
-            variable.attrs["error_bar"] = float(found.bars[field][-1]) if field else 4 * np.finfo(float).eps * size
+            bar = _bar_of_a_law(str(name), element, found.bars)
+            if field is not None:
+                bar = float(found.bars[field][-1])
+            variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
         dataset.attrs["route"], *others = found.routes
         dataset.attrs["second_route"] = ", ".join(others)
         if found.checked_by is not None:
@@ -81,3 +86,20 @@ class MechanismTruth:
         if any(said):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, said))
         return with_events(dataset, found.events) if found.events or element.mechanism.contacts else dataset
+
+
+def _bar_of_a_law(name: str, element: MechanismElement, bars: Mapping[str, FloatArray]) -> float | None:
+    """Error bar of a residual that is made of several fields; None: of any other variable."""
+    mass = sum(body.mass for body in element.mechanism.bodies)
+    place, velocity, force = (float(bars[field][-1]) if field in bars else 0.0 for field in ("p_WB", "v_WB", "pressed"))
+    match name:
+        case "friction_direction":  # of what hardly presses and hardly slides
+            return force / (PRESSES * element.force) + velocity / (SLIDES * element.speed)
+        case "natural_map":
+            return force + velocity * element.force / element.speed
+        case "momentum_error":
+            return mass * velocity
+        case "angular_momentum_error":
+            return mass * (element.length * velocity + element.speed * place)
+        case _:
+            return None

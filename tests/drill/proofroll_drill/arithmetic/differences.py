@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.files.trajectory_file import read
+from proofroll.running.case import Status
 
 
 @dataclass(frozen=True)
@@ -33,12 +34,20 @@ class Difference:
 def differences(kind: str, reference: Path, other: Path, records: tuple[Any, Any]) -> Iterator[Difference]:
     """All of them, of two records (:mod:`proofroll_drill.arithmetic.record`) in their folders."""
     ours, theirs = records
-    for comparison, mine in ours.items():
-        its = theirs.get(comparison, {})
+    for comparison in ours:
+        mine, its = _in_both(ours[comparison], theirs.get(comparison, {}))
         for place, one, two in _parted(_decisions(mine), _decisions(its)):
             yield Difference(kind, comparison, place, one, two)
         for what, gap, allowed in (*_limits(mine, its), *_numbers(mine, its, reference, other)):
             yield Difference(kind, comparison, what, f"known to {allowed:.2g}", f"off by {gap:.2g}")
+
+
+def _in_both(one: Any, two: Any) -> tuple[Any, Any]:
+    """Records of the runs whose packages both kinds have."""
+    runs = [record.get("decisions", {}) for record in (one, two)]
+    gone = {name for record in runs for name, said in record.items() if said["status"] == Status.MISSING}
+    left = [{name: said for name, said in record.items() if name not in gone} for record in runs]
+    return {**one, "decisions": left[0]}, {**two, "decisions": left[1]}
 
 
 def _decisions(record: Any) -> dict[str, Any]:

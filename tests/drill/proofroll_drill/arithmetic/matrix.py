@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from proofroll.files.data_folders import data_folder
+from proofroll.running.case import Status
 from proofroll_drill.arithmetic.differences import Difference, differences
 from proofroll_drill.arithmetic.kinds import REPOSITORY, Arithmetic, make_ready, took_effect
 
@@ -94,7 +95,8 @@ def _matrix(
             reference = place / kind.name, record
         parted = list(differences(kind.name, reference[0], folder, (reference[1], record)))
         failed, passed = _tested(kind, tests, folder, jobs) if tests else ([], "")
-        runs = sum(len(item["decisions"]) for item in record.values())
+        decisions = (said for item in record.values() for said in item["decisions"].values())
+        runs = sum(said["status"] != Status.MISSING for said in decisions)
         found.append(Tried(kind.name, kind.says, "", runs, parted, failed, passed))
     return found
 

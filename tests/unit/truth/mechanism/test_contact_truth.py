@@ -285,3 +285,12 @@ def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     with pytest.raises(Refused, match="not unique or not possible \\(Painlevé\\)"):
         truth_of(mechanism_of("painleve_rod"), np.array([0.0, 0.01]))
     motion("painleve_rod", [0.0, 0.01], friction=0.5)
+
+
+def test_residuals_of_the_truth_are_within_their_bars() -> None:
+    """Each residual of Coulomb's law, which is zero for the truth, is no larger than its own error bar says."""
+    found = truth(load_scene("sled"), np.array([0.0, 0.1, 0.2]))
+    for name in ("penetration", "contact_pull", "cone_excess", "friction_direction", "hop_speed", "natural_map"):
+        bar = found[name].attrs["error_bar"]
+        assert 0 < bar < 1e-5, name
+        assert float(np.nanmax(np.abs(found[name].to_numpy()))) <= bar, name

@@ -6,7 +6,7 @@ from importlib import metadata, util
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Missing
 
 # A step's error relative to the state: no tolerance below can be told from it.
 TIGHTEST = float(np.finfo(float).eps)
@@ -18,13 +18,13 @@ def available() -> bool:
 
 
 def require_heyoka(what: str) -> None:
-    """Refuses ``what`` in one line where heyoka is missing.
+    """Check: heyoka is here, which ``what`` needs.
 
     Raises:
-        Refused: it is not installed.
+        Missing: it is not installed; no engine has refused anything by that.
     """
     if not available():
-        raise Refused(f"{what} needs heyoka, which is not installed here: pip install 'proofroll[fast]' (Linux)")
+        raise Missing(f"{what} needs heyoka, which is not installed here: pip install 'proofroll[fast]' (Linux)")
 
 
 def with_heyoka(version: str) -> str:
