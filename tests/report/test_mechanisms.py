@@ -13,11 +13,14 @@ import pytest
 from browsing import Visit
 from scipy.spatial.transform import Rotation
 
-from proofroll.elements.mechanism.report.replay import _turned
+from proofroll.core.truth import truth
+from proofroll.elements.mechanism.report.replay import _turned, drawn
 from proofroll.files.comparison_file import load_comparison
+from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.page.growing import write_report
+from proofroll.report.replay.records import Replayed
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
@@ -102,3 +105,12 @@ def test_bodies_turn_as_often_as_their_spin_says() -> None:
     exact = Rotation.from_rotvec(times[:, None] * rate) * Rotation.from_rotvec([0.3, 0.1, -0.2])
     assert (Rotation.from_quat(found, scalar_first=True) * exact.inv()).magnitude().max() < 1e-9
     assert np.linalg.norm(rate) * 0.1 > np.pi, "the samples alone would not show it"
+
+
+def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
+    """A ladder shows the forces of floor and wall at its ends, on the ladder, as the truth has them."""
+    scene = load_scene("ladder")
+    true = truth(scene, np.linspace(0.0, 0.1, 6))
+    case, _, numbers = drawn(Replayed(scene, true, Path("none"), [], "ladder", "as it is"))
+    assert [joint["at"][2] for joint in case["joints"][1:]] == [-0.75, 0.75]
+    assert next(width for name, _, width, _, _ in numbers.arrays if name == "force") == 9

@@ -277,3 +277,17 @@ def test_drives_and_stops_are_drawn(scene: str, marks: list[str]) -> None:
     letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
     assert set(marks) <= set(letters)
     assert len(full.marks) > len(bare.marks)
+
+
+@pytest.mark.parametrize(
+    ("scene", "shapes", "names"),
+    [("sled", 4, ["left", "right", "back"]), ("rattleback", 2, ["contact"]), ("tilted_disc", 2, ["contact"])],
+)
+def test_shapes_that_may_touch_are_drawn(scene: str, shapes: int, names: list[str]) -> None:
+    """Each shape has an outline and each plane one patch, also where contacts share it; what touches has its name."""
+    element = load_scene(scene).elements[0]
+    smooth = dataclasses.replace(element.mechanism, geometries=(), pairs=())
+    full, bare = drawn(element), drawn(dataclasses.replace(element, mechanism=smooth))
+    letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
+    assert set(names) <= set(letters)
+    assert len(full.marks) - len(bare.marks) == shapes + len(names)

@@ -6,7 +6,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
+from proofroll.elements.mechanism.contacts.shapes import HalfSpace
+from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.kinematics import Tree
+from proofroll.elements.mechanism.rotations import frame_of_axis
 from proofroll.report.pen import Drawing, View
 
 _SIZE = 240.0  # of the mechanism in the picture [px]
@@ -17,16 +21,18 @@ _OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer of what is not pl
 _STROKE = 10.0  # half of the stroke that marks a stop [px]
 _FARTHEST = 10.0  # place of a stop that is drawn, over the mechanism's length, or its angle [rad]
 _TEETH = 8  # of the zigzag of a spring
+_OUTLINE, _PATCH = 97, 0.6  # points of a shape's outline; half of a plane's patch, over the mechanism's length
 
 
 def drawn(element: MechanismElement) -> Drawing:
     """The skeleton of a mechanism: from each body's centre of mass a line to all that is fastened to the body."""
     mechanism, start, picture = element.mechanism, element.start, Drawing()
-    at = View(*direction(element), _SIZE / element.length)
+    at = View(*direction(element), _SIZE / _reach(element))
 
     def place(body: str, position: tuple[float, ...]) -> FloatArray:
         return np.asarray(start.point(body, position)[0])
 
+    _shapes(picture, at, element)
     for spring in mechanism.springs:
         ends = place(spring.body_a, spring.position_a), place(spring.body_b, spring.position_b)
         picture.path(_zigzag(at(np.stack(ends))), "thin")
@@ -55,6 +61,47 @@ def drawn(element: MechanismElement) -> Drawing:
     _laws(picture, at, element)
     _gravity(picture, at, element)
     return picture
+
+
+def _reach(element: MechanismElement) -> float:
+    """Length of the mechanism, or of its longest shape [m]."""
+    shapes = [shape for contact in element.mechanism.contacts for shape in (contact.shape_a, contact.shape_b)]
+    sizes = [
+        float(np.linalg.norm(shape.support(axis)[0] - shape.support(-axis)[0]))
+        for shape in shapes
+        if not isinstance(shape, HalfSpace)
+        for axis in np.eye(3)
+    ]
+    return max([element.length, *sizes])
+
+
+def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
+    """The outline of each shape that may touch, a patch of each plane, and the names of what touches at the start."""
+    mechanism = element.mechanism
+    motion = Tree(mechanism).at(*mechanism.start())
+    found, index = touches(mechanism, motion), mechanism.body_index
+    e3, up = direction(element)
+    e1 = np.cross(up, e3) / np.linalg.norm(np.cross(up, e3))
+    angles = np.linspace(0.0, 2 * np.pi, _OUTLINE)
+    rim = np.outer(np.cos(angles), e1) + np.outer(np.sin(angles), np.cross(e3, e1))
+    drawn_already: set[bytes] = set()
+    for contact, each in zip(mechanism.contacts, found, strict=True):
+        for body, shape in ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)):
+            p, R = motion.p_WB[index[body]], motion.R_WB[index[body]]
+            if isinstance(shape, HalfSpace):
+                n = R @ shape.normal
+                x, y = frame_of_axis(n)[:, 0], frame_of_axis(n)[:, 1]
+                middle = np.mean([one.place for one in found], axis=0)
+                middle = middle - n * (n @ (middle - p - R @ shape.point))
+                outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
+            else:
+                outline = np.array([p + R @ shape.support(R.T @ d)[0] for d in rim])
+            path = np.asarray(at(outline))
+            if path.round(3).tobytes() not in drawn_already:
+                picture.path(path, "hidden" if isinstance(shape, HalfSpace) else "thin")
+                drawn_already.add(path.round(3).tobytes())
+        if each.gap <= TOUCHING and len(found) <= _MOST_NAMES:
+            _name(picture, np.asarray(at(each.place)), contact.name, "letter", (0.0, 14.0))
 
 
 def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:

@@ -13,7 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.checks import WORLD
+from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.shapes import HalfSpace
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
@@ -48,6 +50,12 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
+    # Of contacts the force on the shape that is no plane, at its middle; what is not determinate is not drawn
+    touching = [_touching(contact) for contact in mechanism.contacts]
+    joints += [
+        (contact.name, body, middle) for contact, (body, middle, _) in zip(mechanism.contacts, touching, strict=True)
+    ]
+    signs = np.repeat([1.0] * (len(joints) - len(touching)) + [sign for *_, sign in touching], 3)
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
     true = replayed.true_values([*_MOTION, *names, *(name for name, _ in readings)])
@@ -67,7 +75,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     numbers.put("extent", 0, np.concatenate([com, *(end[:, None] for end in ends)], axis=1).reshape(-1, 3), least)
     shown = _columns(true, [name for name, _ in readings], times)
     numbers.put("readings", 0, shown, 2.0**-20 * (float(np.abs(shown).max(initial=0.0)) or 1.0))
-    force = _columns(true, names, times)
+    force = _columns(true, names, times) * signs
     largest = float(np.abs(force).max(initial=0.0))
     numbers.put("force", 0, force if largest else None, _ROUNDED * largest)
     for run, motion in enumerate([placed, *ghosts]):
@@ -97,6 +105,17 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
         "falls": any(joint.kind == "free" for joint in mechanism.joints),
     }  # fmt: skip
     return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
+
+
+def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
+    """Body of the shape that is no plane, the shape's middle there [m], and the sign of the force on it."""
+    if isinstance(contact.shape_a, HalfSpace):
+        assert not isinstance(contact.shape_b, HalfSpace)  # two planes are no contact
+        body, shape, sign = contact.body_b, contact.shape_b, -1.0
+    else:
+        body, shape, sign = contact.body_a, contact.shape_a, 1.0
+    x, y, z = shape.centre.tolist()
+    return body, (x, y, z), sign
 
 
 def _readings(element: MechanismElement) -> list[tuple[str, str]]:
