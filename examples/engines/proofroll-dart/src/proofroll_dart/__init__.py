@@ -19,11 +19,16 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.signal import value_at
 
 _KINDS = {"fixed": "Weld", "revolute": "Revolute", "prismatic": "Prismatic", "universal": "Universal"}
-_PROVIDES = frozenset({MechanismCapability[name.upper()] for name in _KINDS} | {MechanismCapability.JOINT_SPRINGS})
+_DRIVES = {MechanismCapability[name] for name in ("JOINT_SPRINGS", "ACTUATORS", "SATURATION", "SIGNALS")}
+_PROVIDES = frozenset({MechanismCapability[name.upper()] for name in _KINDS} | _DRIVES)
+_SWITCHING = frozenset({MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS})
 _LACKING = {
     MechanismCapability.SPRINGS: "DART has no springs between points",
+    MechanismCapability.ARMATURE: "DART's joints have no inertia of their own",
+    MechanismCapability.COUPLINGS: "this version of dartpy has no mimic joints",
     MechanismCapability.FREE: "this adapter integrates coordinates whose rates are the velocities",
     MechanismCapability.SPHERICAL: "this adapter integrates coordinates whose rates are the velocities",
 }
@@ -71,7 +76,7 @@ class Dart:
     """DART through dartpy. See :class:`proofroll.core.engine.Engine`."""
 
     name: ClassVar[str] = "dart"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {"world": _PROVIDES, "forward_dynamics": _PROVIDES}
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {"world": _PROVIDES | _SWITCHING, "forward_dynamics": _PROVIDES}
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"world": _LACKING, "forward_dynamics": _LACKING}
     settings: ClassVar[type[DartSettings]] = DartSettings
     presets: ClassVar[Mapping[str, Mapping[str, DartSettings]]] = {
@@ -105,12 +110,10 @@ class Dart:
         self._world.setTimeStep(settings.dt or 1e-3)
         self._world.addSkeleton(self._skeleton)
         self._put(*mechanism.start())
-        laws = [
-            (joint.torque, joint.stiffness, joint.rest, joint.damping)
-            for joint in mechanism.joints
-            for _ in range(joint.nv)
-        ]
-        self._drive, self._stiffness, self._rest, self._damping = np.array(laws).T
+        self._of = [joint for joint in mechanism.joints for _ in range(joint.nv)]
+        laws = [(joint.stiffness, joint.rest, joint.damping) for joint in self._of]
+        self._stiffness, self._rest, self._damping = np.array(laws).T
+        self._actuators = [(item, mechanism.place_of(item.joint)[1]) for item in mechanism.actuators]
 
     def _add(self, joint: Joint) -> None:
         create = getattr(self._skeleton, f"create{_KINDS[joint.kind]}JointAndBodyNodePair")
@@ -130,17 +133,34 @@ class Dart:
             built.setSpringStiffness(index, joint.stiffness)
             built.setRestPosition(index, joint.rest)
             built.setDampingCoefficient(index, joint.damping)
+            built.setCoulombFriction(index, joint.friction)
+        if joint.limits:
+            built.setPositionLowerLimit(0, joint.limits[0])
+            built.setPositionUpperLimit(0, joint.limits[1])
+            built.setLimitEnforcement(True)  # without it limits hold nothing
         self._bodies[joint.child] = body
 
     def _put(self, q: Any, v: Any) -> None:
         self._skeleton.setPositions(q)
         self._skeleton.setVelocities(v)
 
-    def _rates(self, _: float, x: Any) -> Any:
+    def _efforts(self, t: float) -> Any:
+        """Efforts of the actuators at the present state."""
+        q, v = self._skeleton.getPositions(), self._skeleton.getVelocities()
+        return np.array([item.effort(t, q[at], v[at]) for item, at in self._actuators])
+
+    def _driven(self, t: float) -> Any:
+        """Drives of the joints and efforts of the actuators, along the velocities."""
+        forces = np.array([float(value_at(joint.torque, t)) for joint in self._of])
+        if self._actuators:
+            np.add.at(forces, [at for _, at in self._actuators], self._efforts(t))
+        return forces
+
+    def _rates(self, t: float, x: Any) -> Any:
         """Velocities, and DART's accelerations."""
         q, v = np.split(x, 2)
         self._put(q, v)
-        self._skeleton.setForces(self._drive - self._stiffness * (q - self._rest) - self._damping * v)
+        self._skeleton.setForces(self._driven(t) - self._stiffness * (q - self._rest) - self._damping * v)
         self._skeleton.computeForwardDynamics()
         return np.concatenate([v, self._skeleton.getAccelerations()])
 
@@ -149,7 +169,7 @@ class Dart:
         dt = self._settings.dt
         if dt is not None:
             for _ in range(whole_steps(self._steps * dt, t, dt)):
-                self._skeleton.setForces(self._drive)
+                self._skeleton.setForces(self._driven(self._steps * dt))
                 self._world.step()
                 self._steps += 1
         elif t > self._t:
@@ -170,6 +190,7 @@ class Dart:
             np.array([body.getLinearVelocity() for body in bodies]),
             np.array([body.getAngularVelocity() for body in bodies]),
             np.array([Rotation.from_matrix(pose.rotation()).as_quat(scalar_first=True) for pose in poses]),
+            effort=self._efforts(self._t) if self._actuators else None,
         )
 
     def built(self) -> MechanismBuilt:

@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.signal import value_at
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -29,12 +30,14 @@ PROVIDES: frozenset[str] = frozenset(
     {
         _CAPABILITY.FIXED, _CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.SPHERICAL,
         _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_SPRINGS,
+        _CAPABILITY.JOINT_FRICTION, _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS,
     }
 )  # fmt: skip
 LACKING: Mapping[str, str] = {
     _CAPABILITY.SPRINGS: "PyBullet has no springs between points",
     _CAPABILITY.UNIVERSAL: "URDF has no such joint",
-    _CAPABILITY.JOINT_FRICTION: "PyBullet reads dry friction from a URDF and does not use it",
+    _CAPABILITY.ARMATURE: "PyBullet's joints have no inertia of their own",
+    _CAPABILITY.STOPS: "PyBullet's limits throw back by how deep a step lands in them",
 }
 _TYPES = {"fixed": "fixed", "revolute": "continuous", "prismatic": "prismatic", "spherical": "spherical"}
 _ROWS = "a loop's rows are those of the step's start, and the first step does not yet know that they turn"
@@ -60,7 +63,13 @@ class PybulletMechanism:
         told = [self._world.getJointInfo(self._robot, index) for index in range(count)]
         self._links = {info[12].decode(): index for index, info in enumerate(told)} | {WORLD: -1}
         self._joints = [self._links[joint.child] for joint in mechanism.joints]
-        self._forced = [joint for joint in mechanism.joints if joint.torque or joint.stiffness or joint.damping]
+        self._actuators = [(item, mechanism.joint_index[item.joint]) for item in mechanism.actuators]
+        driven = {number for _, number in self._actuators}
+        self._forced = [
+            (number, joint)
+            for number, joint in enumerate(mechanism.joints)
+            if joint.torque or joint.stiffness or joint.damping or number in driven
+        ]
         for joint, index in zip(mechanism.joints, self._joints, strict=True):
             self._start(joint, index)
         for loop in mechanism.loops:
@@ -87,7 +96,8 @@ class PybulletMechanism:
             )  # fmt: skip
         if joint.nv == 1:
             self._world.resetJointState(robot, index, joint.q0[0], joint.v0[0])
-            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=0)
+            # a motor that wants to stop the joint is dry friction; the friction of a URDF is read and not used
+            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=joint.friction)
         elif joint.nv == 3:
             q = [*joint.q0[1:], joint.q0[0]]
             self._world.resetJointStateMultiDof(robot, index, q, list(joint.v0))
@@ -106,10 +116,12 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         dt = self._settings.dt
         for _ in range(whole_steps(self._steps * dt, t, dt)):
-            for joint in self._forced:
-                index = self._links[joint.child]
+            now = self._steps * dt
+            for number, joint in self._forced:
+                index = self._joints[number]
                 q, v, *_ = self._world.getJointState(self._robot, index)
-                force = joint.torque - joint.stiffness * (q - joint.rest) - joint.damping * v
+                force = value_at(joint.torque, now) - joint.stiffness * (q - joint.rest) - joint.damping * v
+                force += sum(item.effort(now, q, v) for item, at in self._actuators if at == number)
                 self._world.setJointMotorControl2(self._robot, index, self._world.TORQUE_CONTROL, force=force)
             self._world.stepSimulation()
             self._steps += 1
@@ -133,7 +145,11 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`; PyBullet's reactions of chains are not those, so none is given."""
         motion = self._tree.at(*self._state())
         turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
-        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
+        now = self._steps * self._settings.dt
+        states = [self._world.getJointState(self._robot, self._joints[number]) for _, number in self._actuators]
+        told = zip(self._actuators, states, strict=True)
+        effort = np.array([item.effort(now, state[0], state[1]) for (item, _), state in told]) if states else None
+        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned, effort=effort)
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
