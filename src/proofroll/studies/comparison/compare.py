@@ -204,7 +204,9 @@ def _judgements(
         judgements.append(judgement)
         for factor, found in curves.items():
             if name in found:
-                errors[factor][name] = largest_difference(found[name], true)
+                between = reference.between(name, trajectories[factor])
+                off_grid = 0.0 if between is None else largest_difference(*between)
+                errors[factor][name] = max(largest_difference(found[name], true), off_grid)
     return judgements, errors
 
 

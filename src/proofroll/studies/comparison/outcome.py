@@ -67,7 +67,7 @@ class LadderRun:
     Attributes:
         value: of the step [s] or tolerance.
         result: how it ended.
-        errors: largest distance from the truth at the samples, by observable; empty without a trajectory.
+        errors: largest distance from the truth, between the samples too, by observable; empty without a trajectory.
     """
 
     value: float

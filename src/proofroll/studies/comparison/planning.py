@@ -95,6 +95,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
     of_engines = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
+    of_engines |= {rung.step for ladder in rungs for rung in ladder.values()}
     between = tuple(sorted({t for step in of_engines for t in off_grid(times, step).tolist()}))
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):

@@ -57,10 +57,12 @@ def judged(
     true: Mapping[float, Result] | None = None,
     rungs: Mapping[float, Answer] | None = None,
     certificate: Sequence[Line] = (),
+    between: Sequence[float] = (),
 ) -> Outcome:
     """The outcome where every row's engine gives what ``answer`` makes of the truth.
 
-    ``true``: speeds without a truth; ``rungs``: what comes of other steps, by their factors.
+    ``true``: speeds without a truth; ``rungs``: what comes of other steps, by their factors; ``between``: times off
+    the grid [s] that are sampled, too.
     """
     store, results = Store(folder), dict[str, Result]()
     runs, truths = list[Planned](), dict[str, Case]()
@@ -76,7 +78,7 @@ def judged(
     for row in comparison.rows:
         for point in comparison.variations(row):
             scene = load_scene(comparison.scene, **point)
-            dataset = truth(scene.fully_asked, time_grid(comparison.until, comparison.every))
+            dataset = truth(scene.fully_asked, time_grid(comparison.until, comparison.every), between=np.array(between))
             if BallCapability.BOUNDED_FRICTION in scene.requires:
                 dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
             facts = dataclasses.replace(FACTS, name=row.engine)
@@ -206,6 +208,17 @@ def test_a_run_is_judged_by_its_own_ladder(tmp_path: Path) -> None:
     assert run.verdict is Verdict.UNCONFIRMED
     assert run.contradictions[0].startswith("alpha at speed=4 unconfirmed, expected: agrees (")
     assert "no limit shown: dt 0.00025 diverged: NaN" in run.contradictions[0]  # which step is missing, and why
+
+
+def test_the_error_of_a_rung_is_that_between_its_samples_too(tmp_path: Path) -> None:
+    """A coarser run that is right in its samples and a millimetre off between them has that error in the ladder."""
+
+    def hidden(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
+        return dataset.assign({"between.z": dataset["between.z"] + 1e-3})
+
+    row, rungs = dataclasses.replace(ROW, ladder=[4.0, 2.0, 1.0]), {4.0: hidden, 2.0: the_truth}
+    (run,) = judged(tmp_path, claim([row], [4.0]), the_truth, rungs=rungs, between=[0.05, 0.15]).runs
+    assert {rung.value: rung.errors["z"] for rung in run.rungs} == {4e-3: pytest.approx(1e-3), 2e-3: 0.0}
 
 
 def silent(_: Scene, dataset: xr.Dataset) -> xr.Dataset:
