@@ -311,7 +311,7 @@ def _turning_apart(t: FloatArray, q_WB: FloatArray, w_WB: FloatArray) -> FloatAr
 
 
 def _apart(q_WB: FloatArray, times: tuple[FloatArray, FloatArray], spin: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Angles [rad] between orientations and those to which the spin turns others, given as (t [s], ω [rad/s]).
+    """Angles [rad] between later orientations and earlier ones turned by the spin, given as (t [s], ω [rad/s]).
 
     ``q_WB``, shape (2, n, 4), are before and after, at these ``times`` [s].
     """

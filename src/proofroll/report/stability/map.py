@@ -47,7 +47,7 @@ def svg(study: StabilityStudy) -> str:
 
 
 def letters(study: StabilityStudy) -> dict[str, str]:
-    """The letter of each kind of failure; of those that a kind of element names, the first of theirs that is left."""
+    """Letter of each kind of failure; further kinds take the first letter of their words that is free."""
     found = dict(_LETTERS)
     for kind in study.meanings:
         if kind not in found:

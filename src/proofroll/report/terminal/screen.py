@@ -24,7 +24,7 @@ def printable(text: str) -> str:
 
 
 def escaped(text: str) -> str:
-    """JSON with such characters written as numbers, so that nothing is lost."""
+    """JSON with control characters written as numbers, so that nothing is lost."""
     return _COMMANDS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 

@@ -132,7 +132,7 @@ def _applied(name: str, x: Any) -> Any:
 
 
 class _Symbol:
-    """A number that is not known yet, and the program that it belongs to: what each name there is assigned."""
+    """An unknown number in a program; ``program`` has the name that each formula is assigned to."""
 
     __slots__ = ("program", "text")
 

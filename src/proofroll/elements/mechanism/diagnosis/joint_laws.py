@@ -100,7 +100,7 @@ def _geared(actuators: tuple[Actuator, ...]) -> bool:
 
 @hypothesis("couplings", "the rates of both joints have one ratio at every sample, which is not the scene's")
 def of_couplings(evidence: Evidence) -> Iterator[Cause]:
-    """Another ratio of a coupling; at the start, where there is one equation, one that a mistake makes."""
+    """Wrong ratio of a coupling: fitted to a run; at the start the nearest of those that known mistakes give."""
     mechanism, found = evidence.element.mechanism, both(evidence)
     if not mechanism.couplings:
         return
