@@ -13,7 +13,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, Refused
 from proofroll.truth.crossing import first_rise, stays_negative
 
 State = FloatArray
@@ -141,11 +141,15 @@ class HybridPath(Generic[LegT]):
         return [int(k) for k in np.searchsorted(ends, times, side="right")]
 
 
-def follow(route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = ()) -> HybridPath[LegT]:
+def follow(
+    route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = (), close: float = 0.0
+) -> HybridPath[LegT]:
     """Path from time 0 to ``until`` [s]; a leg ends at each of the rising ``breaks`` [s] of its rates.
 
+    After a decision with a margin below ``close``, where round-off decides, what is refused ends the path.
+
     Raises:
-        Diverged: the route makes no progress.
+        Diverged, Refused: by the route, or it makes no progress.
     """
     time, over, change, still = 0.0, 0.0, route.begin(), 0
     legs: list[LegT] = []
@@ -163,9 +167,14 @@ def follow(route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = ())
         if leg.guard is None and end == until:
             return HybridPath(tuple(legs), tuple(happenings), tuple(margins))
         still = still + 1 if leg.end <= leg.start else 0
-        if still > _STUCK:
-            raise Diverged(f"the truth makes no progress at {leg.end:g} s, where its modes alternate at once")
-        time, change = leg.end, route.change(leg)
+        try:
+            if still > _STUCK:
+                raise Diverged(f"the truth makes no progress at {leg.end:g} s, where its modes alternate at once")
+            time, change = leg.end, route.change(leg)
+        except (Diverged, Refused):
+            if min(margin for _, margin in margins) < close:
+                return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
+            raise
 
 
 def walked(
@@ -311,7 +320,6 @@ def states_of(
     return np.concatenate(parts)
 
 
-def least_margin(paths: Sequence[HybridPath[Any]]) -> tuple[float, float]:
-    """Time [s] and size of the smallest distance of a decision from another outcome; inf where nothing was decided."""
-    decisions = [margin for path in paths for margin in path.margins]
-    return min(decisions, key=lambda decision: decision[1], default=(np.inf, np.inf))
+def first_close(paths: Sequence[HybridPath[Any]], close: float) -> float:
+    """Time [s] of the first decision that is nearer to another outcome than ``close``; inf: there is none."""
+    return min((time for path in paths for time, margin in path.margins if margin < close), default=np.inf)

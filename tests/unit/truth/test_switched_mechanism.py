@@ -145,3 +145,23 @@ def test_complementarity_holds_on_random_problems() -> None:
         assert np.all(np.abs(a[state == 0]) < 1e-9)
         assert np.all(a[state < 0] >= -1e-12)
         assert np.all(a[state > 0] <= 1e-12)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(
+    ("scene", "parameters", "edge"),
+    [
+        ("pendulum_friction", {"angle": 2.0}, 9.81 * 0.5 * np.sin(2.0)),
+        ("spring_friction", {}, 100.0),
+        ("friction_hold", {}, 9.81),
+    ],
+)
+def test_friction_that_just_holds_is_ill_posed(scene: str, parameters: dict[str, float], edge: float) -> None:
+    """Within round-off of the force that it has to hold, dry friction hangs on nothing, on both sides alike."""
+    said = set()
+    for part in (-1, 0, 1):
+        friction = edge * (1 + part * np.finfo(float).eps)
+        mechanism = load_scene(scene, friction=friction, **parameters).elements[0].mechanism  # type: ignore[attr-defined]
+        found = truth_of(mechanism, np.array([0.0, 0.05]))
+        said.add((found.horizon, tuple(found.events)))
+    assert said == {(0.0, ())}

@@ -14,7 +14,7 @@ from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.two_paths import TOLERANCE, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCE, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, matched
 
 
@@ -31,7 +31,8 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     size = _size(dynamics)
     tree = ContactTree(dynamics, TOLERANCE, size)
     bodies = ContactBodies(ContactEquations(mechanism, second.lean), TOLERANCE, size)
-    paths = follow(tree, float(times[-1])), follow(bodies, float(times[-1]))
+    until = float(times[-1])
+    paths = follow(tree, until, (), CLOSE), follow(bodies, until, (), CLOSE)
     legs = paths[0].leg_at(times)
     others = [min(number, len(paths[1].legs) - 1) for number in legs]
     samples = [

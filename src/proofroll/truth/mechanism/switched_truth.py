@@ -17,7 +17,7 @@ from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
-from proofroll.truth.mechanism.two_paths import TOLERANCE, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCE, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
 
 _GRAZED = 1e-8  # rad, m or part by which a stop or a limit must be passed to act; more than the look ahead is wrong by
@@ -77,7 +77,7 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
     check_start(equations, second)
     tree, bodies = SwitchedTree(equations, TOLERANCE), SwitchedBodies(second.lean, equations.switched, TOLERANCE)
     until, kinks = float(times[-1]), breaks(mechanism.signals)
-    paths = follow(tree, until, kinks), follow(bodies, until, kinks)
+    paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
     nq = mechanism.nq

@@ -14,12 +14,12 @@ from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.hybrid import HybridPath, Stretch, least_margin
+from proofroll.truth.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.mechanism.two_routes import FACTOR, ROUND_OFF, TwoRouteMotion, judged, largest
 
 TOLERANCE = 1e-14  # of each step
 # Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
-_CLOSE = 1e-9
+CLOSE = 1e-9
 
 Path = HybridPath[Stretch[Any]]
 
@@ -74,9 +74,8 @@ def two_route_motion(
     placed = masked.placed(mechanism)
     reach = np.maximum(size, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
-    time, close = least_margin(paths)
-    horizon = min(parted, time if close < _CLOSE else np.inf)
-    happened = _events(*paths) if np.isinf(parted) else ()
+    horizon = min(parted, first_close(paths, CLOSE))
+    happened = tuple(event for event in _events(*paths) if event.time < horizon)
     force = None if pressed is None else pressed[0]
     return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)
 
@@ -93,7 +92,7 @@ def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
 def _events(one: Path, two: Path) -> Sequence[Event]:
     """The changes of both routes, each with a bracket that holds both times and their round-off."""
     found = []
-    for a, b in zip(one.happenings, two.happenings, strict=True):
+    for a, b in zip(one.happenings, two.happenings, strict=False):  # beyond where they part there may be more of one
         wide = FACTOR * abs(a.time - b.time) + ROUND_OFF * a.time
         found.append(Event(a.kind, float(a.time), float(a.time - wide), float(a.time + wide), a.name))
     return tuple(found)

@@ -294,3 +294,13 @@ def test_residuals_of_the_truth_are_within_their_bars() -> None:
         bar = found[name].attrs["error_bar"]
         assert 0 < bar < 1e-5, name
         assert float(np.nanmax(np.abs(found[name].to_numpy()))) <= bar, name
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("part", [-20, -1, 0, 1])
+def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
+    """Friction of 2/7 of the slope, to round-off: whether the contact sticks hangs on nothing, on both sides alike."""
+    friction = 2 / 7 * np.tan(0.3) * (1 + part * np.finfo(float).eps)
+    mechanism, _ = as_bodies("inclined_plane", float(friction), 0.3, speed=0.0)
+    found = truth_of(mechanism, np.array([0.0, 0.1]))
+    assert (found.horizon, tuple(found.events)) == (0.0, ())

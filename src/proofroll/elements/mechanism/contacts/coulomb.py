@@ -19,6 +19,9 @@ Outcome = Literal["open", "stick", "slip"]
 _SWEEPS = 1000
 _SETTLED = 1e-12  # of the largest force: a sweep that changes less is the last
 _RESTS = 1e-10  # of the loads: a contact that moves less does not move
+# Part of friction's bound beyond which a contact slides: nearer to it round-off decides, and no direction of slip is
+# found; that it hangs on less than parameters are known to is :func:`sure`'s to say.
+_AT_BOUND = 1e-9
 # Part of the loads and of friction by which an outcome is tried on both sides; if it changes, it hangs on nothing.
 _NUDGE = 1e-6
 # Between two of them the direction of slip is looked for; those of the axes lie in between.
@@ -80,7 +83,7 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tup
     from scipy.optimize import brentq  # half a second, which most uses of a mechanism do not need
 
     held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
-    if np.linalg.norm(held[1:]) <= mu * held[0]:
+    if np.linalg.norm(held[1:]) <= mu * held[0] * (1 + _AT_BOUND):
         return held, "stick"
 
     def across(angle: float) -> float:
