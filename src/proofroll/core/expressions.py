@@ -52,7 +52,8 @@ def evaluated(
     evaluator = SimpleEval(operators=_OPERATORS, functions=called, names=known)
     del evaluator.nodes[ast.Attribute]
     try:
-        quantity = Quantity(0.0) + evaluator.eval(text.replace("^", "**").strip())
+        source = text.replace("^", "**").strip()
+        quantity = Quantity(0.0) + evaluator.eval(source, ast.parse(source, mode="eval").body)
         number = float(quantity.value)
     except ZeroDivisionError:
         raise InputError(field, text, "divides by zero; change the expression or its parameters") from None
