@@ -194,6 +194,7 @@ def test_a_table_of_numbers(command_line: Proofroll, scene: str, tmp_path: Path)
     code, out, err = command_line("judge", str(own), "--scene", scene)
     assert (code, err) == (0, ""), out
     assert "v_WB is off by" in out
+    assert "positions" not in out.partition("not judged:")[2]  # which are judged
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,8 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     needs = f"; engines must provide: {', '.join(sound.requires)}" if sound.requires else ""
     about = f"{sound.scene}, " if sound.kind != "scene" and sound.scene else ""
     head = f"{sound.name} is sound: {sound.kind}, {about}{counts}{needs}"
-    options.show(sound, False, lambda: [head, *(f"  {line}" for line in sound.start)])
+    drawn = [] if plot is None else [f"The plot is in {plot}."]
+    options.show(sound, False, lambda: [head, *(f"  {line}" for line in sound.start), *drawn])
 
 
 def _draw(found: SoundFile, plot: Path) -> None:

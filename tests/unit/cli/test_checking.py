@@ -77,7 +77,8 @@ def test_how_a_scene_starts(
 def test_a_scene_is_drawn(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --plot the scene at its start, its parameters and how it starts are a page; a study or robot has none."""
     page = tmp_path / "scene.html"
-    assert proofroll("check", "four_bar", "--plot", str(page))[0] == 0
+    code, out, _ = proofroll("check", "four_bar", "--plot", str(page))
+    assert (code, "".join(out.split()).endswith(f"Theplotisin{page}.")) == (0, True)
     text = page.read_text(encoding="utf-8")
     assert '<svg class="drawing"' in text
     assert "degrees of freedom: 1" in text

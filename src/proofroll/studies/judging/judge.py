@@ -168,6 +168,8 @@ def judge(
         unjudged |= _events_left(scene, observed, bounds)
         if any(scene.observables[name].role is Role.REACTION for name in bounds if name in scene.observables):
             unjudged = {name: why for name, why in unjudged.items() if name not in given.reactions}
+    for item in compared:  # also where only what follows from it was given
+        unjudged.pop(item.judgement.observable, None)
     return Judged(scene.name, tuple(compared), because, unjudged)
 
 
