@@ -15,8 +15,16 @@ from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.pose_words import pose
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, independent, mechanism_of
+from proofroll.elements.mechanism.sampling import (
+    WITH_AXIS,
+    MechanismBuilt,
+    MechanismSample,
+    independent,
+    mechanism_of,
+    unsaid,
+)
 from proofroll.elements.mechanism.switches import switched_joints
+from proofroll.engines.projection.contact_modes import ContactMotion
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.joint_modes import SwitchedMotion
 from proofroll.engines.projection.recursion import compiled
@@ -34,6 +42,9 @@ PROVIDES = frozenset(
         MechanismCapability.JOINT_FRICTION,
         MechanismCapability.STOPS,
         MechanismCapability.REBOUNDS,
+        MechanismCapability.CONTACT,
+        MechanismCapability.CONTACT_FRICTION,
+        MechanismCapability.CONTACT_REBOUNDS,
     }
 )
 LACKING: Mapping[str, str] = {
@@ -54,7 +65,9 @@ class ProjectionMechanism:
         switched = switched_joints(mechanism)
         if switched and mechanism.loops:
             raise Refused("dry friction and stops are followed in trees of joints, and this mechanism has loops")
-        if switched and settings.equations == "compiled":
+        if mechanism.contacts and (switched or mechanism.loops or mechanism.actuators):
+            raise Refused("contacts are followed in trees whose joints have no loops, switches or actuators")
+        if (switched or mechanism.contacts) and settings.equations == "compiled":
             raise Refused("equations that switch are not compiled; choose preset=matched")
         for body in mechanism.bodies:
             if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
@@ -69,7 +82,14 @@ class ProjectionMechanism:
         in_numpy = equations.rates, equations.eliminated
         rates, self._without_violations = compiled(mechanism) if settings.equations == "compiled" else in_numpy
         self._switched: SwitchedMotion | None = None
-        self._motion: Integrator | SwitchedMotion
+        self._touching: ContactMotion | None = None
+        self._motion: Integrator | SwitchedMotion | ContactMotion
+        if mechanism.contacts:
+            stepper = STEPPERS[settings.integrator](resolution)
+            self._motion = self._touching = ContactMotion(
+                self._equations, mechanism, stepper, self._accepted, resolution if settings.resolution == "dt" else 0.0
+            )
+            return
         if switched:
             stepper = STEPPERS[settings.integrator](resolution)
             self._motion = self._switched = SwitchedMotion(self._equations, switched, stepper, self._accepted)
@@ -100,17 +120,20 @@ class ProjectionMechanism:
             raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
     def _solved(self, x: Array) -> SolvedState:
-        return self._switched.solve(x)[0] if self._switched else self._equations.solve(x)
+        switching = self._switched or self._touching
+        return switching.solve(x)[0] if switching else self._equations.solve(x)
 
     def events(self) -> Sequence[Event]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
-        return tuple(self._switched.events) if self._switched else ()
+        switching = self._switched or self._touching
+        return tuple(switching.events) if switching else ()
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._motion.x
         solved = self._solved(x)
-        force, torque = equations.reactions(solved)
+        # reactions beside forces of contact, which are no part of the matrices of the bodies' loads, are not told
+        force, torque = unsaid(self._mechanism) if self._touching else equations.reactions(solved)
         r, q, v, _ = equations.parts(x)
         R, w = solved.bodies.rotation, solved.bodies.spin
         arm = np.einsum("nij,nj->ni", R, equations.com)
@@ -122,6 +145,7 @@ class ProjectionMechanism:
             joint_force=force,
             joint_torque=torque,
             effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
+            contact_force=self._touching.solve(x)[1] if self._touching else None,
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
         )
 
@@ -151,4 +175,5 @@ class ProjectionMechanism:
             mobility=6 * count - rank,
             acceleration=solved.linear - cross(turning, arm) - cross(w, cross(w, arm)),
             angular_acceleration=turning,
+            **(self._touching.read() if self._touching else {}),
         )

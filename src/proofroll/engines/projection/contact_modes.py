@@ -1,0 +1,352 @@
+"""Contacts of bodies: which is open, slips or sticks, when that ends, and what comes next.
+
+Forces of contact act along the velocities ν of the tree, whose mass matrix the projection has. Between two switches the
+equations are smooth; a switch is located within a step by shorter steps of the same method. Which mode comes next
+follows from Coulomb's law at all contacts at once, by the same solver as in the truth's first route: that both decide
+alike is no news, that both move alike in between is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import cross
+from proofroll.core.errors import Diverged, Refused
+from proofroll.core.events import Event
+from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
+from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
+from proofroll.elements.mechanism.contacts.family import Family, family_text
+from proofroll.elements.mechanism.contacts.start import TOUCHING
+from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
+from proofroll.engines.projection.elimination import Space
+from proofroll.engines.projection.elimination import solved as divided
+from proofroll.engines.projection.joint_modes import SETTLED
+from proofroll.engines.projection.stepping import Stepper
+
+_WITHOUT_PROGRESS = 20  # switches in a row at one time, which are an endless loop
+_RANK = 1e-10  # of the largest singular value: rows of contacts that depend on each other
+_ULPS = 4  # of the time, to which switches are located
+_STILL = 1e-9  # m/s: digits of a file, by which what touches may slide at the start
+_REST = 1e-2  # of what gravity makes in a fixed step: slips as slow as this end with another that ends
+
+
+class ContactsThere(NamedTuple):
+    """Contacts at a state, without their forces.
+
+    Attributes:
+        touching: each of them.
+        J: of each slide by the velocities ν, (contacts, 3, nv).
+        response: what a force along the velocities makes of their rates, times Jᵀ, (nv, contacts, 3).
+        rate: of each slide without forces of contact, (contacts, 3).
+    """
+
+    touching: tuple[Touching, ...]
+    J: Array
+    response: Array
+    rate: Array
+
+
+class ContactMotion:
+    """Motion of a tree whose bodies touch.
+
+    Attributes:
+        t, x: present time [s] and state.
+        mode: of each contact.
+        events: so far.
+    """
+
+    def __init__(
+        self,
+        equations: DependentCoordinates,
+        mechanism: Mechanism,
+        stepper: Stepper,
+        accept: Callable[[float, Array], Array],
+        step: float,
+    ) -> None:
+        """Takes the size of a fixed ``step`` [s]; 0: it adapts."""
+        self._equations, self._stepper, self._accept = equations, stepper, accept
+        self.contacts, self._index = mechanism.contacts, mechanism.body_index
+        self.friction = np.array([contact.friction for contact in self.contacts])
+        self._faint = max(_STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
+        self._fastest: dict[int, float] = {}
+        self._idle, self.events = 0, list[Event]()
+        now = self.at(equations.start)
+        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= _STILL for each in now.touching]
+        still = [bool(np.linalg.norm(each.slide) <= _STILL) for each in now.touching]
+        self._enter(0.0, equations.start, self._decided(now, closed, still))
+
+    @property
+    def t(self) -> float:
+        """Present time [s]."""
+        return self._stepper.t
+
+    @property
+    def x(self) -> Array:
+        """State now."""
+        return self._stepper.y
+
+    def at(self, x: Array) -> ContactsThere:
+        """Contacts at a state, with what forces do to them."""
+        equations, spaces = self._equations, list[Space]()
+
+        def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
+            spaces.append(space)
+            return divided(space.H, push[:, None])[:, 0], np.zeros(0)
+
+        free = equations.solve(x, 0.0, closing)
+        moving = self._moving(x)
+        touching = tuple(touch(each, moving[each.body_a], moving[each.body_b]) for each in self.contacts)
+        S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
+        J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
+        for k, (contact, found) in enumerate(zip(self.contacts, touching, strict=True)):
+            along = S[:, :3, :3] @ (found.place - origin) + S[:, :3, 3]
+            for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
+                i = self._index[body]
+                if i >= 0:
+                    J[k] += sign * (equations.tree.moves[i][:, None] * along).T
+                    rate[k] += sign * self._material(x, free, i, moving[body], found)
+        flat = J.reshape(-1, J.shape[2]).T
+        return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
+
+    def _moving(self, x: Array) -> dict[str, Moving]:
+        """Motion of the frames of all bodies, and of the world."""
+        equations = self._equations
+        r, _, v, _ = equations.parts(x)
+        bodies = equations.bodies(x)
+        found = {"world": Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))}
+        for name, i in self._index.items():
+            if i >= 0:
+                R, w = bodies.rotation[i], bodies.spin[i]
+                arm = R @ equations.com[i]
+                found[name] = Moving(r[i] - arm, R, v[i] - cross(w, arm), w)
+        return found
+
+    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, found: Touching) -> Array:
+        """Rate of the velocity of a body's material at the place of contact, which moves over it."""
+        arm = found.place - self._equations.parts(x)[0][i]
+        turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
+        return np.asarray(free.linear[i] + turning + cross(body.w, found.place_rate - body.velocity(found.place)))
+
+    def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
+        """Forces on body a of each contact in a mode [N], (contacts, 3).
+
+        Raises:
+            Diverged: friction makes a normal force that tears (Painlevé).
+        """
+        rows = _rows(now, mode)
+        along = [
+            row - self.friction[k] * self._heading(k, now.touching[k]) if mode[k].kind == "slip" else row
+            for k, row in rows
+        ]
+        force = np.zeros((len(mode), 3))
+        if not rows:
+            return force
+        K = np.array([row @ now.J[k] for k, row in rows])
+        D = np.array([now.response[:, k] @ direction for (k, _), direction in zip(rows, along, strict=True)])
+        wanted = [-row @ now.rate[k] for k, row in rows]
+        for i, (k, row) in enumerate(rows):
+            if mode[k].kind == "slip":
+                wanted[i] -= now.touching[k].normal_rate @ now.touching[k].slide
+                if row @ now.J[k] @ D[i] <= 0:
+                    raise Diverged(f"at t = {self.t:.6g} s " + PAINLEVE.format(name=self.contacts[k].name))
+        sizes = np.linalg.lstsq(K @ D.T, np.array(wanted), rcond=_RANK)[0]
+        for size, (k, _), direction in zip(sizes, rows, along, strict=True):
+            force[k] += size * direction
+        return force
+
+    def _settled(self, x: Array, mode: ContactMode) -> Array:
+        """The state without velocities that closed contacts do not allow."""
+        now = self.at(x)
+        rows = _rows(now, mode)
+        if not rows:
+            return x
+        K = np.array([row @ now.J[k] for k, row in rows])
+        D = np.array([now.response[:, k] @ row for k, row in rows])
+        left = np.array([row @ now.touching[k].slide for k, row in rows])
+        return self._equations.pushed(x, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
+
+    def _heading(self, k: int, found: Touching) -> Array:
+        """Direction of a slip; beyond its end within a step it goes on as before it."""
+        slip, toward = across(found), self._toward[k]
+        speed = float(np.linalg.norm(slip))
+        if speed <= np.finfo(float).tiny:
+            return toward
+        return np.asarray(slip / speed if slip @ toward >= 0 else -slip / speed)
+
+    def solve(self, x: Array) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
+        """Equations of motion at a state in the present mode, the forces of contact, and the contacts."""
+        now = self.at(x)
+        force = self.forces(now, self.mode)
+        return self._equations.solve(x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
+
+    def read(self) -> dict[str, Any]:
+        """Geometry and laws of the contacts now, for :class:`proofroll.elements.mechanism.sampling.MechanismBuilt`."""
+        found = self.solve(self.x)[2]
+        return {
+            "contact_gap": np.array([each.gap for each in found]),
+            "contact_normal": np.array([each.normal for each in found]),
+            "contact_place": np.array([each.place for each in found]),
+            "contact_friction": self.friction.copy(),
+            "contact_restitution": np.array([contact.restitution for contact in self.contacts]),
+            "contact_family": family_text(Family.HARD),
+        }
+
+    def _rates(self, x: Array) -> Array:
+        now = self.at(x)
+        return self._equations.rates(x, np.einsum("kin,ki->n", now.J, self.forces(now, self.mode)))
+
+    def advance(self, t: float) -> None:
+        """Moves to time t [s].
+
+        Raises:
+            Diverged: modes alternate without end, or the integration gave up.
+        """
+        stepper = self._stepper
+        stepper.aim(t)
+        while stepper.t < t:
+            stepper.step(t, np.inf)
+            ends = [
+                self._crossing(k, kind) for k, kind, excess, moves in self._excess(stepper.y) if excess > 0 and moves
+            ]
+            if ends:
+                self._switch(*min(ends))
+            else:
+                self._idle = 0
+                self._look(stepper.y)
+
+    def _look(self, x: Array) -> None:
+        """Keeps the directions of slips, to know when one has turned."""
+        moving = self._moving(x)
+        for k, (own, each) in enumerate(zip(self.mode, self.contacts, strict=True)):
+            if own.kind == "slip":
+                self._toward[k] = self._heading(k, touch(each, moving[each.body_a], moving[each.body_b]))
+
+    def _enter(self, t: float, x: Array, mode: ContactMode) -> None:
+        x, self.mode = self._settled(x, mode), mode
+        self._toward = [np.array(own.heading or (0.0, 0.0, 0.0)) for own in mode]
+        self._look(x)
+        self._stepper.begin(t, x, self._rates, self._accept, np.ones(len(x)))
+
+    def _excess(self, x: Array) -> list[tuple[int, str, float, bool]]:
+        """Excess of each mode over each of its ends, and whether it moves towards it."""
+        now = self.at(x)
+        force, found = self.forces(now, self.mode), list[tuple[int, str, float, bool]]()
+        for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
+            if own.kind == "open":
+                found.append((k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
+                continue
+            N = float(each.normal @ force[k])
+            found.append((k, "lift_off", -N, True))
+            if own.kind == "slip" and self.friction[k]:
+                found.append((k, "still", -float(across(each) @ self._toward[k]), True))
+            elif own.kind == "stick":
+                T = float(np.linalg.norm(force[k] - N * each.normal))
+                found.append((k, "slip", T - self.friction[k] * N, True))
+        return found
+
+    def _crossing(self, k: int, kind: str) -> tuple[float, int, str]:
+        """Time just after a mode ended within the last step, with its contact and end."""
+
+        def margin(x: Array) -> float:
+            return -next(excess for contact, end, excess, _ in self._excess(x) if (contact, end) == (k, kind))
+
+        now = self._stepper.t
+        return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1], k, kind
+
+    def _switch(self, t: float, k: int, kind: str) -> None:
+        stepper = self._stepper
+        self._idle = self._idle + 1 if t <= stepper.t_before else 0
+        if self._idle > _WITHOUT_PROGRESS:
+            raise Diverged(f"contacts alternate without end at t = {t:.6g} s")
+        x, was, happened = stepper.inside(t), self.mode, list[tuple[str, str]]()
+        now, closed = self.at(x), [own.kind != "open" for own in was]
+        still = [own.kind == "stick" for own in was]
+        if kind == "impact":
+            x, closed = self._struck(x, now, k)
+            happened = [("impact", self.contacts[k].name)]
+            now = self.at(x)
+            still = [bool(np.linalg.norm(across(each)) <= _STILL) for each in now.touching]
+        elif kind == "still":
+            slips = [float(np.linalg.norm(across(each))) for each in now.touching]
+            still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
+        mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
+        for own, before, contact in zip(mode, was, self.contacts, strict=True):
+            if own.kind != before.kind and (contact.name not in {name for _, name in happened} or own.kind == "stick"):
+                happened.append(("lift_off" if own.kind == "open" else own.kind, contact.name))
+        low = max(stepper.t_before, t - _ULPS * float(np.spacing(t)))
+        self.events += [Event(each, t, *stepper.bracket(low, t), name) for each, name in happened]
+        self._enter(t, x, mode)
+
+    def _leaving(self, now: ContactsThere, k: int) -> ContactMode:
+        """The mode with a contact that slips from now on, against the friction that held it."""
+        force, n = self.forces(now, self.mode)[k], now.touching[k].normal
+        held = force - n * (n @ force)
+        x, y, z = (-held / np.linalg.norm(held)).tolist()
+        line = None if self.mode[k].along is None else (x, y, z)
+        return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
+
+    def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool]]:
+        """The state after an impact, by Newton's law and Coulomb's, and which contacts stay closed."""
+        which = [k for k, own in enumerate(self.mode) if own.kind != "open" or k == hit]
+        frames, J, response = self._framed(now, which)
+        c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
+        speed, e = -c[3 * which.index(hit)], self.contacts[hit].restitution
+        if speed < SETTLED * self._fastest.setdefault(hit, speed):
+            e = 0.0
+        c[3 * which.index(hit)] *= 1 + e
+        impulse, _ = self._law(J @ response, c, which, [None] * len(which))
+        x = self._equations.pushed(x, response @ impulse.ravel())
+        closed = [False] * len(self.mode)
+        for place, k in enumerate(which):
+            closed[k] = bool(impulse[place, 0] > 0 and not (k == hit and e))
+        return x, closed
+
+    def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
+        """Normal and two directions of some contacts; J along them, and what forces along them do."""
+        frames = [frame_of_axis(now.touching[k].normal)[:, [2, 0, 1]] for k in which]
+        J = np.concatenate([frame.T @ now.J[k] for frame, k in zip(frames, which, strict=True)])
+        response = np.concatenate([now.response[:, k] @ frame for frame, k in zip(frames, which, strict=True)], 1)
+        return frames, J, response
+
+    def _law(self, G: Array, c: Array, which: Sequence[int], sliding: Sequence[Array | None]) -> tuple[Array, Any]:
+        try:
+            return solved(G, c, self.friction[list(which)], sliding, [self.contacts[k].name for k in which])
+        except Refused as error:
+            raise Diverged(f"at t = {self.t if hasattr(self._stepper, 't') else 0.0:.6g} s: {error}") from None
+
+    def _decided(self, now: ContactsThere, closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
+        """Mode that follows from the forces: of contacts that are closed, and do not slide where they are still."""
+        which, mode = [k for k, shut in enumerate(closed) if shut], [OPEN for _ in closed]
+        if not which:
+            return tuple(mode)
+        frames, J, response = self._framed(now, which)
+        c, sliding = np.zeros(3 * len(which)), list[Array | None]()
+        for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
+            found = now.touching[k]
+            c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
+            c[3 * place] += found.normal_rate @ found.slide
+            slip = frame[:, 1:].T @ found.slide
+            sliding.append(None if still[k] else slip / np.linalg.norm(slip))
+        G = J @ response
+        force, done = self._law(G, c, which, sliding)
+        for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
+            own, slides = slice(3 * place, 3 * place + 3), sliding[place]
+            mode[k] = acting(done[place], frame, -force[place, 1:] if slides is None else slides, G[own, own])
+        return tuple(mode)
+
+
+def _rows(now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
+    """Directions along which closed contacts hold, each with its contact: the normal of a slip, all of a stick."""
+    found: list[tuple[int, Array]] = []
+    for k, (own, each) in enumerate(zip(mode, now.touching, strict=True)):
+        if own.kind == "slip":
+            found.append((k, each.normal))
+        elif own.kind == "stick":
+            found += [(k, direction) for direction in np.eye(3)]
+    return found

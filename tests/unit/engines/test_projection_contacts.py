@@ -1,0 +1,72 @@
+"""Bodies that touch, by the projection method: switches located within a step, at the order of its steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.files.scene_file import load_scene
+
+PROJECTION = load_engine("projection")
+DEFAULT = PROJECTION.presets["dependent"]["default"]
+
+
+def test_a_sled_turns_about_a_foot_and_rests() -> None:
+    """One foot stops, then all: place of rest and events are those of two routes, at steps of 1e-3 s of order 4."""
+    run = PROJECTION.build(load_scene("sled"), DEFAULT)
+    run.advance(0.7)
+    assert np.hypot(*(run.sample().p_WB[0, :2] - (0.458107051786, 0.048503949880))) < 1e-5
+    first, *others = run.events()
+    assert (first.kind, first.name) == ("stick", "right")
+    assert first.time_low <= 0.557674084 <= first.time_high
+    assert {item.name for item in others} == {"left", "back"}
+    N = np.linalg.solve([np.ones(3), (0.15, 0.15, -0.20), (0.10, -0.10, 0.03)], (2 * 9.81, 0, 0))
+    np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "time", "kind", "contact"),
+    [
+        ("falling_rod", 0.572316015251, "slip", "contact"),
+        ("ladder", 0.916021339175, "lift_off", "top"),
+        ("rocking_block", 0.209019729139, "impact", "left"),
+        ("spinning_bounce", 0.319275428407, "impact", "contact"),
+    ],
+)
+def test_the_first_switch_is_where_two_routes_have_it(name: str, time: float, kind: str, contact: str) -> None:
+    """The first change of each scene comes at its time to 1e-7 s, of its kind and at its contact."""
+    run = PROJECTION.build(load_scene(name), replace(DEFAULT, dt=2e-3))
+    run.advance(np.ceil(time / 2e-3) * 2e-3)
+    event = run.events()[0]
+    assert (event.kind, event.name) == (kind, contact)
+    assert event.time == pytest.approx(time, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder"])
+def test_a_start_is_certified(name: str) -> None:
+    """Geometry, friction and first accelerations of every shape are the scene's to round-off, also on what moves."""
+    (element,) = load_scene(name).elements
+    assert isinstance(element, MechanismElement)
+    run = PROJECTION.build(load_scene(name), DEFAULT)
+    lines = element.certify(run.built(), run.sample())
+    assert [str(line) for line in lines if not line.holds] == []
+    told = {line.quantity for line in lines if line.difference is not None}
+    assert {"gaps", "friction of contacts", "acceleration", "law of contact: hard contact by Coulomb's law"} <= told
+    known = ~np.isnan(element.first_press)
+    np.testing.assert_allclose(run.sample().contact_force[known], element.first_press[known], atol=1e-8)
+
+
+def test_contacts_beside_other_switches_are_refused() -> None:
+    """A stop beside contacts is refused in a line that says what is followed."""
+    mechanism = mechanism_of(load_scene("free_turntable"))
+    joints = tuple(
+        replace(joint, limits=(-1.0, 1.0)) if joint.kind == "revolute" else joint for joint in mechanism.joints
+    )
+    with pytest.raises(Refused, match="contacts are followed in trees"):
+        PROJECTION.build(replace(mechanism, joints=joints), DEFAULT)
