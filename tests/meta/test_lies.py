@@ -32,6 +32,7 @@ from proofroll.running.recording import record
 from proofroll.running.simulation import simulate
 from proofroll.running.time_case import clean_runs
 from proofroll.studies.comparison.default_comparison import bounds
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
 
@@ -104,7 +105,7 @@ def band_of(about: str) -> dict[str, str]:
     run = simulate(scene, liar(about, Lie("nothing", (about,))), until=UNTIL[about], every=EVERY)
     true = _true(scene, run)
     reference = Reference.of(scene, true)
-    given = [*reference.observed(run), *(name for name in _STATE if name in run and name in true)]
+    given = [*held_against.observed(reference, run), *(name for name in _STATE if name in run and name in true)]
     items = {name: scene.observables.get(name) for name in given}
     return {name: "1 %" if item and item.role is Role.RESIDUAL else "0.1 %" for name, item in items.items()}
 
@@ -214,7 +215,7 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
     }
     assert {run.attrs["status"] for run in runs.values()} == {"done"}
     reference = Reference.of(scene, _true(scene, runs[1.0]))
-    curves = {factor: reference.observed(run) for factor, run in runs.items()}
+    curves = {factor: held_against.observed(reference, run) for factor, run in runs.items()}
     judgements = []
     for item, curve in curves[1.0].items():
         ladder = [curves[factor][item] for factor in factors]
@@ -233,7 +234,7 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
                 scale=size,
                 limit=limit,
                 ladder=True,
-                between=reference.between(item, runs[1.0]),
+                between=held_against.between(reference, item, runs[1.0]),
                 magnitude=reference.magnitude(item),
             )
         )

@@ -70,3 +70,29 @@ def test_docstrings_open_with_a_noun_or_a_verb(folder: str) -> None:
 def test_a_clause_is_seen(first: str, hard: bool) -> None:
     """A docstring that opens with a clause is found, and one that opens with a noun or a verb is not."""
     assert bool(list(hard_to_read(f'"""{first}"""'))) is hard
+
+
+_REFERENCE = re.compile(r":(?:class|func|meth|mod|data|attr):`~?(proofroll[\w.]*)`")
+
+
+def _resolves(name: str) -> bool:
+    """True if a name is a module, or an attribute of one, at any depth."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        place = ROOT / "src" / Path(*parts[:count])
+        file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+        if file.is_file():
+            text = file.read_text(encoding="utf-8")
+            return all(re.search(rf"\b{part}\b", text) for part in parts[count:])
+    return False
+
+
+def test_cross_references_point_to_what_there_is() -> None:
+    """Every whole name of this package in a docstring is that of a module, a class, a function or an attribute."""
+    files = sorted((ROOT / "src").rglob("*.py"))
+    assert [
+        (path.name, name)
+        for path in files
+        for name in _REFERENCE.findall(path.read_text(encoding="utf-8"))
+        if not _resolves(name)
+    ] == []

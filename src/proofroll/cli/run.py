@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
+from proofroll.core.limits import RUN_TIME_LIMIT
 
 if TYPE_CHECKING:
     from proofroll.running.case import Case
@@ -34,7 +35,7 @@ def run(
         Path | None,
         typer.Option(help="Write the trajectory to this file, by its ending: nc (netCDF), csv, or npz (numpy)."),
     ] = None,
-    time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = 600.0,
+    time_limit: Annotated[float, typer.Option(help="Wall seconds after which the run is ended.")] = RUN_TIME_LIMIT,
     ask: Annotated[list[str] | None, typer.Option(help="What is wanted besides the motion: orientation.")] = None,
     plot: Annotated[
         Path | None, typer.Option(help="Draw the run to this file, by its ending: html, svg, png or pdf.")

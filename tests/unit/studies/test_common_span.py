@@ -16,6 +16,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import changed
 from proofroll.running.recording import record
 from proofroll.running.simulation import build
+from proofroll.studies.judging.held_against import observed
 from proofroll.studies.judging.reference import Reference
 
 TIMES = time_grid(0.4, 5e-3)
@@ -45,7 +46,7 @@ def test_who_leaves_the_wall_is_judged_up_to_there(engine: str) -> None:
     whole = reference(scene)
     run = record(build(scene, engine), scene, TIMES).dataset
     held, cut = whole.common_span({1.0: run})
-    curves = held.observed(cut[1.0])
+    curves = observed(held, cut[1.0])
     for name in ("gamma", "z", "N", "F2", "F3", "gap", "slip", "event_times", "event_order"):
         true, _ = held.true(name, curves[name])
         assert curves[name].shape == true.shape, name
@@ -60,7 +61,7 @@ def test_who_ends_too_early_is_not_excused() -> None:
     scene = lying()
     short = record(build(scene, "reduced"), scene, TIMES).dataset.isel(time=slice(30))
     held, cut = reference(scene).common_span({1.0: short})
-    curve = held.observed(cut[1.0])["gamma"]
+    curve = observed(held, cut[1.0])["gamma"]
     assert curve.shape != held.true("gamma", curve)[0].shape
 
 
@@ -89,7 +90,7 @@ def test_a_ball_that_leaves_cuts_what_is_beside_it(other: str) -> None:
     run = record(build(scene, "projection"), scene, TIMES).dataset
     held, cut = whole.common_span({1.0: run})
     assert len(held.dataset.time) == len(run.time) < len(TIMES)
-    curves = held.observed(cut[1.0])
+    curves = observed(held, cut[1.0])
     judged = {"gamma", "z", "N", "F2", "F3", "event_times", "event_order", "down", "across", "q", "tip"}
     for name in [name for name in curves if name.split(".")[0] in judged]:
         true, _ = held.true(name, curves[name])

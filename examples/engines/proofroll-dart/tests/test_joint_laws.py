@@ -23,5 +23,5 @@ def test_laws_are_those_of_the_scene(name: str, error: float) -> None:
 
 
 def test_equations_without_steps_have_no_stops() -> None:
-    """What switches is not among the capabilities of the formulation that scipy integrates."""
+    """Laws that switch are not among the capabilities of the formulation that scipy integrates."""
     assert not required(mechanism_of(load_scene("stop"))) <= Dart.provides["forward_dynamics"]

@@ -25,6 +25,7 @@ from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison.expectations import contradictions_of
 from proofroll.studies.comparison.outcome import ComparedPoint, LadderRun, Outcome, Run
 from proofroll.studies.comparison.planning import Plan, Planned, at_point, plan, point_name
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
@@ -169,11 +170,11 @@ def _judgements(
 ) -> tuple[list[Judgement], dict[float, dict[str, float]]]:
     """The judgements of a run; and factor of each rung of its ladder -> error of each observable."""
     reference, trajectories = reference.common_span(trajectories)
-    curves = {factor: reference.observed(dataset) for factor, dataset in trajectories.items()}
+    curves = {factor: held_against.observed(reference, dataset) for factor, dataset in trajectories.items()}
     main = curves[1.0]
     judgements: list[Judgement] = []
     errors: dict[float, dict[str, float]] = {factor: {} for factor in curves}
-    always, given = reference.always(main), band.bounds | run.row.bound
+    always, given = held_against.always(reference, main), band.bounds | run.row.bound
     for name, curve in main.items():
         tolerance = given.get(name) or always.get(name)
         if tolerance is None:
@@ -195,7 +196,7 @@ def _judgements(
             doubt=reference.doubt(name),
             own_bar=reference.own_bar(name, trajectories[1.0]),
             sampled_bar=reference.sampled_bar,
-            between=reference.between(name, trajectories[1.0]),
+            between=held_against.between(reference, name, trajectories[1.0]),
             magnitude=reference.magnitude(name),
             precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
         )
@@ -204,7 +205,7 @@ def _judgements(
         judgements.append(judgement)
         for factor, found in curves.items():
             if name in found:
-                between = reference.between(name, trajectories[factor])
+                between = held_against.between(reference, name, trajectories[factor])
                 off_grid = 0.0 if between is None else largest_difference(*between)
                 errors[factor][name] = max(largest_difference(found[name], true), off_grid)
     return judgements, errors

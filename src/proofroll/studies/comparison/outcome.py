@@ -122,7 +122,7 @@ class Outcome:
         scene: with its own parameters.
         file: the scene's, for its words.
         runs: with their judgements.
-        points: by :func:`proofroll.studies.planning.point_name`.
+        points: by :func:`proofroll.studies.comparison.planning.point_name`.
         beyond_budget: cases that the processor time did not suffice for, as text.
     """
 

@@ -21,8 +21,10 @@ from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Doubt, Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import html_table
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.given_run import GivenRun, Run, read_run
-from proofroll.studies.judging.reference import Reference, turned_alike
+from proofroll.studies.judging.held_against import turned_alike
+from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -155,11 +157,11 @@ def judge(
     observed: dict[str, FloatArray] = {}
     if "scene_digest" in dataset.attrs:  # all variables of a run
         reference, cut = reference.common_span({0: dataset})
-        dataset, observed = cut[0], reference.observed(cut[0])
+        dataset, observed = cut[0], held_against.observed(reference, cut[0])
     sure = [str(name) for name, variable in dataset.data_vars.items() if UNCERTAIN not in variable.attrs]
     bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
-    further = {name: bound for name, bound in reference.always(observed).items() if name not in bounds}
+    further = {name: bound for name, bound in held_against.always(reference, observed).items() if name not in bounds}
     found = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
     compared += [item for item in found if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
@@ -292,13 +294,13 @@ def _compared(
         values = observed[name]
         true, bar = reference.true(name, values)
         scale, doubt = reference.sizes.get(name, 1.0), reference.doubt(name)
-        own, between = reference.own_bar(name, dataset), reference.between(name, dataset)
+        own, between = reference.own_bar(name, dataset), held_against.between(reference, name, dataset)
     else:
         values, truth_of = dataset[name].to_numpy(), reference.dataset[name]
         true, bar = truth_of.to_numpy(), float(truth_of.attrs["error_bar"])
         if item and item.role is Role.REACTION and dataset["time"].to_numpy()[0] == 0:
             true, values = true[1:], values[1:]  # several engines define reactions only after a first step
-        between = reference.between(name, dataset)
+        between = held_against.between(reference, name, dataset)
         if truth_of.dims[-1:] == ("wxyz",):
             values = turned_alike(values, true)
         scale, doubt = _size(reference, name, true, _unit(reference, name)), Doubt.NONE

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -12,13 +11,11 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.comparison import Tolerance
-from proofroll.core.dataset import BETWEEN, Key, common_span, observe, part, scales
+from proofroll.core.dataset import Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
-from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import Doubt
 from proofroll.files.trajectory_file import read
 
@@ -96,28 +93,6 @@ class Reference:
             return next((float(time) for time in self.curves[name]), None)
         return self.sizes.get(name)
 
-    def always(self, names: Iterable[str]) -> dict[str, Tolerance]:
-        """Tolerances of the observables that are judged without one; only what differs is shown."""
-        items = {name: self.scene.observables[name] for name in names if self.scene.observables[name].always}
-        end = Tolerance(float(self.dataset["time"][-1]), False, "s")
-        return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
-
-    def observed(self, dataset: xr.Dataset) -> dict[str, FloatArray]:
-        """The observables of an engine's trajectory of this scene."""
-        curves = observe(self.scene, dataset)
-        for element in self.scene.elements:
-            own, true = part(self.scene, element, dataset), part(self.scene, element, self.dataset)
-            if "event_kind" in own:  # else it says nothing of events
-                curves[self.scene.label(element, EVENT_ORDER)] = event_order(own, true)
-        curves = {name: values for name, values in curves.items() if name in self.scene.observables}
-        for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:
-            values = curves.pop(name)
-            if name in self.curves:  # the truth of a scene that asks for it
-                curves[name] = turned_alike(values, self.curves[name])
-        both = (dataset, self.dataset)
-        sure = {name: on_turns_of(self.curves.get(name), values, name, both) for name, values in curves.items()}
-        return {name: values for name, values in sure.items() if values is not None}
-
     def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
         """True values of an observable with ``values`` from an engine, and their error bar."""
         item = self.scene.observables[name]
@@ -130,29 +105,6 @@ class Reference:
             return known, float(self.dataset[name].attrs["error_bar"])
         # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
-
-    def between(self, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
-        """Values of an observable or state of a run off the grid, and its true values there; None: nothing to compare.
-
-        A sampling interval with an event, of the run or of the truth, does not count: within a step of
-        the engine forces may still be those before.
-        """
-        own, item = f"{BETWEEN}.{name}", self.scene.observables.get(name)
-        if own not in dataset or own not in self.dataset:
-            return None
-        times, known = dataset[BETWEEN].to_numpy(), self.dataset[BETWEEN].to_numpy()
-        grid = self.dataset["time"].to_numpy()
-        happened = [event.time for run in (dataset, self.dataset) for event in self.events_of(run)]
-        alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
-        both = np.isin(times, known) & alone & (times < grid[-1])
-        values, true = dataset[own].to_numpy()[both], self.dataset[own].to_numpy()[np.isin(known, times[both])]
-        if item is not None and item.role is Role.RESIDUAL:
-            return values, np.zeros_like(values)
-        if dataset[own].dims[-1:] == ("wxyz",):
-            values = turned_alike(values, true)
-        turned = on_turns_of(true, values, name, (dataset, self.dataset))
-        said = np.isfinite(true)
-        return None if turned is None else (turned[said], true[said])
 
     def magnitude(self, name: str) -> float:
         """Size of the numbers whose small difference an observable is; 0: it is none."""
@@ -182,16 +134,3 @@ class Reference:
     def events_of(self, dataset: xr.Dataset) -> list[Event]:
         """Events of all elements in another run."""
         return [event for item in self.scene.elements for event in events_of(part(self.scene, item, dataset))]
-
-
-def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
-    """Quaternions with the signs of the true ones, for q and -q are the same orientation; shape (…, 4)."""
-    if values.shape != true.shape:
-        return values
-    return np.asarray(values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0))
-
-
-def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
-    """Count of events that are missing, too many, or of another kind than the truth's."""
-    kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
-    return np.array([float(sum(a != b for a, b in kinds))])

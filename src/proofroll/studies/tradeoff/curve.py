@@ -19,6 +19,7 @@ from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.timing import Timing
 from proofroll.studies.cases import case_of
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.pareto import envelope
 from proofroll.studies.tradeoff.records import Corner
@@ -209,7 +210,7 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
 def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurvePoint:
     if point.result.status != Status.DONE:
         return point
-    curves = reference.observed(read(runner.store.trajectory(point.case)))
+    curves = held_against.observed(reference, read(runner.store.trajectory(point.case)))
     errors, bars = {}, {}
     for name, curve in curves.items():
         true, bar = reference.true(name, curve)

@@ -22,6 +22,7 @@ from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.recording import record
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
 from proofroll_drill.mutants import (
     ball_models,
@@ -129,7 +130,7 @@ def tried(kind: type[Mutant]) -> Mutated:
 def judged(reference: Reference, dataset: Any) -> list[Judgement]:
     """Verdicts of all observables that a run has."""
     found = []
-    for name, values in reference.observed(dataset).items():
+    for name, values in held_against.observed(reference, dataset).items():
         true, bar = reference.true(name, values)
         size = reference.sizes.get(name, 1.0)
         unit = reference.scene.observables[name].unit

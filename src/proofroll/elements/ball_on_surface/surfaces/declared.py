@@ -156,7 +156,7 @@ class Declared:
         return np.asarray(u.reshape(*p.shape[:-1], 2))
 
     def _away(self, p_WB: npt.ArrayLike, first: int, count: int) -> FloatArray:
-        """The distance and its derivatives by x, y and z: ``count`` of ten numbers from ``first`` on, shape (..., count)."""
+        """Distance and its derivatives by x, y, z: ``count`` of ten numbers from ``first`` on, shape (..., count)."""
         p = np.asarray(p_WB, dtype=np.float64)
         parts = _field(self)[0](*p.tolist()) if p.ndim == 1 else _field(self)[1](p[..., 0], p[..., 1], p[..., 2])
         return _stacked(parts[first : first + count], p.shape[:-1])

@@ -1,0 +1,81 @@
+"""Values of a run as they are compared with the truth: on its turns and signs, at its times."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.comparison import Tolerance
+from proofroll.core.dataset import BETWEEN, observe, part
+from proofroll.core.events import EVENT_ORDER, events_of
+from proofroll.core.observable import Role
+from proofroll.core.turns import on_turns_of
+from proofroll.studies.judging.reference import Reference
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def always(reference: Reference, names: Iterable[str]) -> dict[str, Tolerance]:
+    """Tolerances of the observables that are judged without one; only what differs is shown."""
+    items = {name: reference.scene.observables[name] for name in names if reference.scene.observables[name].always}
+    end = Tolerance(float(reference.dataset["time"][-1]), False, "s")
+    return {name: end if item.role is Role.EVENT else Tolerance(0.5, True) for name, item in items.items()}
+
+
+def observed(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]:
+    """The observables of an engine's trajectory of this scene."""
+    curves = observe(reference.scene, dataset)
+    for element in reference.scene.elements:
+        own, true = part(reference.scene, element, dataset), part(reference.scene, element, reference.dataset)
+        if "event_kind" in own:  # else it says nothing of events
+            curves[reference.scene.label(element, EVENT_ORDER)] = event_order(own, true)
+    curves = {name: values for name, values in curves.items() if name in reference.scene.observables}
+    for name in [name for name in curves if name in dataset and dataset[name].dims[-1:] == ("wxyz",)]:
+        values = curves.pop(name)
+        if name in reference.curves:  # the truth of a scene that asks for it
+            curves[name] = turned_alike(values, reference.curves[name])
+    both = (dataset, reference.dataset)
+    sure = {name: on_turns_of(reference.curves.get(name), values, name, both) for name, values in curves.items()}
+    return {name: values for name, values in sure.items() if values is not None}
+
+
+def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
+    """Values of an observable or state of a run off the grid, and its true values there; None: nothing to compare.
+
+    A sampling interval with an event, of the run or of the truth, does not count: within a step of
+    the engine forces may still be those before.
+    """
+    own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
+    if own not in dataset or own not in reference.dataset:
+        return None
+    times, known = dataset[BETWEEN].to_numpy(), reference.dataset[BETWEEN].to_numpy()
+    grid = reference.dataset["time"].to_numpy()
+    happened = [event.time for run in (dataset, reference.dataset) for event in reference.events_of(run)]
+    alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
+    both = np.isin(times, known) & alone & (times < grid[-1])
+    values, true = dataset[own].to_numpy()[both], reference.dataset[own].to_numpy()[np.isin(known, times[both])]
+    if item is not None and item.role is Role.RESIDUAL:
+        return values, np.zeros_like(values)
+    if dataset[own].dims[-1:] == ("wxyz",):
+        values = turned_alike(values, true)
+    turned = on_turns_of(true, values, name, (dataset, reference.dataset))
+    said = np.isfinite(true)
+    return None if turned is None else (turned[said], true[said])
+
+
+def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:
+    """Quaternions with the signs of the true ones, for q and -q are the same orientation; shape (…, 4)."""
+    if values.shape != true.shape:
+        return values
+    return np.asarray(values * np.where(np.sum(values * true, axis=-1, keepdims=True) < 0, -1.0, 1.0))
+
+
+def event_order(dataset: xr.Dataset, truth: xr.Dataset) -> FloatArray:
+    """Count of events that are missing, too many, or of another kind than the truth's."""
+    kinds = itertools.zip_longest(*([event.kind for event in events_of(item)] for item in (dataset, truth)))
+    return np.array([float(sum(a != b for a, b in kinds))])
