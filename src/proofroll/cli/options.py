@@ -219,10 +219,10 @@ def show(
 
 
 def require_pages() -> None:
-    """Before the work rather than after it.
+    """Checks, before any work, that the libraries for pages and pictures are installed.
 
     Raises:
-        Missing: what draws pages and pictures is not installed.
+        Missing: one is not.
     """
     from importlib.util import find_spec
 

@@ -67,8 +67,8 @@ class FirstMotion:
         angular_acceleration: likewise [rad/s²].
         scale: what accelerations are measured by, never zero [m/s²].
         moment: a time in which little happens: when an engine without a step is looked at first [s].
-        pull: acceleration by the loads alone [m/s²]. A fast start has many times that, and an error of the loads would
-            be small beside it, so short runs are measured by this; None: the scale.
+        pull: acceleration by the loads alone [m/s²], in whose units errors of short runs are counted: beside the
+            many times larger acceleration of a fast start an error of the loads would be small. None: the scale.
         lasts: before this time nothing that moves can have stopped [s]; later the acceleration may be another.
     """
 

@@ -107,9 +107,9 @@ def load_element_kinds() -> tuple[type[ElementKind], ...]:
 
 
 def require_engine(name: str) -> None:
-    """Raises InputError if no installed package announces such an engine; nothing is loaded.
+    """Raises InputError if no installed package announces an engine of this name; loads none.
 
-    Of another interpreter nothing is known here.
+    Engines of other interpreters are not checked.
     """
     if not place_of(name):
         _entry_point(name)

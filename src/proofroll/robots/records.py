@@ -26,8 +26,8 @@ class ImporterRow:
     Attributes:
         engine: as the user wrote it.
         status: ``holds``, ``explained``, ``differs``, ``refused``, ``missing``, or how its process ended.
-        message: why it holds nothing; None where it holds something.
-        says: remark on every reading of this engine.
+        message: reason that the engine has no model of the file; None if it has one.
+        says: remark that holds for every file that this engine reads.
         remarks: of its reader, on this file.
         layers: those that it offers.
         causes: of its differences.
@@ -36,7 +36,7 @@ class ImporterRow:
         as_written: what its importer does with the file as it is, where that is asked.
         fed: the engine has no importer: it was fed from our reading, and what it leaves out is no news of a file.
         accepted: all causes of its differences are among those that the user accepts.
-        where: it is off the most at the first layer that fails.
+        where: body or joint with the largest difference, at the first layer that fails.
         offending: joints whose carried body it holds differently, or lacks.
     """
 

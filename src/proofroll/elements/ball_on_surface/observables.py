@@ -228,9 +228,10 @@ def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Differences of the velocities from the rates of the positions, in stretches as :func:`force_audit` [m/s].
 
-    At every sample v against the derivative of the positions, and, where there is an orientation, the radius times ω
-    against its rate; at samples off the grid (:func:`proofroll.core.time_grid.off_grid`) their velocity and spin and,
-    over the time from the nearest sample, their position and orientation against the curves through the samples on it.
+    At every sample v is held against the derivative of the positions. Where there is an orientation, the radius times ω
+    is held against the rate of it. Samples off the grid (:func:`proofroll.core.time_grid.off_grid`) are held against
+    curves through the others: their velocity and spin, and their position and orientation over the time from the
+    nearest sample.
     """
     return _joined(_rates_audited(body, stretch) for stretch in stretches(dataset))
 

@@ -115,9 +115,10 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
 
 
 def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:
-    """Distance of a solution of :func:`complementary` from another one, relative to the forces in play.
+    """Least distance of a solution of :func:`complementary` from a change of mode, relative to the forces in play.
 
-    For a force between its bounds the distance from the nearer one, for one at a bound the force that would stop it.
+    A force between its bounds is as far from a change as from the nearer bound. A force at a bound is as far from it as
+    the further force that would stop the motion.
     """
     least = math.inf
     for k in range(len(free)):

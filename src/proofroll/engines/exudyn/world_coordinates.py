@@ -72,7 +72,7 @@ class WorldCoordinates(ExudynModel):
         self.integration = Integration(self.system, settings, {self._rolling: turning})
 
     def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`. The velocity ω is the rate of no orientation."""
+        """See :class:`proofroll.core.engine.Engine`. No orientation is integrated from the angular velocity."""
         output, (centre, spin) = self.system.GetNodeOutput, self._nodes
         return BallSample(
             p_WB=output(centre, Output.Position),

@@ -238,7 +238,7 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
 
 
 def check_restitution(settings: MujocoSettings) -> None:
-    """Rejects what would make of an impact something else than restitution.
+    """Rejects settings with which an impact would not follow the law of restitution.
 
     Raises:
         Refused: the integrator has stages, or the contact is edited.

@@ -59,7 +59,7 @@ def make_stability(
 
 
 def stability_study(found: StabilityMap) -> StabilityStudy:
-    """Record of a stability map, with counts on top."""
+    """Record of a stability map, with the numbers of its boundaries and of silent ones."""
     points = [_point(point) for point in found.points]
     scene = load_scene(found.scene)
     failing = [point for point in points if point.failure and point.failure not in NOT_RUN]

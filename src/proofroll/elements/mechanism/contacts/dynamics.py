@@ -31,7 +31,7 @@ class ContactsNow:
 
     Attributes:
         solution: of the mechanism without forces of contact.
-        W: what a force along the velocities makes of the accelerations, (nv, nv).
+        W: accelerations by unit forces along the velocities, (nv, nv).
         touching: of each contact.
         J: derivative of each slide by the velocities, (contacts, 3, nv).
         bias: rate of each slide where v̇ = 0, (contacts, 3).

@@ -28,8 +28,9 @@ _CLOSED = 1e-6
 class ContactWatch:
     """Events of all contacts of a run. See :class:`proofroll.core.element_abilities.RunWatch`.
 
-    A state of one sample alone between two of the other is none: what presses so has struck and left again, what slips
-    not has turned. Two impacts between samples are one.
+    A state that lasts for one sample alone does not count as an event of its own. A contact that presses at one sample
+    between two open ones has rebounded; one whose slip is zero at one sample has changed direction. Two impacts between
+    samples count as one.
     """
 
     def __init__(self, element: MechanismElement) -> None:
