@@ -41,11 +41,11 @@ class Composite(BallWithRows):
     """Two joints along the generators carry a massless carriage; a spherical joint in it carries the ball.
 
     Coordinates are (u1, u2, orientation of the ball in the carriage), velocities (u̇1, u̇2, spin relative to the
-    carriage in the ball's axes). The two rows of rolling are the only constraints. The
-    spherical joint transmits the normal force.
+    carriage in the ball's axes). The two rows of rolling are the only constraints. The spherical joint transmits the
+    normal force.
 
-    Without integrated orientation the ball's axes are those of the carriage, e1, e2, e3, along which all
-    quantities of Pinocchio are taken. If the two motions of the surface commute, Jacobian and rows are constant in these axes.
+    Without integrated orientation the ball's axes are those of the carriage, e1, e2, e3, along which all quantities of
+    Pinocchio are taken. If the two motions of the surface commute, Jacobian and rows are constant in these axes.
     """
 
     def __init__(self, body: RollingBall, orientation: bool) -> None:
