@@ -110,9 +110,10 @@ def _after(head: str, key: str) -> str:
 
 
 def _told(event: Event) -> str:
-    """One event with its bracket."""
+    """One event with its bracket, and what it happens to where it has a name."""
     bar = number(0.5 * (event.time_high - event.time_low), 1)
-    return f"{event.kind.replace('_', '-')} at {event.time:.9g} ± {bar} s"
+    name = f" of {event.name}" if event.name else ""
+    return f"{event.kind.replace('_', '-')}{name} at {event.time:.9g} ± {bar} s"
 
 
 def run_lines(content: RunContent) -> list[Any]:

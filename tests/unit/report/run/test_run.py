@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 from rich.console import Console
 
+from proofroll.core.events import Event
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import write
 from proofroll.report.run.run import run_content, run_lines
@@ -68,3 +69,13 @@ def test_what_comes_before_the_first_step_is_told(seconds: float | None, said: s
     assert content.build_seconds == seconds
     lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}))
     assert said in [str(line) for line in lines]
+
+
+def test_an_event_says_to_what_it_happens(tmp_path: Path) -> None:
+    """Of several contacts or joints the name stands with the kind; an event without a name has none."""
+    result = Result(Status.DONE, "reached 1 s", wall_seconds=1.0)
+    content = run_content(_case("pendulum"), result, tmp_path / "none.npz")
+    events = [Event("lift_off", 0.5, 0.4, 0.6, "left"), Event("slip", 0.7, 0.7, 0.7)]
+    lines = run_lines(dataclasses.replace(content, final={"time": 1.0}, units={"time": "s"}, events=events))
+    (said,) = [str(line) for line in lines if str(line).startswith("events: ")]
+    assert said.startswith("events: lift-off of left at 0.5 ± 0.1 s, slip at 0.7")
