@@ -60,7 +60,10 @@ def read_back(mechanism, **options):
     """Lines of contact of the certificate: largest relative difference of each."""
     run = MUJOCO.build(mechanism, preset(**options))
     lines = MechanismElement(mechanism).certify(run.built(), run.sample())
-    return {line.quantity: line.difference for line in lines if "contact" in line.quantity or line.quantity == "gaps"}
+    geometry = [line for line in lines if line.quantity != "forces of contact"]
+    return {
+        line.quantity: line.difference for line in geometry if "contact" in line.quantity or line.quantity == "gaps"
+    }
 
 
 @pytest.mark.parametrize("kind", SHAPES)

@@ -62,6 +62,18 @@ def test_a_start_is_certified(name: str) -> None:
     np.testing.assert_allclose(run.sample().contact_force[known], element.first_press[known], atol=1e-8)
 
 
+@pytest.mark.parametrize("factor", [-1.0, 0.0, 1.01])
+def test_a_wrong_first_force_is_not_certified(factor: float) -> None:
+    """A force of contact that is on the other body, left out, or a hundredth too large is told by the certificate."""
+    (element,) = load_scene("sled").elements
+    assert isinstance(element, MechanismElement)
+    run = PROJECTION.build(load_scene("sled"), DEFAULT)
+    sample = run.sample()
+    wrong = replace(sample, contact_force=factor * sample.contact_force)
+    assert [line.quantity for line in element.certify(run.built(), sample) if not line.holds] == []
+    assert [line.quantity for line in element.certify(run.built(), wrong) if not line.holds] == ["forces of contact"]
+
+
 def test_contacts_beside_other_switches_are_refused() -> None:
     """A stop beside contacts is refused in a line that says what is followed."""
     mechanism = mechanism_of(load_scene("free_turntable"))

@@ -27,7 +27,8 @@ _COMPOSED = "composed along the tree by the engine's own arithmetic"
 # Three evaluations show the noise, they do not bound it; each side has its own.
 _MARGIN = 10.0
 _NOISY = "round-off of the scene's own accelerations, which many bodies in a row magnify"
-_FROM_ACCELERATIONS = ("acceleration", "angular acceleration", "forces", "torques", "couplings")
+_FORCES = ("forces", "torques", "couplings", "forces of contact")
+_FROM_ACCELERATIONS = ("acceleration", "angular acceleration", *_FORCES)
 # What a model may soften: quantity -> largest relative difference that any reason explains, and why.
 CAPS: Mapping[str, Regularised] = {
     # with all of it allowed, a mechanism that does not set off at all would pass
@@ -63,7 +64,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
         known = ~np.isnan(want) & ~np.isnan(got) if got.shape == want.shape else np.zeros(0, dtype=bool)
         difference = float(np.max(np.abs(got - want)[known], initial=0.0)) / scale if known.size else float("inf")
         soft = built.regularised.get(quantity.replace(" ", "_"))
-        if soft is None and quantity in {"forces", "torques", "couplings"}:  # as soft as what they accelerate
+        if soft is None and quantity in _FORCES:  # as soft as what they accelerate
             soft = max(built.regularised.values(), key=lambda one: one.tolerance, default=None)
         tolerance, because = tolerated(soft, CAPS.get(quantity), COMPOSED, _COMPOSED)
         own = scale if "acceleration" in quantity else found.scale
@@ -99,7 +100,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     compare("acceleration", "m/s^2", found.acceleration, built.acceleration, found.scale)
     turning = _turning(element, soft="angular_acceleration" in built.regularised)
     compare("angular acceleration", "rad/s^2", found.angular_acceleration, built.angular_acceleration, turning)
-    _compare_reactions(element, sample, compare)
+    _compare_reactions(element, built, sample, compare)
     return lines
 
 
@@ -125,10 +126,31 @@ def _compare_contacts(
     compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
 
 
+def _compare_press(
+    element: MechanismElement,
+    built: MechanismBuilt,
+    sample: MechanismSample,
+    compare: Callable[[str, str, Any, Any, float], None],
+) -> None:
+    """Compares the first forces of contacts, as far as they are determinate; a first step as soft as a hop has none."""
+    if not element.mechanism.contacts:
+        return
+    wanted, given = element.first_press, sample.contact_force
+    softest = max((soft.tolerance for soft in built.regularised.values()), default=0.0)
+    if given is not None:
+        given = None if softest > CAPS["forces of contact"].tolerance else np.reshape(given, wanted.shape)
+    natural = sum(body.mass for body in element.mechanism.bodies) * element.first_motion.scale
+    compare("forces of contact", "N", wanted, given, float(np.nanmax(np.abs(wanted), initial=0.0)) or natural)
+
+
 def _compare_reactions(
-    element: MechanismElement, sample: MechanismSample, compare: Callable[[str, str, Any, Any, float], None]
+    element: MechanismElement,
+    built: MechanismBuilt,
+    sample: MechanismSample,
+    compare: Callable[[str, str, Any, Any, float], None],
 ) -> None:
     """Named forces, and forces and moments as far as they are determinate; models without them are not asked."""
+    _compare_press(element, built, sample, compare)
     _compare_named(element, sample, compare)
     if sample.joint_force is None or sample.joint_torque is None:
         return

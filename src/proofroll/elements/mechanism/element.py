@@ -280,6 +280,12 @@ class MechanismElement:
         wrench: FloatArray = self._first["wrench"]
         return read_only(wrench)
 
+    @property
+    def first_press(self) -> FloatArray:
+        """Forces of contacts on their first bodies at the start [N], (contacts, 3); NaN where not determinate."""
+        found = self._pressed
+        return np.zeros((0, 3)) if found is None else np.where(found.determinate, found.force, np.nan)
+
     @cached_property
     def first_named(self) -> FloatArray:
         """The named forces at the start, see :mod:`proofroll.elements.mechanism.named_forces`."""

@@ -93,7 +93,7 @@ class ImpulseRun(MechanismRun):
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened, unsaid = dict[str, Regularised](), dict[str, None]()
         for name, value in hard.items():
-            size = float(np.abs(value).max()) or np.finfo(float).tiny
+            size = float(np.abs(value).max()) or 1.0  # nothing moves otherwise than freely
             others = twice[name], step[name], getattr(found, name)
             unsure = float(self._settings.solver_tolerance or 0.0) / span / size
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
