@@ -44,7 +44,7 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
         return Advised(column.title, f"For {title} no engine was run.")
     first, *others = engines
     asked = f"For {title} to {number(tolerance)}{' with forces' if forces else ''}"
-    if forces and _without_forces(matrix, column):
+    if forces and matrix.without_forces.issuperset(column.studies):
         return Advised(column.title, f"{asked}: forces are not judged there.")
     said = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
@@ -122,7 +122,7 @@ def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
 
 def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, without: ChoiceCell) -> str:
     """Sentence about forces, which were not asked for."""
-    if _without_forces(matrix, column):
+    if matrix.without_forces.issuperset(column.studies):
         return " Forces are not judged there."
     name, cell = min(_engines(matrix, column, tolerance, True), key=lambda item: item[1].cost)
     if not math.isfinite(cell.cost):
@@ -131,12 +131,6 @@ def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, w
         return " It holds the forces, too."
     more = f", {_times(cell.cost, without.cost)}" if math.isfinite(without.cost) else ""
     return f" If forces count, too, take {_named(name, cell)} ({cell.text} s/s{more})."
-
-
-def _without_forces(matrix: ChoiceMatrix, column: ChoiceColumn) -> bool:
-    """True if no run of the column has forces that are judged."""
-    found = (item for row in matrix.models for name in column.studies for item in row.found.get(name, ()))
-    return all(item.forces is None for item in found)
 
 
 def _times(cost: float, of: float) -> str:

@@ -106,8 +106,19 @@ class ChoiceMatrix:
     def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         """Cell at a tolerance, a part of the size."""
         own = [name for name in column.studies if name in row.found]
+        if forces and own:
+            judged = [name for name in own if name not in self.without_forces]
+            if not judged:
+                return ChoiceCell(Verdict.NOT_JUDGED, "no forces", "forces are not judged here", why="no forces judged")
+            own = judged
         cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in own]
         return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
+
+    @cached_property
+    def without_forces(self) -> set[str]:
+        """Studies in which no run has forces that are judged, as where they are not unique."""
+        found = [(name, item.forces) for row in self.rows for name, items in row.found.items() for item in items]
+        return {name for name, _ in found} - {name for name, forces in found if forces is not None}
 
     @property
     def models(self) -> list[ChoiceRow]:
@@ -123,7 +134,7 @@ class ChoiceMatrix:
             cell, name = min(cells, key=lambda item: item[0].cost, default=(ChoiceCell(NOT_RUN, "", ""), ""))
             if math.isfinite(cell.cost):
                 said.append(f"{column.group}: {name} ({cell.text} s/s)")
-            else:
+            elif not (forces and self.without_forces.issuperset(column.studies)):
                 without.append(column.group)
         nothing = f"nothing that was run and timed holds it for {', '.join(without)}" if without else ""
         if not said:

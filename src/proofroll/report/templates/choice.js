@@ -47,6 +47,10 @@
   }
   everywhere(hide);
   form.addEventListener("submit", (event) => event.preventDefault());
+  // A few scenes are shown by their names at once, where the screen has room for them.
+  addEventListener("load", () => {
+    if (table.tHead.rows[0].cells.length < 9 && innerWidth > 800) table.querySelectorAll("button[data-group]").forEach((button) => button.click());
+  });
 
   table.addEventListener("click", (event) => {
     const button = event.target.closest("button");

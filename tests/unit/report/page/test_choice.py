@@ -45,7 +45,8 @@ def test_forces_count_where_they_are_asked_for() -> None:
     """With forces the same tolerance takes a finer run; an engine that reports none says so."""
     assert at(ARM, 2)[:2] == (Verdict.AGREES, "0.01")
     assert at(ARM, 2, forces=True)[:2] == (Verdict.AGREES, "~0.04")
-    assert at([LINE], 2, forces=True)[:2] == (Verdict.INCOMPLETE, "no forces")
+    told = replace(FORCE, engine="beta", row=7)
+    assert at([LINE, told], 2, forces=True)[:2] == (Verdict.INCOMPLETE, "no forces")
 
 
 def test_what_no_run_holds_shows_the_least_error_and_why() -> None:
@@ -57,6 +58,14 @@ def test_what_no_run_holds_shows_the_least_error_and_why() -> None:
     assert at([line(error=0.0, truth_error_bar=1e-5)], 6).state == Verdict.CONVERGES
     once = at([line(limit="no ladder")], 4)
     assert (once.state, "the closest of what was run" in once.title) == (Verdict.DIFFERS, True)
+
+
+def test_a_scene_without_judged_forces_takes_no_part_where_forces_count() -> None:
+    """Alone it says so, and the answer does not call it unheld; in a group the other scenes decide."""
+    assert at([LINE], 2, forces=True)[:2] == (Verdict.NOT_JUDGED, "no forces")
+    assert "nothing that was run" not in choice_matrix([LINE], STUDIES).answer(1e-2, True)
+    chain = replace(LINE, study="chain", scene="chain")
+    assert at([*ARM, chain], 4, forces=True)[:2] == at(ARM, 4, forces=True)[:2]
 
 
 def test_the_limit_of_forces_says_nothing_of_motion() -> None:
