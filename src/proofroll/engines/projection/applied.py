@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from proofroll.elements.mechanism import Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.connections import SKEW, Bodies, Ends
 
@@ -17,7 +19,10 @@ _TURN = 2 * math.pi
 
 
 class _Law(NamedTuple):
-    """Spring, damper and drive of one coordinate of a joint; ``axis`` z (of A), x (of B) or slide (along z of A)."""
+    """Spring, damper and drive of one coordinate of a joint; ``axis`` z (of A), x (of B) or slide (along z of A).
+
+    ``push`` of time, coordinate and rate stands in for them.
+    """
 
     connection: int
     axis: str
@@ -25,6 +30,7 @@ class _Law(NamedTuple):
     rest: float
     damping: float
     drive: float
+    push: Callable[[float, float, float], float] | None = None
 
 
 class Applied:
@@ -33,6 +39,7 @@ class Applied:
     Attributes:
         springs: whether there are any between points.
         laws: whether joints have any.
+        now: time at which drives and targets are taken [s].
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -44,7 +51,8 @@ class Applied:
             for actuator in mechanism.actuators
         ]
         self._laws += self._motors
-        sprung = [law for law in self._laws if law.stiffness and law.axis != "slide"]
+        self.now = 0.0
+        sprung = [law for law in self._laws if (law.stiffness or law.push) and law.axis != "slide"]
         start = ((law, mechanism.joints[law.connection].q0) for law in sprung)
         self._angles = {law: q0[1 if law.axis == "x" else 0] for law, q0 in start}
         self._balls = [
@@ -101,6 +109,8 @@ class Applied:
         return np.array([self._size(law, ends) for law in self._motors])
 
     def _size(self, law: _Law, ends: Ends) -> float:
+        if law.push is not None:
+            return law.push(self.now, self._coordinate(law, ends), self._rate(law, ends))
         size = law.drive - law.damping * self._rate(law, ends)
         return size - law.stiffness * (self._coordinate(law, ends) - law.rest) if law.stiffness else size
 
@@ -143,11 +153,12 @@ def _direction(law: _Law, ends: Ends) -> Array:
 
 
 def _motor(actuator: Actuator, number: int, joint: Joint) -> _Law:
-    """The effort of an actuator with a constant target, as a spring, damper and drive at its joint."""
+    """The effort of an actuator: a spring, damper and drive at its joint, or a push with a limit or in time."""
     n, target = actuator.gear, actuator.target
-    assert isinstance(target, float)  # other targets are refused
-    gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
     axis = "slide" if joint.kind == "prismatic" else "z"
+    if actuator.limit is not None or not isinstance(target, float):
+        return _Law(number, axis, 0.0, 0.0, 0.0, 0.0, actuator.effort)
+    gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
     return _Law(number, axis, n * n * actuator.kp, 0.0, n * n * actuator.kd, n * gain * target)
 
 
@@ -155,4 +166,7 @@ def _laws(number: int, joint: Joint) -> list[_Law]:
     if not (joint.stiffness or joint.damping or joint.torque) or joint.kind == "spherical":
         return []
     axes = {"revolute": ("z",), "prismatic": ("slide",), "universal": ("z", "x")}[joint.kind]
-    return [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes]
+    own = [_Law(number, axis, joint.stiffness, joint.rest, joint.damping, joint.constant_drive) for axis in axes]
+    if varies(joint.torque):  # one axis has it
+        own.append(_Law(number, axes[0], 0.0, 0.0, 0.0, 0.0, lambda t, _q, _v: float(value_at(joint.torque, t))))
+    return own

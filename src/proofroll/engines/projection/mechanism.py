@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
-from proofroll.core.integrators import INTEGRATORS, Integrator
+from proofroll.core.integrators import INTEGRATORS, Accept, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.pose_words import pose
@@ -23,6 +23,7 @@ from proofroll.elements.mechanism.sampling import (
     mechanism_of,
     unsaid,
 )
+from proofroll.elements.mechanism.signal import varies
 from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.contact_modes import ContactMotion
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
@@ -38,6 +39,8 @@ PROVIDES = frozenset(
     | {
         MechanismCapability.REDUNDANT,
         MechanismCapability.ACTUATORS,
+        MechanismCapability.SATURATION,
+        MechanismCapability.SIGNALS,
         MechanismCapability.ARMATURE,
         MechanismCapability.JOINT_FRICTION,
         MechanismCapability.STOPS,
@@ -48,8 +51,7 @@ PROVIDES = frozenset(
     }
 )
 LACKING: Mapping[str, str] = {
-    MechanismCapability.SATURATION: "its switches are those of friction and stops",
-    MechanismCapability.SIGNALS: "its equations do not depend on time",
+    MechanismCapability.COUPLINGS: "its tree has no rows between joints",
 }
 # Regularity of the loops' rows over the largest on the way: accelerations lose as many digits as it has zeros. Loops
 # that pass a singular pose by a hundredth of a radian have some hundredth.
@@ -65,10 +67,16 @@ class ProjectionMechanism:
         switched = switched_joints(mechanism)
         if switched and mechanism.loops:
             raise Refused("dry friction and stops are followed in trees of joints, and this mechanism has loops")
-        if mechanism.contacts and (switched or mechanism.loops or mechanism.actuators):
-            raise Refused("contacts are followed in trees whose joints have no loops, switches or actuators")
-        if (switched or mechanism.contacts) and settings.equations == "compiled":
-            raise Refused("equations that switch are not compiled; choose preset=matched")
+        self._timed = any(map(varies, mechanism.signals))
+        pushed = self._timed or any(actuator.limit is not None for actuator in mechanism.actuators)
+        if mechanism.contacts and (switched or mechanism.loops or mechanism.actuators or pushed):
+            raise Refused("contacts are followed in trees whose joints have no loops, switches, actuators or signals")
+        if (switched or pushed or mechanism.contacts) and settings.equations == "compiled":
+            raise Refused("equations that switch or change in time are not compiled; choose preset=matched")
+        if switched and pushed:
+            raise Refused(
+                "dry friction and stops are followed under drives that neither change in time nor have a limit"
+            )
         for body in mechanism.bodies:
             if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
                 raise Refused(
@@ -95,7 +103,25 @@ class ProjectionMechanism:
             self._motion = self._switched = SwitchedMotion(self._equations, switched, stepper, self._accepted)
             return
         integrator = INTEGRATORS[settings.integrator]
-        self._motion = integrator(rates, self._accepted, start, np.ones(len(start)), resolution)
+        accepted: Accept = self._accepted
+        if self._timed:  # the time is the last component of the state: integrators hand on nothing else
+            start, rates, accepted = np.append(start, 0.0), self._rates_in_time, self._accepted_in_time
+        self._motion = integrator(rates, accepted, start, np.ones(len(start)), resolution)
+
+    def _rates_in_time(self, y: Array) -> Array:
+        self._equations.applied.now = float(y[-1])
+        return np.append(self._equations.rates(y[:-1]), 1.0)
+
+    def _accepted_in_time(self, t: float, y: Array) -> Array:
+        return np.append(self._accepted(t, y[:-1]), y[-1])
+
+    @property
+    def _state(self) -> Array:
+        """State now, without the time."""
+        if not self._timed:
+            return self._motion.x
+        self._equations.applied.now = self._motion.t
+        return self._motion.x[:-1]
 
     def _accepted(self, t: float, x: Array) -> Array:
         if not np.isfinite(x.sum()):
@@ -130,7 +156,7 @@ class ProjectionMechanism:
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
-        equations, x = self._equations, self._motion.x
+        equations, x = self._equations, self._state
         solved = self._solved(x)
         # reactions beside forces of contact, which are no part of the matrices of the bodies' loads, are not told
         force, torque = unsaid(self._mechanism) if self._touching else equations.reactions(solved)
@@ -152,7 +178,7 @@ class ProjectionMechanism:
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         equations = self._equations
-        solved = self._solved(self._motion.x)
+        solved = self._solved(self._state)
         bodies, count, joints = solved.bodies, len(equations.mass), len(self._mechanism.joints)
         R, w = bodies.rotation, bodies.spin
         arm = np.einsum("nij,nj->ni", R, equations.com)

@@ -1,0 +1,57 @@
+"""Efforts with limits, and drives and targets in time, in the projection method."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.engines.projection.mechanism import ProjectionMechanism
+from proofroll.engines.projection.settings import PRESETS
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+AT = np.array([0.0, 0.2])
+
+
+def wheel(*actuators: Actuator, **more: Any) -> Mechanism:
+    """A wheel of 1 kg m² on an axle."""
+    joint = Joint("j", "revolute", "world", "b", orientation=(0, 0, 0.3), q0=(0.2,), v0=(0.5,), **more)
+    return Mechanism((Body("b", 1.0, inertia=ONES),), (joint,), actuators=actuators, gravity=(0, 0, 0))
+
+
+@pytest.mark.parametrize(("preset", "error"), [("default", 1e-5), ("matched", 1e-9)])
+@pytest.mark.parametrize(
+    "made",
+    [
+        wheel(Actuator("a", "j", "position", 3.0, kp=70.0, kd=5.0, gear=2.0, limit=9.0)),
+        wheel(Actuator("a", "j", "velocity", 30.0, kd=5.0, limit=2.0)),
+        wheel(Actuator("a", "j", "position", Formula("4*sin(7*t)"), kp=50.0, kd=2.0, limit=20.0)),
+        wheel(torque=Formula("90*cos(9*t)")),
+        wheel(torque=Table((0.0, 0.1, 0.4), (0.0, 90.0, -1.0))),
+    ],
+)
+def test_efforts_are_those_of_each_stage(made: Mechanism, preset: str, error: float) -> None:
+    """Clamped and varying efforts give the true motion, beyond a turn, and are told."""
+    engine = ProjectionMechanism(made, PRESETS["dependent"][preset])
+    engine.advance(AT[1])
+    found, truth = engine.sample(), truth_of(made, AT).record
+    assert found.w_WB[0, 2] == pytest.approx(truth.v[1, 0], abs=20 * error)
+    if made.actuators:
+        assert found.effort == pytest.approx(truth.named[1], abs=100 * error)
+
+
+def test_what_is_not_followed_is_refused() -> None:
+    """Stops together with a limit, and compiled equations, have their reason."""
+    limited = Actuator("a", "j", "torque", 3.0, limit=2.0)
+    with pytest.raises(Refused, match="neither change in time nor have a limit"):
+        ProjectionMechanism(wheel(limited, friction=0.1), PRESETS["dependent"]["default"])
+    compiled = replace(PRESETS["dependent"]["tuned"])
+    with pytest.raises(Refused, match="not compiled"):
+        ProjectionMechanism(wheel(limited), compiled)
