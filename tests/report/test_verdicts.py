@@ -22,7 +22,7 @@ from proofroll.report.comparison.sentences import conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.comparison.verdict_matrix import counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
-from proofroll.report.page.html import page
+from proofroll.report.page.html import page, templates
 from proofroll.report.page.records import report_content
 from proofroll.report.page.summary import three_sentences
 from proofroll.report.terminal.tables import closing_lines, verdict_table
@@ -100,10 +100,14 @@ def test_the_price_of_compiling_has_a_column(made: tuple[Outcome, Store]) -> Non
         seconds: [dataclasses.replace(answered(run), result=dataclasses.replace(run.result, build_seconds=seconds))]
         for seconds in (0.02, 23.5)
     }
-    quick, slow = (printed(outcome_content(with_runs(made[0], {0: one})), 100) for one in runs.values())
+    contents = [outcome_content(with_runs(made[0], {0: one})) for one in runs.values()]
+    quick, slow = (printed(content, 100) for content in contents)
     assert "s before" in slow
     assert re.search(r" 24 ", slow)
     assert "s before" not in quick
+    pages = [str(templates().get_template("parts.html").module.matrix(overview(one, 0), "", "")) for one in contents]
+    assert ["before <small>s</small>" in page for page in pages] == [False, True]
+    assert re.search(r'<td class="n">24</td>', pages[1])
 
 
 def test_a_refusal_hides_no_difference_and_no_failure(made: tuple[Outcome, Store]) -> None:

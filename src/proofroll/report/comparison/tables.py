@@ -13,6 +13,8 @@ from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.labels import names, symbol
 
+_COMPILES = 10.0  # s before the first step: machine code of equations takes one or two, on a busy machine some more
+
 
 def observables(content: ReportedComparison) -> dict[str, str]:
     """The judged observables with their units, in the order of the first row that has them all."""
@@ -21,6 +23,14 @@ def observables(content: ReportedComparison) -> dict[str, str]:
         for name, judgement in row.observables.items():
             units.setdefault(name, judgement.unit)
     return units
+
+
+def seconds_before(content: ReportedComparison) -> dict[int, float]:
+    """Row -> longest time before the first step [s]; empty unless an engine takes as long as only compilers do."""
+    found: dict[int, float] = {}
+    for run in content.runs:
+        found[run.row] = max(found.get(run.row, 0.0), run.build_seconds or 0.0)
+    return found if max(found.values(), default=0.0) > _COMPILES else {}
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from proofroll.core.number_format import counted as told
 from proofroll.core.number_format import error, number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Cost, ReportedComparison, ReportedRow, ReportedRun
-from proofroll.report.comparison.tables import observables
+from proofroll.report.comparison.tables import observables, seconds_before
 from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_text
 
 
@@ -38,7 +38,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class MatrixLine:
-    """A row or a run with its cells by observable, a link to its evidence, and what happened where it failed."""
+    """A row or a run with its cells by observable, a link to its evidence, and what happened where it failed.
+
+    ``before`` is its longest time before the first step [s].
+    """
 
     of: ReportedRow | ReportedRun
     cells: dict[str, Cell]
@@ -47,14 +50,16 @@ class MatrixLine:
     message: str
     as_expected: bool
     cost: Cost | None
+    before: float | None = None
 
 
 @dataclass(frozen=True)
 class Matrix:
-    """The unit of each column by its observable, and the lines by engine."""
+    """The unit of each column by its observable, and the lines by engine; whether some engine compiles for long."""
 
     columns: dict[str, str]
     groups: dict[str, list[MatrixLine]]
+    compiles: bool
 
 
 def anchor(comparison: int, row: int, point: int) -> str:
@@ -73,7 +78,7 @@ def overview(content: ReportedComparison, comparison: int) -> Matrix:
         hrefs = {point: anchor(comparison, index, number) for number, point in enumerate(points)}
         cells = {name: Cell(item, hrefs[item.point], item.point) for name, item in row.observables.items()}
         shown = (verdict_text(row), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
-        lines.append(MatrixLine(row, cells, *shown))
+        lines.append(MatrixLine(row, cells, *shown, before=seconds_before(content).get(index)))
     return _matrix(content, lines)
 
 
@@ -93,7 +98,8 @@ def at_point(content: ReportedComparison, comparison: int, point: int, name: str
             href = anchor(comparison, run.row, point)
             cells = {judgement.observable: Cell(judgement, href) for judgement in run.judgements}
             message = run.message if run.status != "done" else ""
-            lines.append(MatrixLine(run, cells, run.verdict, href, message, not run.contradictions, run.cost))
+            said = (run.verdict, href, message, not run.contradictions, run.cost, run.build_seconds)
+            lines.append(MatrixLine(run, cells, *said))
     return _matrix(content, lines)
 
 
@@ -101,4 +107,4 @@ def _matrix(content: ReportedComparison, lines: list[MatrixLine]) -> Matrix:
     groups: dict[str, list[MatrixLine]] = {}
     for line in lines:
         groups.setdefault(line.of.name, []).append(line)
-    return Matrix(observables(content), groups)
+    return Matrix(observables(content), groups, bool(seconds_before(content)))

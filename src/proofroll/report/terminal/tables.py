@@ -11,7 +11,7 @@ from rich.text import Text
 
 from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Verdict
-from proofroll.report.comparison.tables import observables, remarks
+from proofroll.report.comparison.tables import observables, remarks, seconds_before
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 WIDTH = 100
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
-_COMPILES = 10.0  # s before the first step: machine code of equations takes one or two, on a busy machine some more
 STYLES = {
     "agrees": "green",
     "unconfirmed": "yellow",
@@ -58,7 +57,7 @@ def console() -> Screen:
 def verdict_table(content: ReportedComparison) -> Table:
     """One line per engine with settings: the worst over all points of the parameters."""
     names = columns(content)
-    before = _before(content)
+    before = seconds_before(content)
     table = plain_table(
         # Where the window is narrow those with a least width break between words, and nothing is cut.
         Column("engine formulation setting", min_width=_WORD, overflow="fold"),
@@ -84,14 +83,6 @@ def verdict_table(content: ReportedComparison) -> Table:
             Text("") if row.as_expected else Text("!!", style="bold red"),
         )
     return table
-
-
-def _before(content: ReportedComparison) -> dict[int, float]:
-    """Row -> longest time before the first step [s]; empty unless an engine takes as long as only compilers do."""
-    found: dict[int, float] = {}
-    for run in content.runs:
-        found[run.row] = max(found.get(run.row, 0.0), run.build_seconds or 0.0)
-    return found if max(found.values(), default=0.0) > _COMPILES else {}
 
 
 def _beyond(item: WorstJudgement) -> float:
