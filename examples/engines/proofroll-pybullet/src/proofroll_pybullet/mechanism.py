@@ -41,6 +41,7 @@ LACKING: Mapping[str, str] = {
 }
 _TYPES = {"fixed": "fixed", "revolute": "continuous", "prismatic": "prismatic", "spherical": "spherical"}
 _ROWS = "a loop's rows are those of the step's start, and the first step does not yet know that they turn"
+_DAMPED = "PyBullet damps all bodies by default, which shows beside friction in the first step"
 _LARGE = 1e9  # of a limit that is none: force [N], speed, travel [m]
 
 
@@ -162,7 +163,9 @@ class PybulletMechanism:
             com.append(np.array(told[3]) + _joint_of(self._mechanism, body).child_position)
             inertia.append(R @ np.diag(told[2]) @ R.T)
         moves = bool(self._mechanism.loops) and bool(np.any(self._mechanism.start()[1]))
-        soft = {name: Regularised(1.0, _ROWS) for name in ("acceleration", "angular_acceleration") if moves}
+        damped = self._settings.preset == "default" and any(joint.friction for joint in self._mechanism.joints)
+        why = Regularised(1.0, _ROWS) if moves else Regularised(2e-2, _DAMPED) if damped else None
+        soft = {} if why is None else dict.fromkeys(("acceleration", "angular_acceleration"), why)
         return MechanismBuilt(
             np.array(mass), np.array(com), np.array(inertia), gravity=self._world.gravity(), regularised=soft
         )
