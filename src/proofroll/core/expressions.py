@@ -6,6 +6,7 @@ import ast
 import math
 import operator
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from simpleeval import InvalidExpression, SimpleEval
 
@@ -17,11 +18,23 @@ _OPERATORS = {
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
     ast.Div: operator.truediv,
-    ast.Pow: lambda base, power: Quantity(base) ** power if not isinstance(base, Quantity) else base**power,
     ast.USub: operator.neg,
     ast.UAdd: operator.pos,
 }
-_LONGEST = 500  # characters: what a person writes is far shorter, and nesting stays shallow enough to be parsed
+LONGEST = 500  # characters: what a person writes is far shorter, and nesting stays shallow enough to be parsed
+
+
+def evaluator(
+    names: Mapping[str, Any], functions: Mapping[str, Callable[[Any], Any]], power: Callable[[Any, Any], Any]
+) -> SimpleEval:
+    """Evaluator of formulas with + - * / ^ ** ( ), these names and functions, and no attributes."""
+    made = SimpleEval(operators={**_OPERATORS, ast.Pow: power}, functions=dict(functions), names=dict(names))
+    del made.nodes[ast.Attribute]
+    return made
+
+
+def _power(base: Any, power: Any) -> Any:
+    return (base if isinstance(base, Quantity) else Quantity(base)) ** power
 
 
 def evaluated(
@@ -45,15 +58,14 @@ def evaluated(
         InputError: it cannot be read, names an unknown parameter, calls a function, divides by zero, overflows, adds
             what has different units, or its result has another unit.
     """
-    if len(text) > _LONGEST:
-        raise InputError(field, text, f"an expression may have at most {_LONGEST} characters")
+    if len(text) > LONGEST:
+        raise InputError(field, text, f"an expression may have at most {LONGEST} characters")
     known = {"pi": Quantity(math.pi), **names}
     called = {name: _of_ratio(name, function) for name, function in (functions or {}).items()}
-    evaluator = SimpleEval(operators=_OPERATORS, functions=called, names=known)
-    del evaluator.nodes[ast.Attribute]
     try:
         source = text.replace("^", "**").strip()
-        quantity = Quantity(0.0) + evaluator.eval(source, ast.parse(source, mode="eval").body)
+        found = evaluator(known, called, _power).eval(source, ast.parse(source, mode="eval").body)
+        quantity = Quantity(0.0) + found
         number = float(quantity.value)
     except ZeroDivisionError:
         raise InputError(field, text, "divides by zero; change the expression or its parameters") from None

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from proofroll.core.arrays import read_only
 from proofroll.core.errors import InputError, require_known
@@ -44,6 +46,15 @@ FACTS: dict[str, Facts] = {
     "planar": Facts(3, 3, (2,), _PARALLEL),
     "free": Facts(7, 6, (), ()),
 }
+
+
+def rows_of(kinds: Sequence[str]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of connections of some kinds, (2, points) and (3, angles): each with its connection, then its axes."""
+    points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
+    angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
+    return np.array(points, dtype=np.intp).reshape(-1, 2).T, np.array(angles, dtype=np.intp).reshape(-1, 3).T
+
+
 TURNING = ("revolute", "universal")  # whose coordinates are angles that go on beyond a turn
 WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
 WITH_QUATERNION = ("spherical", "free")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import math
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,7 +13,7 @@ import numpy as np
 from simpleeval import InvalidExpression, SimpleEval
 
 from proofroll.core.errors import InputError, no_such_key
-from proofroll.core.expressions import evaluated
+from proofroll.core.expressions import LONGEST, evaluated, evaluator
 from proofroll.core.parameters import Parameters
 from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism import checks
@@ -25,17 +24,10 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     name: getattr(np, {"asin": "arcsin", "atan": "arctan"}.get(name, name))
     for name in ("sin", "cos", "tan", "asin", "atan", "exp", "log", "sqrt", "tanh")
 }
-_OPERATORS = {
-    ast.Add: operator.add,
-    ast.Sub: operator.sub,
-    ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    # integers would grow for hours before they overflow
-    ast.Pow: lambda base, power: (float(base) if isinstance(base, int) else base) ** power,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-}
-_LONGEST = 500  # characters
+
+
+def _power(base: Any, power: Any) -> Any:
+    return (float(base) if isinstance(base, int) else base) ** power  # integers would grow for hours
 
 
 @dataclass(frozen=True)
@@ -55,17 +47,15 @@ class Formula:
             value = float(self.at(0.0))
         except (InvalidExpression, ArithmeticError, SyntaxError, TypeError, ValueError, RecursionError, MemoryError):
             value = math.nan
-        if len(self.text) > _LONGEST or not math.isfinite(value):
+        if len(self.text) > LONGEST or not math.isfinite(value):
             advice = "is no finite number at t = 0; use t, parameters, + - * / ^ ( ), pi and " + ", ".join(FUNCTIONS)
             raise InputError("formula", f"= {self.text}", advice)
 
     def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
         """Value at a time [s], an array of them, or a symbol, with what the functions are there."""
         names = {"pi": math.pi, **dict(self.numbers), TIME: time}
-        evaluator = SimpleEval(operators=_OPERATORS, functions=dict(functions), names=names)
-        del evaluator.nodes[ast.Attribute]
         with np.errstate(all="ignore"):
-            return evaluator.eval("", previously_parsed=self._parsed)
+            return evaluator(names, functions, _power).eval("", previously_parsed=self._parsed)
 
     @cached_property
     def _parsed(self) -> Any:

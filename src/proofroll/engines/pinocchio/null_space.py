@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesdd, dpotrf, dtrtri
 
 from proofroll.core.arrays import cross
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import FACTS, rows_of
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import independent_anywhere
 from proofroll.engines.pinocchio.joint_tree import JointTree
@@ -51,12 +51,9 @@ class LoopRows:
     def __init__(self, tree: JointTree) -> None:
         self._model, self._tree = tree.model, tree
         kinds = [loop.kind for loop in tree.mechanism.loops]
-        points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
-        angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
-        self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
-        self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
+        (self._point, self._axis), (self._angle, self._x, self._y) = rows_of(kinds)
         # whether a row's direction turns with body_a; points that coincide do so along the world's axes too
-        self._turning = np.array([len(FACTS[kinds[number]].translations) < 3 for number, _ in points]).reshape(-1, 1)
+        self._turning = np.array([len(FACTS[kinds[number]].translations) < 3 for number in self._point]).reshape(-1, 1)
         self._fixed = np.eye(3)[self._axis]
         self._loop = np.concatenate([self._point, self._angle])
         self._ends = np.array(tree.loops, dtype=np.intp).reshape(-1, 2).T

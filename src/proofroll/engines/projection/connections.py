@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from proofroll.core.arrays import cross
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.checks import Vector
-from proofroll.elements.mechanism.joint import FACTS
+from proofroll.elements.mechanism.joint import rows_of
 from proofroll.elements.mechanism.rotations import Array
 
 # Matrix of ω × from ω, its nine elements in a row; and back, from any matrix by its part that changes sign.
@@ -151,11 +151,8 @@ class Constraints:
     """
 
     def __init__(self, kinds: list[str]) -> None:
-        points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
-        angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
-        self._point, self._axis = np.array(points, dtype=np.intp).reshape(-1, 2).T
-        self._angle, self._x, self._y = np.array(angles, dtype=np.intp).reshape(-1, 3).T
-        self.owner, self.points = np.concatenate([self._point, self._angle]), len(points)
+        (self._point, self._axis), (self._angle, self._x, self._y) = rows_of(kinds)
+        self.owner, self.points = np.concatenate([self._point, self._angle]), len(self._point)
         self._sums = (self.owner == np.arange(len(kinds))[:, None]).astype(float)
 
     def at(self, ends: Ends) -> ConnectionRows:

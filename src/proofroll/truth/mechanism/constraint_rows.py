@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars, GeneralBody, Planar
@@ -87,12 +88,8 @@ class ConstraintRows:
         """All rows of a joint, loop or rolling contact."""
         if number in self._rolling:
             return self._of_rolling(number)
-        c = self._connections[number]
-        a, b = self._views[c.a], self._views[c.b]
+        c, a, b, arm_a, arm_b, d, towards = self._apart(number)
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
-        arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
-        d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
-        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
         rows = []
         facts = FACTS[c.kind]
         for k in facts.translations:
@@ -136,13 +133,17 @@ class ConstraintRows:
             return self._row(number, 0.0, bias, (_NONE, axis), (_NONE, back), (_NONE, axis))
         return self._sliding(number, axis)
 
-    def _sliding(self, number: int, n: Sequence[Scalar]) -> ConstraintRow:
-        """Row for the distance of two points along an axis that turns with body a."""
+    def _apart(self, number: int) -> tuple[Any, ...]:
+        """A connection, its bodies, the arms to its points, the way between these, and its second rate at u̇ = 0."""
         c = self._connections[number]
         a, b = self._views[c.a], self._views[c.b]
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
         d = minus(plus(b.r, arm_b), plus(a.r, arm_a))
-        towards = minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
+        return c, a, b, arm_a, arm_b, d, minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
+
+    def _sliding(self, number: int, n: Sequence[Scalar]) -> ConstraintRow:
+        """Row for the distance of two points along an axis that turns with body a."""
+        _, a, b, arm_a, arm_b, d, towards = self._apart(number)
         slide = minus(speed_at(b, arm_b), speed_at(a, arm_a))
         n_rate = cross(a.w, n)
         bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
