@@ -125,6 +125,11 @@ def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, w
     if matrix.without_forces.issuperset(column.studies):
         return " Forces are not judged there."
     name, cell = min(_engines(matrix, column, tolerance, True), key=lambda item: item[1].cost)
+    judged = [study for study in column.studies if study not in matrix.without_forces]
+    if len(judged) < len(column.studies) and math.isfinite(cell.cost):
+        return (
+            f" In {', '.join(judged)}, where forces are judged, take {_named(name, cell)} ({cell.text} s/s) for both."
+        )
     if not math.isfinite(cell.cost):
         return " If forces count, too, nothing that was run and timed holds it."
     if cell.cost == without.cost:

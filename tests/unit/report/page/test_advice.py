@@ -57,6 +57,16 @@ def test_forces_are_told_where_they_change_nothing_or_are_never_given() -> None:
     assert "with forces" in said([LINE, exact], 1e-3, forces=True)[0]
 
 
+def test_of_a_group_only_scenes_with_judged_forces_are_told() -> None:
+    """Where one scene of two has no forces that are judged, the other is named, and costs are not compared."""
+    exact = replace(FORCE, error=1e-9)
+    chain = replace(LINE, study="chain", scene="chain")
+    group = said([LINE, exact, chain], 1e-3)[0]
+    assert group.endswith(
+        "In arm, where forces are judged, take alpha joints default at dt 1e-3 s (0.01 s/s) for both."
+    )
+
+
 def test_over_all_few_formulations_cover_what_can_be_covered() -> None:
     """The one that holds most studies first, then what adds to it; studies without any are named."""
     chain = [replace(item, study="chain", scene="chain") for item in (LINE, BETA)]
