@@ -20,7 +20,7 @@ from proofroll.files.toml import study_of
 from proofroll.report.comparison.lines import lines_of
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.page.choice import ChoiceStudy, choice_matrix
+from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 from proofroll.report.page.html import templates
 from proofroll.report.page.scene_sheet import scene_sheet
 from proofroll.running.runner import Runner

@@ -19,8 +19,8 @@ from proofroll.ball_studies.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.comparison.work_precision import svg
 from proofroll.report.page.growing import write_report
+from proofroll.report.tradeoff.work_precision import svg
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
 from proofroll.studies.comparison.compare import compare

@@ -14,8 +14,8 @@ from rich.console import Console
 
 from proofroll.core.errors import ProofrollError
 from proofroll.report import labels
-from proofroll.report.comparison.work_precision import svg
 from proofroll.report.tradeoff.tables import corner_table
+from proofroll.report.tradeoff.work_precision import svg
 from proofroll.studies import study_store
 from proofroll.studies.study_store import keep
 from proofroll.studies.tradeoff.curve import Question

@@ -11,7 +11,7 @@ import pytest
 from browsing import UNDRAWN, Visit
 
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice import DECADES, ChoiceMatrix
+from proofroll.report.page.choice_matrix import DECADES, ChoiceMatrix
 from proofroll.report.page.html import choice_of
 
 Visiting = Callable[..., AbstractContextManager[Visit]]

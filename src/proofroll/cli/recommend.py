@@ -102,7 +102,7 @@ def _from_report(
     """
     from proofroll.report.against import EarlierReport
     from proofroll.report.page.advice import advice
-    from proofroll.report.page.choice import ChoiceStudy, choice_matrix
+    from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 
     lines = EarlierReport.read(path, "--report").lines
     for name in engines:

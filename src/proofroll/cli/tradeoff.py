@@ -45,8 +45,8 @@ def tradeoff(
     as_json: options.Json = False,
 ) -> None:
     """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
-    from proofroll.report.comparison.work_precision import svg
     from proofroll.report.tradeoff.tables import default_quantities, tradeoff_parts
+    from proofroll.report.tradeoff.work_precision import svg
     from proofroll.running.store import write_text
 
     claims, question = question_of(scene, settings, quantity, until)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from proofroll.core.number_format import counted, number
-from proofroll.report.page.choice import SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
+from proofroll.report.page.choice_matrix import SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
 
 _NOTHING = "nothing that was run and timed holds it"
 

@@ -19,7 +19,7 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice import ASKED, DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.choice_matrix import ASKED, DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles

@@ -8,7 +8,7 @@ from table_lines import ARM, FORCE, LINE, line
 
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice import ChoiceStudy, choice_matrix
+from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
 
 STUDIES = {name: ChoiceStudy(f"A {name}", f"c{number}", [""]) for number, name in enumerate(("arm", "chain"))}
 BETA = line(engine="beta", row=3, error=1e-9, cost=0.5)

@@ -12,7 +12,7 @@ from table_lines import ARM, FINER, FORCE, LINE, line
 
 from proofroll.core.verdict import Verdict
 from proofroll.report.long_table import TableLine
-from proofroll.report.page.choice import DECADES, NOT_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.choice_matrix import DECADES, NOT_RUN, ChoiceCell, ChoiceMatrix, ChoiceStudy, choice_matrix
 
 STUDIES = {
     "arm": ChoiceStudy("An arm", "c0", ["", "mass=2"]),
