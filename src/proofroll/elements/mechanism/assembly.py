@@ -10,7 +10,7 @@ from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.analysis import analysed, least
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
-from proofroll.elements.mechanism.kinematics import Tree
+from proofroll.elements.mechanism.kinematics import Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
@@ -39,19 +39,30 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     q, v = mechanism.start()
     free = np.concatenate([np.full(joint.nv, joint.dependent) for joint in mechanism.joints])
     for _ in range(_ROUNDS):
-        rows = tree.loop_rows(tree.at(q, v))
+        rows = _finite(tree.loop_rows(tree.at(q, v)))
         dv = np.zeros(len(v))
         dv[free] = -least(rows.C[:, free], rows.residual)
         q = tree.moved(q, dv * min(1.0, _LARGEST / max(np.abs(dv).max(initial=0.0), 1e-300)))
         if np.abs(dv).max(initial=0.0) < 1e-15:
             break
-    C = tree.loop_rows(tree.at(q, v)).C
+    C = _finite(tree.loop_rows(tree.at(q, v))).C
     v[free] = -least(C[:, free], C[:, ~free] @ v[~free])
     joints = tuple(
         replace(joint, q0=tuple(q[at_q]), v0=tuple(v[at_v]), dependent=False)
         for joint, at_q, at_v in zip(mechanism.joints, mechanism.q_slices, mechanism.v_slices, strict=True)
     )
     return replace(mechanism, joints=joints)
+
+
+def _finite(rows: Rows) -> Rows:
+    """Rows of loops that can be computed with.
+
+    Raises:
+        InputError: they are beyond all numbers.
+    """
+    if not all(np.isfinite(part).all() for part in rows):
+        raise InputError("loops", "infinite", "lengths, coordinates or velocities are too large to be computed with")
+    return rows
 
 
 def _check_inertia(mechanism: Mechanism, M: Array) -> None:
@@ -83,7 +94,7 @@ def check_start(mechanism: Mechanism) -> None:
     tree = Tree(mechanism)
     q, v = mechanism.start()
     motion = tree.at(q, v)
-    rows = tree.loop_rows(motion)
+    rows = _finite(tree.loop_rows(motion))
     for spring in mechanism.springs:
         ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
         one, two = (tree.point(motion, body, np.array(place))[0] for body, place in ends)

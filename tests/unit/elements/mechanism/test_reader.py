@@ -258,6 +258,7 @@ BAD = {
     "hostile expression": (SLIDER_CRANK.replace("= crank/2", "= __import__('os').getcwd()"), "bodies.0.com.0"),
     "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*Attribute"),
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
+    "velocity beyond numbers": (SLIDER_CRANK.replace("v0 = 10", "v0 = 1e200", 1), "loops = 'infinite'"),
     "assignment": (SLIDER_CRANK.replace("= crank/2", "= m = crank/2"), "no finite real number"),
     "complex": (SLIDER_CRANK.replace("= crank/2", "= (0-1)^0.5"), "no finite real number"),
     "text": (
