@@ -21,7 +21,6 @@ from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
-from proofroll.elements.mechanism.signal import value_at
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -30,18 +29,15 @@ PROVIDES: frozenset[str] = frozenset(
     {
         _CAPABILITY.FIXED, _CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.SPHERICAL,
         _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_SPRINGS,
-        _CAPABILITY.JOINT_FRICTION, _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS,
     }
 )  # fmt: skip
 LACKING: Mapping[str, str] = {
     _CAPABILITY.SPRINGS: "PyBullet has no springs between points",
     _CAPABILITY.UNIVERSAL: "URDF has no such joint",
-    _CAPABILITY.ARMATURE: "PyBullet's joints have no inertia of their own",
-    _CAPABILITY.STOPS: "PyBullet's limits throw back by how deep a step lands in them",
+    _CAPABILITY.JOINT_FRICTION: "PyBullet reads dry friction from a URDF and does not use it",
 }
 _TYPES = {"fixed": "fixed", "revolute": "continuous", "prismatic": "prismatic", "spherical": "spherical"}
 _ROWS = "a loop's rows are those of the step's start, and the first step does not yet know that they turn"
-_DAMPED = "PyBullet damps all bodies by default, which shows beside friction in the first step"
 _LARGE = 1e9  # of a limit that is none: force [N], speed, travel [m]
 
 
@@ -64,13 +60,7 @@ class PybulletMechanism:
         told = [self._world.getJointInfo(self._robot, index) for index in range(count)]
         self._links = {info[12].decode(): index for index, info in enumerate(told)} | {WORLD: -1}
         self._joints = [self._links[joint.child] for joint in mechanism.joints]
-        self._actuators = [(item, mechanism.joint_index[item.joint]) for item in mechanism.actuators]
-        driven = {number for _, number in self._actuators}
-        self._forced = [
-            (number, joint)
-            for number, joint in enumerate(mechanism.joints)
-            if joint.torque or joint.stiffness or joint.damping or number in driven
-        ]
+        self._forced = [joint for joint in mechanism.joints if joint.torque or joint.stiffness or joint.damping]
         for joint, index in zip(mechanism.joints, self._joints, strict=True):
             self._start(joint, index)
         for loop in mechanism.loops:
@@ -97,8 +87,7 @@ class PybulletMechanism:
             )  # fmt: skip
         if joint.nv == 1:
             self._world.resetJointState(robot, index, joint.q0[0], joint.v0[0])
-            # a motor that wants to stop the joint is dry friction; the friction of a URDF is read and not used
-            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=joint.friction)
+            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=0)
         elif joint.nv == 3:
             q = [*joint.q0[1:], joint.q0[0]]
             self._world.resetJointStateMultiDof(robot, index, q, list(joint.v0))
@@ -117,12 +106,10 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         dt = self._settings.dt
         for _ in range(whole_steps(self._steps * dt, t, dt)):
-            now = self._steps * dt
-            for number, joint in self._forced:
-                index = self._joints[number]
+            for joint in self._forced:
+                index = self._links[joint.child]
                 q, v, *_ = self._world.getJointState(self._robot, index)
-                force = value_at(joint.torque, now) - joint.stiffness * (q - joint.rest) - joint.damping * v
-                force += sum(item.effort(now, q, v) for item, at in self._actuators if at == number)
+                force = joint.torque - joint.stiffness * (q - joint.rest) - joint.damping * v
                 self._world.setJointMotorControl2(self._robot, index, self._world.TORQUE_CONTROL, force=force)
             self._world.stepSimulation()
             self._steps += 1
@@ -146,11 +133,7 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`; PyBullet's reactions of chains are not those, so none is given."""
         motion = self._tree.at(*self._state())
         turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
-        now = self._steps * self._settings.dt
-        states = [self._world.getJointState(self._robot, self._joints[number]) for _, number in self._actuators]
-        told = zip(self._actuators, states, strict=True)
-        effort = np.array([item.effort(now, state[0], state[1]) for (item, _), state in told]) if states else None
-        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned, effort=effort)
+        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -163,9 +146,7 @@ class PybulletMechanism:
             com.append(np.array(told[3]) + _joint_of(self._mechanism, body).child_position)
             inertia.append(R @ np.diag(told[2]) @ R.T)
         moves = bool(self._mechanism.loops) and bool(np.any(self._mechanism.start()[1]))
-        damped = self._settings.preset == "default" and any(joint.friction for joint in self._mechanism.joints)
-        why = Regularised(1.0, _ROWS) if moves else Regularised(2e-2, _DAMPED) if damped else None
-        soft = {} if why is None else dict.fromkeys(("acceleration", "angular_acceleration"), why)
+        soft = {name: Regularised(1.0, _ROWS) for name in ("acceleration", "angular_acceleration") if moves}
         return MechanismBuilt(
             np.array(mass), np.array(com), np.array(inertia), gravity=self._world.gravity(), regularised=soft
         )
