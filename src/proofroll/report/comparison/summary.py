@@ -29,8 +29,13 @@ from proofroll.studies.comparison.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.comparison.planning import at_point, point_name
 
 
+def reported_rows(outcome: Outcome) -> list[ReportedRow]:
+    """Summary of each row of a comparison."""
+    return [_row(runs) for runs in by_row(outcome).values()]
+
+
 def outcome_content(outcome: Outcome) -> ReportedComparison:
-    """A comparison's findings."""
+    """Content of a comparison's section in a report."""
     comparison = outcome.comparison
     rows = by_row(outcome)
     numbers = {key: number for number, key in enumerate(rows)}
@@ -57,7 +62,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
             name: ShownBand(band.because, {key: in_words(bound) for key, bound in band.bounds.items()})
             for name, band in comparison.bands.items()
         },
-        rows=[_row(runs) for runs in rows.values()],
+        rows=reported_rows(outcome),
         runs=[_run(run, numbers[id(run.row)]) for run in outcome.runs],
         hosts=hosts(run.result for run in outcome.runs),
         budget=comparison.budget,

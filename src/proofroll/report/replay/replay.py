@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 from proofroll.files.trajectory_file import read_some
-from proofroll.report.comparison.summary import outcome_content, runs_at
+from proofroll.report.comparison.summary import reported_rows, runs_at
 from proofroll.report.labels import names
 from proofroll.report.pages import packed
 from proofroll.report.replay.library import three
@@ -126,7 +126,7 @@ def distance(path: FloatArray, true: FloatArray) -> float:
 
 def _looks(outcome: Outcome) -> list[tuple[str, int]]:
     """Name and colour of each row, as in the comparison's figures."""
-    rows = outcome_content(outcome).rows
+    rows = reported_rows(outcome)
     return [(name, style.colour) for name, style in zip(names(rows), styles(rows), strict=True)]
 
 
