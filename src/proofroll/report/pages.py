@@ -45,7 +45,7 @@ def folded(html: str) -> str:
     """A page whose closed folds (``<details>``) are built when they are opened.
 
     What follows the summary of each is moved into the element with the id ``folds``, compressed; ``templates/page.js``
-    puts it back. A fold within a fold is one of its own. Browsers so read, place and paint what is open alone.
+    puts it back. A fold within a fold is one of its own, and one with the attribute ``data-whole`` stays as it is. Browsers so read, place and paint what is open alone.
     """
     texts: list[str] = []
     levels: list[list[str]] = [[]]
@@ -56,7 +56,7 @@ def folded(html: str) -> str:
             levels[-1].append(f'<div data-fold="{len(texts) - 1}"></div>')
         levels[-1].append(piece)
         if piece.startswith("<details"):
-            closed.append(not piece.endswith(" open>"))
+            closed.append(not piece.endswith((" open>", " data-whole>")))
         elif piece == "</summary>" and closed[-1]:
             levels.append([])
     kept = packed(json.dumps(texts, ensure_ascii=False).encode("utf-8", "replace"))
