@@ -45,7 +45,8 @@ def folded(html: str) -> str:
     """A page whose closed folds (``<details>``) are built when they are opened.
 
     What follows the summary of each is moved into the element with the id ``folds``, compressed; ``templates/page.js``
-    puts it back. A fold within a fold is one of its own, and one with the attribute ``data-whole`` stays as it is. Browsers so read, place and paint what is open alone.
+    puts it back. A fold within a fold is one of its own, and one with the attribute ``data-whole`` stays as it is.
+    Browsers so read, place and paint what is open alone.
     """
     texts: list[str] = []
     levels: list[list[str]] = [[]]
