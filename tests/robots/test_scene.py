@@ -96,10 +96,6 @@ def test_engines_follow_the_truth_of_a_robot(robot, name, monkeypatch):
     true = truth(scene, np.linspace(0, 0.2, 3))
     assert true.positions.attrs["error_bar"] < 1e-12
     for engine, tolerance in (("mujoco", 1e-8), ("pinocchio", 1e-8), ("exudyn", 1e-3)):
-        if (engine, name) == ("exudyn", "moving.xml"):
-            with pytest.raises(Refused, match="inertia of drives, and Exudyn's joints between bodies have no inertia"):
-                simulate(scene, "exudyn[formulation=redundant]", until=0.2)
-            continue
         run = simulate(scene, engine, until=0.2, every=0.1)
         for quantity in ("positions", "forces", "torques", "attitudes"):
             scale = float(np.nanmax(np.abs(true[quantity])))

@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from proofroll.core.engine_abilities import Term
-from proofroll.core.errors import Refused
+from proofroll.core.errors import Missing
 from proofroll.elements.ball_on_surface.compiled import library
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.scene_file import load_scene
@@ -128,5 +128,5 @@ def test_the_whole_without_engines(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without heyoka there is nothing to measure, in one line."""
     monkeypatch.setattr(library, "available", lambda: False)
-    with pytest.raises(Refused, match="bench reference needs heyoka"):
+    with pytest.raises(Missing, match="bench reference needs heyoka"):
         bench.reference(2, lambda _: None)

@@ -12,6 +12,7 @@ from proofroll.core.time_grid import EVERY, time_grid
 from proofroll.core.turns import doubt, on_turns_of, samples_between
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import build, recorded
+from proofroll.studies.judging.held_against import observed
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.versions.difference import _apart
 
@@ -89,7 +90,7 @@ def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
     assert list(found.unjudged) == ["turns of q.pivot"]
     reference = Reference.of(scene, proofroll.simulate(scene, until=UNTIL, every=5.0))
     off = run.assign({"q.pivot": run["q.pivot"] + 0.1})
-    assert reference.observed(off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
+    assert observed(reference, off)["q.pivot"][-1] == pytest.approx(fine["q.pivot"] + 0.1, abs=1e-6)
 
 
 def test_turns_that_nobody_knows_are_no_difference() -> None:

@@ -168,7 +168,7 @@ def test_tolerances_of_another_form(text: object) -> None:
         ("ladder = [1, 0.5, 0.25]", "ladder = [1, 0.5, -0.25]", ["rows.1.ladder"]),
         ("only = { speed = [4] }", "only = { sped = [4] }", ["rows.1.only", "sped", "varies speed"]),
         ("only = { speed = [4] }", "only = { speed = [5] }", ["rows.1.only.speed = 5", "has only 2, 4"]),
-        ('N = "0.1 %"', 'n = "0.1 %"', ["tolerances.tight", "'n'", "no such observable; choose from gamma, z, N"]),
+        ('N = "0.1 %"', 'n = "0.1 %"', ["tolerances.tight", "'n'", "choose from gamma, z, attitude, N"]),
         ('scene = "sphere_in_cylinder"', 'scene = "sphere"', ["scene = 'sphere'"]),
         ('expect_for = { N', 'expect_for = { n', ["rows.1", "'n'", "no such observable"]),
         ("order = { z", "order = { y", ["rows.1", "'y'", "no such observable"]),

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 from proofroll_dart import Dart
 
-from proofroll.elements.mechanism.capabilities import required
-from proofroll.elements.mechanism.sampling import mechanism_of
-from proofroll.files.scene_file import load_scene
-from proofroll.truth.mechanism.switched_truth import truth_of
+import proofroll
 
 
 @pytest.mark.parametrize(
@@ -15,13 +12,13 @@ from proofroll.truth.mechanism.switched_truth import truth_of
 )
 def test_laws_are_those_of_the_scene(name: str, error: float) -> None:
     """After 0.5 s at a step of 1 ms a mass is where it should be, as far as a first-order step brings it."""
-    scene = load_scene(name)
+    scene = proofroll.load_scene(name)
     engine = Dart.build(scene, Dart.presets["world"]["default"])
     engine.advance(0.5)
-    truth = truth_of(mechanism_of(scene), np.array([0.0, 0.5]))
-    assert np.max(np.abs(engine.sample().p_WB - truth.record.p_WB[1])) < error
+    truth = proofroll.simulate(scene, until=0.5, every=0.5)
+    assert np.max(np.abs(engine.sample().p_WB - truth["p_WB"].to_numpy()[1])) < error
 
 
 def test_equations_without_steps_have_no_stops() -> None:
     """Laws that switch are not among the capabilities of the formulation that scipy integrates."""
-    assert not required(mechanism_of(load_scene("stop"))) <= Dart.provides["forward_dynamics"]
+    assert not proofroll.load_scene("stop").requires <= Dart.provides["forward_dynamics"]

@@ -10,6 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
+from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
@@ -47,9 +48,20 @@ _SHAPES = {
 }
 
 
+def _require_readable(built: MechanismBuilt) -> None:
+    """Rejects what is of another shape or kind than the protocol says.
+
+    Raises:
+        Diverged: it is; with the name of the field.
+    """
+    require_shapes(built, _SHAPES)
+    if not isinstance(built.contact_family, str | None):
+        raise Diverged("the engine's built() gave contact_family that is no text")
+
+
 def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismSample) -> list[Line]:
     """Compares what was built, and the sample at time 0, with the mechanism; silence has a line that says so."""
-    require_shapes(built, _SHAPES)
+    _require_readable(built)
     mechanism, start, found = element.mechanism, element.start, element.first_motion
     lines: list[Line] = []
 

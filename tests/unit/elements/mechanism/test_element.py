@@ -129,13 +129,21 @@ def test_how_far_a_model_may_soften_says_why() -> None:
 
 @pytest.mark.parametrize("wrong", [np.zeros((2, 5)), "heavy"], ids=["shape", "text"])
 @pytest.mark.parametrize(
-    "name", [item.name for item in dataclasses.fields(MechanismBuilt) if item.name != "regularised"]
+    "name",
+    [item.name for item in dataclasses.fields(MechanismBuilt) if item.name not in {"regularised", "contact_family"}],
 )
 def test_what_is_built_of_another_shape_is_named(name: str, wrong: object) -> None:
     """Whatever an engine says that it built is of the shape that the protocol says, or the field is named."""
     element = element_of("slider_crank")
     with pytest.raises(Diverged, match=rf"^the engine's built\(\) gave {name} (with shape|that is no array)"):
         noticed(element, dataclasses.replace(right(element), **{name: wrong}))
+
+
+def test_a_family_of_contact_is_a_text() -> None:
+    """Numbers where the name of a law of contact belongs are named."""
+    element = element_of("slider_crank")
+    with pytest.raises(Diverged, match="gave contact_family that is no text"):
+        noticed(element, dataclasses.replace(right(element), contact_family=np.zeros(3)))
 
 
 @pytest.mark.parametrize(
