@@ -13,8 +13,9 @@ import numpy as np
 from proofroll.conformance.subject import Subject, UnlikeSceneError, truth_scenes
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import first_difference
-from proofroll.core.dataset import columns_of, scales
+from proofroll.core.dataset import columns_of, part, scales
 from proofroll.core.engine import precision_of
+from proofroll.core.events import events_of
 from proofroll.core.first_steps import MOST, first_steps, softness
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
@@ -33,6 +34,8 @@ _MOST = 0.1
 # An error is at most twice the change from a step to its half; as much again is spared for the terms beyond the first.
 _MARGIN = 4.0
 _ROUND_OFF = 1e-8
+# So long before and after an event [s] all but what jumps is the same.
+_MOMENT = 1e-7
 
 
 def first_steps_fit_the_scene(subject: Subject) -> None:
@@ -55,6 +58,7 @@ def moves_as_the_truth(subject: Subject) -> None:
     finer = _moved(subject.finer(0.5), times, true) if step is not None else moved
     soft = softness(subject.build(), subject.scene)
     sizes = _sizes(subject.scene, times[-1], true)
+    beside = _beside_events(subject.scene, step or 0.0, true)
     for name, values in moved.items():
         error, change = (
             float(np.max(np.abs(values - other))) / sizes[name] for other in (true[name].to_numpy()[1:], finer[name])
@@ -62,7 +66,7 @@ def moves_as_the_truth(subject: Subject) -> None:
         # The speed may be many times what gravity adds to it; a tolerance is relative to it.
         size = float(np.max(np.abs(true[name].to_numpy()))) / sizes[name]
         rough = max(_ROUND_OFF, 10 * subject.closeness, round_off_of(precision_of(subject.settings), size))
-        allowed = min(_MOST, _MARGIN * change + soft + rough)
+        allowed = min(_MOST, _MARGIN * change + soft + rough + beside.get(name, 0.0) / sizes[name])
         if error > allowed or math.isnan(error):
             made = f"of what gravity makes of it in {times[-1]:.2g} s"
             raise UnlikeSceneError(subject, f"{name} is off by {error:.2g} {made}, allowed {allowed:.2g}")
@@ -101,6 +105,26 @@ def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
     wanted = [name for name, item in scene.observables.items() if item.role == Role.REACTION and item.headline]
     sizes = scales(scene, true)
     return {name: size for name, size in (found | {name: sizes[name] for name in wanted}).items() if name in true}
+
+
+def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, float]:
+    """Error of what jumps one step [s] beside an event, which half a step may share; nothing where nothing jumps.
+
+    The place is off by the jump's way; the jump itself by how far a step turns what meets.
+    """
+    found: dict[str, float] = {}
+    for element in scene.elements:
+        at = [event.time for event in events_of(part(scene, element, true)) if event.time > _MOMENT]
+        if not at or not step:
+            continue
+        around = sorted({0.0, *(time + moment for time in at for moment in (-_MOMENT, _MOMENT))})
+        own = part(scene, element, _trajectory(scene.digest, tuple(around)))
+        changes = {name: np.abs(np.diff(own[name].to_numpy(), axis=0))[1::2] for name in ("v_WB", "w_WB")}
+        jumps = {name: float(np.max(change)) for name, change in changes.items()}
+        turn = step * float(np.max(np.abs(own["v_WB"].to_numpy()))) / element.length
+        errors = {"p_WB": step * jumps["v_WB"], **{name: turn * jump for name, jump in jumps.items()}}
+        found |= {scene.label(element, name): error for name, error in errors.items()}
+    return found
 
 
 @cache
