@@ -18,8 +18,10 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 WIDTH, MOST_HEIGHT, DENSITY = 1280, 1100, 2
 # A page of text and flat cells has few colours; a palette makes the file a third as large.
 COLOURS = 64
-# The first table of verdicts, row for row: what the comparison file calls it, and its verdict.
-ROWS = """() => [...document.querySelector(".matrix").querySelectorAll("tbody tr:not(.group)")].map((row) =>
+# The first table of verdicts, which is not that of choice.
+VERDICTS = ".matrix:not(#choice)"
+# Row for row: what the comparison file calls it, and its verdict.
+ROWS = """(table) => [...document.querySelector(table).querySelectorAll("tbody tr:not(.group)")].map((row) =>
   [row.querySelector("th").title, row.querySelector(".v").textContent.trim().split(" ")[1]])"""
 
 
@@ -41,11 +43,11 @@ def screenshot(report: Path, picture: Path) -> None:
             viewport={"width": WIDTH, "height": MOST_HEIGHT}, device_scale_factor=DENSITY, color_scheme="light"
         )
         page.goto(report.resolve().as_uri())
-        end = page.locator(".matrix").first.evaluate("(table) => table.getBoundingClientRect().bottom + 16")
+        end = page.locator(VERDICTS).first.evaluate("(table) => table.getBoundingClientRect().bottom + 16")
         area: Any = {"x": 0, "y": 0, "width": WIDTH, "height": min(end, MOST_HEIGHT)}
         image = Image.open(io.BytesIO(page.screenshot(clip=area)))
         said = PngInfo()
-        said.add_text("verdicts", json.dumps(page.evaluate(ROWS)))
+        said.add_text("verdicts", json.dumps(page.evaluate(ROWS, VERDICTS)))
         browser.close()
     image.convert("RGB").quantize(COLOURS, dither=Image.Dither.NONE).save(picture, optimize=True, pnginfo=said)
 

@@ -12,10 +12,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 from tiny import Tiny
+from typer.testing import CliRunner
 
 import proofroll
+from proofroll.cli import app
 from proofroll.core.errors import InputError
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.sampling import BallSample
@@ -161,6 +164,17 @@ def test_quaternions_of_the_other_sign_are_the_same() -> None:
     alone = {name: given[name] for name in ("time", "q_WB")}
     for run in (given, alone, {name: values[2:] for name, values in given.items()}):
         assert proofroll.judge(run, "pendulum", {"q_WB": 1e-3}).agrees
+
+
+def test_a_file_that_run_wrote_knows_its_scene(tmp_path: Path) -> None:
+    """`judge FILE` alone takes scene and parameters from the file; of one without it asks for the scene."""
+    path = str(tmp_path / "run.nc")
+    given = ["--engine", "projection", "--until", "0.1", "--set", "length=2", "--out", path]
+    assert CliRunner().invoke(app, ["run", "pendulum", *given]).exit_code == 0
+    done = CliRunner().invoke(app, ["judge", path])
+    assert (done.exit_code, done.output.splitlines()[0]) == (0, "agrees with the truth of pendulum")
+    xr.load_dataset(path, engine="scipy").drop_attrs().to_netcdf(other := tmp_path / "other.nc", engine="scipy")
+    assert CliRunner().invoke(app, ["judge", str(other)]).exit_code != 0
 
 
 @pytest.mark.parametrize("scene", ["inclined_plane", "pendulum"])

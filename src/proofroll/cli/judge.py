@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -33,11 +35,14 @@ def judge(
     from proofroll.files.trajectory_file import CSV, NETCDF, STORED
     from proofroll.studies.judging import judge as judging
 
-    if (named is None) == (scene is None):
+    written: Mapping[str, object] = {}
+    if named is None and scene is None:
+        scene, written = _told_by(run)
+    if (named is None) == (not scene):
         raise InputError("scene", scene or "", "name it once: proofroll judge FILE --scene SCENE")
     if named is not None and run.suffix not in (NETCDF, CSV, STORED) and Path(named).suffix in (NETCDF, CSV, STORED):
         run, named = Path(named), str(run)
-    loaded = load_scene(scene or str(named), **options.assignments(settings))  # type: ignore[arg-type]  # text is checked there
+    loaded = load_scene(scene or str(named), **{**written, **options.assignments(settings)})  # type: ignore[arg-type]  # text is checked there
     bounds = options.assignments(tolerance, "--tolerance") if tolerance else None
     with options.spinner(f"the truth of {loaded.name}"):
         judged = judging.judge(run, loaded, bounds, because=because)
@@ -46,3 +51,16 @@ def judge(
     else:
         sys.stdout.write(f"{judged}\n")
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)
+
+
+def _told_by(run: Path) -> tuple[str, Mapping[str, object]]:
+    """Scene and parameters that `proofroll run --out` wrote into a file; no name where there are none."""
+    from proofroll.files.trajectory_file import read
+
+    try:
+        said = read(run).attrs
+        parameters = json.loads(str(said.get("parameters", "{}")))
+    except (OSError, ValueError):
+        return "", {}
+    name = str(said.get("scene_path", said.get("scene", "")))
+    return name, parameters if isinstance(parameters, dict) else {}
