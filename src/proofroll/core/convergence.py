@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +25,8 @@ _ONE_SHAPE = 0.3
 # Changes that grow by more are no law's: halving the step makes four of h^-2. Times that are told in whole steps change
 # by ratios of small integers, 9/2 among them, which this is none of.
 _GROWS = 22**0.5
+# A floor of single precision is below this part of the motion, and shorter steps are so many times worse.
+_LARGE, _WORSE = 0.1, 1.5
 # Differences that shrink more slowly than this say nothing about a limit.
 _NO_CONVERGENCE = 0.25
 
@@ -179,6 +181,23 @@ def floor_text(step: float, error: float, unit: str, worse: bool) -> str:
     if not worse:
         return "no order shows in single precision"
     return f"best step {number(step)} s, floor {number(error)}{'' if unit == '1' else f' {unit}'}: single precision"
+
+
+def floor_of(errors: Mapping[float, float], scale: float, unit: str) -> str:
+    """Clause about what ends a refinement in single precision; empty where its steps are still too long for any order.
+
+    A floor is told where shorter steps are clearly worse than the best, whose error is small: on the way to the order
+    of a scheme the errors of long steps may be as large as the motion, and rise a little with shorter ones, too.
+
+    Args:
+        errors: by step [s].
+        scale: size of the observable.
+        unit: of the errors; 1: none.
+    """
+    best, least = min(errors, key=lambda step: errors[step]), min(errors)
+    if errors[best] > _LARGE * scale:
+        return ""
+    return floor_text(best, errors[best], unit, worse=errors[least] > _WORSE * errors[best])
 
 
 def size(values: FloatArray) -> float:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from proofroll.core.convergence import richardson, tightest
+from proofroll.core.convergence import floor_of, richardson, tightest
 
 T = np.linspace(0, 2, 21)
 LIMIT = np.sin(3 * T)
@@ -150,3 +150,16 @@ def test_changes_of_round_off_are_no_slow_convergence(ratio: float) -> None:
     found = tightest([values, values + digits, values + digits + ratio * digits])
     assert found.shown
     assert found.error_bar == pytest.approx(digits * max(1.0, ratio), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("errors", "told"),
+    [
+        ({4e-3: 0.49, 2e-3: 0.51, 1e-3: 0.513}, ""),  # Euler on a top: as large as the motion in doubles, too
+        ({4e-3: 3e-4, 2e-3: 2e-5, 1e-3: 2.1e-5}, "no order shows in single precision"),
+        ({4e-3: 1e-5, 2e-3: 2e-6, 1e-3: 9e-6}, "best step 2e-3 s, floor 2e-6 m: single precision"),
+    ],
+)
+def test_a_floor_is_told_where_shorter_steps_are_worse(errors: dict[float, float], told: str) -> None:
+    """Errors of the size of the motion are no floor, nor are those that hardly rise."""
+    assert floor_of(errors, 1.0, "m") == told

@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.beside_events import beside_events
 from proofroll.core.comparison import Band, Comparison
-from proofroll.core.convergence import Limit, floor_text, richardson, tightest
+from proofroll.core.convergence import Limit, floor_of, richardson, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
@@ -181,7 +181,7 @@ def _judgements(
             continue
         true, bar = reference.true(name, curve)
         scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
-        limit = _with_floor(run, name, _limit(run, name, curves), curves, true, unit)
+        limit = _with_floor(run, name, _limit(run, name, curves), curves, true, scale, unit)
         judgement = judge_curve(
             name,
             unit,
@@ -243,6 +243,7 @@ def _with_floor(
     limit: Limit | None,
     curves: dict[float, dict[str, FloatArray]],
     true: FloatArray,
+    scale: float,
     unit: str,
 ) -> Limit | None:
     """The limit, or in single precision without one what ended the refinement."""
@@ -251,9 +252,8 @@ def _with_floor(
         return limit
     if facts.precision == "double":
         return limit
-    errors = {factor: largest_difference(found[name], true) for factor, found in curves.items()}
-    best = min(errors, key=lambda factor: errors[factor])
-    return replace(limit, floor=floor_text(facts.step * best, errors[best], unit, best > min(errors)))
+    errors = {facts.step * factor: largest_difference(found[name], true) for factor, found in curves.items()}
+    return replace(limit, floor=floor_of(errors, scale, unit))
 
 
 def _with_events(
