@@ -100,8 +100,9 @@ def test_what_is_folded_is_built_when_it_is_opened(everything: Any, tmp_path: Pa
         assert seen.page.locator("#c1 [data-engine='alpha']").count() > 0
         assert seen.page.locator("#c1 [data-engine='alpha']:visible").count() == 0
     with visit(both, before=UNDRAWN) as seen:
-        seen.page.evaluate("stored('folds').then(() => dispatchEvent(new Event('beforeprint')))")
-        assert seen.page.locator("[data-fold]:not(.run > *)").count() == 0
+        # the texts are read when the browser is idle
+        left = "document.querySelectorAll('[data-fold]:not(.run > *)').length"
+        seen.wait(f"(dispatchEvent(new Event('beforeprint')), {left} === 0)")
         assert seen.page.locator("#c1 .matrix").count() == 2
         assert seen.page.locator(".run > [data-fold]").count() == 16
         seen.unfold()
@@ -163,8 +164,13 @@ def test_zoom_in_one_figure_is_zoom_in_all(drawn: Visit) -> None:
     assert len(set(ranges)) == 1
     assert [float(end) for end in ranges[0].split()] == pytest.approx([0.25, 0.5], abs=0.02)
     assert drawn.page.evaluate("told") == count
-    mouse.dblclick(left, top)
-    drawn.wait("drawn.every((element) => element.layout.xaxis.range[1] >= 1)")
+    whole = "drawn.every((element) => element.layout.xaxis.range[1] >= 1)"
+    for _ in range(20):  # two clicks that a busy machine takes apart are no double one
+        mouse.dblclick(left, top)
+        drawn.page.wait_for_timeout(500)
+        if drawn.page.evaluate(whole):
+            break
+    drawn.wait(whole)
 
 
 def test_pointer_in_one_figure_shows_the_time_in_all(drawn: Visit) -> None:
