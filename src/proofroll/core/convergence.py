@@ -186,8 +186,8 @@ def floor_text(step: float, error: float, unit: str, worse: bool) -> str:
 def floor_of(errors: Mapping[float, float], scale: float, unit: str) -> str:
     """Clause about what ends a refinement in single precision; empty where its steps are still too long for any order.
 
-    A floor is told where shorter steps are clearly worse than the best, whose error is small: on the way to the order
-    of a scheme the errors of long steps may be as large as the motion, and rise a little with shorter ones, too.
+    A floor counts where shorter steps are clearly worse than the best and the best error is small: before the order
+    of a scheme shows, errors may be as large as the motion and rise a little with shorter steps, too.
 
     Args:
         errors: by step [s].
