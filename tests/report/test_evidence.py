@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.dataset import observe
 from proofroll.core.number_format import error
@@ -27,6 +28,7 @@ from proofroll.report.page.records import report_content
 from proofroll.report.styles import OUTLINES, styles
 from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import Outcome
+from proofroll.studies.comparison.planning import point_name
 
 
 def test_rough_curves_keep_extrema_ends_and_gaps() -> None:
@@ -78,6 +80,22 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
         assert len(drawn[key].at or ()) < times.size / 5
         largest = max(abs(value) for value in drawn[key].difference if value is not None)
         assert error(largest, 3) == error(judgement.error, 3), key
+
+
+def test_turns_that_no_sample_tells_are_no_error_of_a_curve(made: tuple[Outcome, Store], tmp_path: Path) -> None:
+    """An angle whose turns are uncertain is drawn on the turns of the truth, as it is judged, in a short run too."""
+    outcome, run = made[0], made[0].runs[0]
+    store, point = Store(tmp_path / "cases"), outcome.points[point_name(run.parameters)]
+    assert run.case is not None
+    assert point.reference is not None
+    turned = point.reference.dataset.copy(deep=True).isel(time=slice(30))
+    turned["gamma"] = turned["gamma"] + 1e-3 + 4 * np.pi
+    turned["gamma"].attrs |= {UNCERTAIN: "samples are far apart", PERIOD: 2 * np.pi}
+    write(turned, store.trajectory(run.case))
+    one = dataclasses.replace(outcome, runs=[run])
+    gamma = next(item for item in point_curves(one, store)[0].observables if item.name == "gamma")
+    assert gamma.engines[0].difference[:30] == pytest.approx([1e-3] * 30)
+    assert gamma.engines[0].difference[30] is None
 
 
 def test_tolerances_and_limits_go_with_the_curves(made: tuple[Outcome, Store]) -> None:
