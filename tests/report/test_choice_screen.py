@@ -12,7 +12,6 @@ from browsing import UNDRAWN, Visit
 
 from proofroll.report.page.advice import advice
 from proofroll.report.page.choice_matrix import DECADES, ChoiceMatrix
-from proofroll.report.page.html import choice_of
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
 SHOWN = """[...document.querySelectorAll('#choice tbody tr')].map((row) =>
@@ -29,7 +28,8 @@ def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
 @pytest.fixture
 def matrix(everything: Any) -> ChoiceMatrix:
     """The matrix of the page."""
-    return choice_of(everything.content)
+    found: ChoiceMatrix = everything.content.choice
+    return found
 
 
 def expected(matrix: ChoiceMatrix, decade: int, forces: bool) -> list[list[list[str]]]:

@@ -22,14 +22,16 @@ from proofroll.report.comparison.sentences import conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.comparison.verdict_matrix import counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
+from proofroll.report.page.choice_matrix import EVERYDAY, choice_matrix
 from proofroll.report.page.html import page, templates
 from proofroll.report.page.records import report_content
 from proofroll.report.page.summary import three_sentences
 from proofroll.report.terminal.tables import closing_lines, verdict_table
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store
-from proofroll.studies.comparison.outcome import Outcome, Run
+from proofroll.studies.comparison.outcome import LadderRun, Outcome, Run
 
+NOTHING = choice_matrix([], {})
 TRUE = np.sin(np.linspace(0, 2, 21))
 OTHER = Limit(TRUE + 0.05, 2e-4, 1.0)
 SCATTERED = richardson([TRUE + off for off in (0.05, -0.04, 0.06)], (4, 2, 1), 1)
@@ -127,11 +129,11 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     result = Result(Status.REFUSED, "no wall, no ball")
     refused = dataclasses.replace(run, result=result, judgements=[], contradictions=[], missing=[])
     content = outcome_content(with_runs(made[0], {number: [refused]}))
-    found = conclusions(content, [], None)
+    found = conclusions(content, NOTHING, [], None)
     assert "1 refuses the scene, or some case of it, with the reason" in found.answer
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
-    assert "; 1 refuses the scene or a case of it" in three_sentences([content], {})[0]
+    assert "; 1 refuses the scene or a case of it" in three_sentences([content], {}, NOTHING)[0]
     text = whole(page(report_content([with_runs(made[0], {number: [refused]})], made[1], ""), [[]], {}, None))
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
@@ -176,13 +178,13 @@ def test_what_could_not_be_judged_is_not_said_to_be_as_expected(made: tuple[Outc
     runs = {rows.index(run.row): [answered(run)] for run in made[0].runs}
     content = outcome_content(with_runs(made[0], runs))
     assert closing_lines(content)[-1].startswith("Every verdict is as")
-    assert "All of this was expected." in conclusions(content, [], None).answer
+    assert "All of this was expected." in conclusions(content, NOTHING, [], None).answer
     assert counted(content).endswith("; as expected")
     nothing = Result(Status.NO_TRUTH, "there is no truth here")
     runs[0] = [dataclasses.replace(run, result=nothing, judgements=[]) for run in runs[0]]
     content = outcome_content(with_runs(made[0], runs))
     assert "Nothing contradicts the comparison file; 1 of its runs could not be judged." in closing_lines(content)
-    assert "Nothing of it was unexpected." in conclusions(content, [], None).answer
+    assert "Nothing of it was unexpected." in conclusions(content, NOTHING, [], None).answer
     assert counted(content).endswith("; nothing is contradicted")
 
 
@@ -196,7 +198,7 @@ def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
     assert row.remarks == ["rests on the same equations as the truth itself (alike)"]
     assert "◐ incomplete*" in printed(content, 100)
     assert counted(content) == "4 settings: ✓ 1 agrees, ◐ 1 incomplete, ✗ 2 differs; as expected"
-    said = three_sentences([content], {})[0]
+    said = three_sentences([content], {}, NOTHING)[0]
     assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth everywhere")
 
 
@@ -219,9 +221,31 @@ def test_the_page_says_all_of_it(outcome: Outcome, made: tuple[Outcome, Store], 
 def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
     """A row that shares the truth's equations is not named as the closest, however small its error is."""
     content = outcome_content(made[0])
-    assert "closest is alpha fine matched" in three_sentences([content], {})[0]
+    assert "closest is alpha fine matched" in three_sentences([content], {}, NOTHING)[0]
     content.rows[0] = dataclasses.replace(content.rows[0], shared="rests on the same equations")
-    assert "closest is alpha fine default" in three_sentences([content], {})[0]
+    assert "closest is alpha fine default" in three_sentences([content], {}, NOTHING)[0]
+
+
+@pytest.mark.parametrize("coarse", [0.19999999, 0.2, 0.20000001])
+def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
+    made: tuple[Outcome, Store], coarse: float
+) -> None:
+    """With settings and rungs that cost nearly the same the first page, the comparison and the matrix name one."""
+    runs: dict[int, list[Run]] = {0: [], 1: []}
+    for run in made[0].runs:
+        number = made[0].comparison.rows.index(run.row)
+        if number < 2:
+            fine = dataclasses.replace(run.result, timings=[0.2], seconds_per_second=0.2)
+            rung = dataclasses.replace(run.result, timings=[coarse], seconds_per_second=coarse)
+            step = LadderRun(4e-3, rung, {item.observable: 1e-8 for item in run.judgements})
+            runs[number].append(dataclasses.replace(run, result=fine, rungs=[step]))
+    content = report_content([with_runs(made[0], runs)], made[1], "proofroll report invented")
+    (column,) = content.choice.columns
+    name, cell = content.choice.cheapest(column, EVERYDAY, forces=True)
+    assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
+    assert f"{column.group}: {name} ({cell.text} s/s)" in content.findings.sentences[2]
+    assert content.comparisons[0].evidence
+    assert f"the cheapest is {cell.name}: {cell.text} s" in content.comparisons[0].evidence.findings.answer
 
 
 def test_every_verdict_is_documented() -> None:

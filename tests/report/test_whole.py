@@ -11,6 +11,7 @@ import pytest
 from invented import further, stability_study, tradeoff_study
 
 from proofroll.core.errors import ProofrollError
+from proofroll.report.page.choice_matrix import choice_matrix
 from proofroll.report.page.growing import Report, begun
 from proofroll.report.page.html import page
 from proofroll.report.page.summary import three_sentences
@@ -96,9 +97,8 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
-    assert found[2].startswith("For z to 1e-4 m in sphere_in_cylinder use good only tuned at dt 1e-3 s")
-    assert "use alpha fine default" in three_sentences(report.content.comparisons, {})[2]
-    nothing = three_sentences([], {})
+    assert found[2] == report.content.choice.answer(1e-3, forces=True)
+    nothing = three_sentences([], {}, choice_matrix([], {}))
     assert len(nothing) == 3
     assert all(sentence.endswith(".") for sentence in nothing)
 

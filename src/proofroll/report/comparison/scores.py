@@ -1,17 +1,13 @@
-"""Scores of a comparison's rows: distance from the truth over all cases, and the row to use at each accuracy."""
+"""Distance of a comparison's rows from the truth, over all cases."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import ReportedComparison, ReportedRun
-
-DECADES = range(1, 14)
-# The error of motion and forces, relative to their sizes, for which the first paragraphs name a setting.
-EVERYDAY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -52,54 +48,6 @@ def scores(content: ReportedComparison) -> list[Score]:
         motion, forces = (_relative(runs, group) if everywhere else None for group in (coordinates, forces_of))
         found.append(Score(index, name, motion, forces, row.seconds_per_second))
     return found
-
-
-@dataclass(frozen=True)
-class CheapestRow:
-    """The cheapest row within a bound: its number, name, error and cost."""
-
-    row: int
-    name: str
-    error: float
-    seconds_per_second: float
-
-
-@dataclass(frozen=True)
-class RowAdvice:
-    """Advice for motion, and for motion and forces, from the loosest bound ``within`` to the tightest one."""
-
-    within: float
-    down_to: float
-    motion: CheapestRow | None
-    motion_and_forces: CheapestRow | None
-
-
-def recommendation(found: list[Score]) -> list[RowAdvice]:
-    """Cheapest row for each decade of relative error that stays within it at every point.
-
-    Decades with the same answer are one entry.
-    """
-    entries: list[RowAdvice] = []
-    for decade in DECADES:
-        bound = 10.0**-decade
-        best = (cheapest(found, "motion", bound), cheapest(found, "worst", bound))
-        if best == (None, None):
-            break
-        if entries and (entries[-1].motion, entries[-1].motion_and_forces) == best:
-            entries[-1] = replace(entries[-1], down_to=bound)
-        else:
-            entries.append(RowAdvice(bound, bound, *best))
-    return entries
-
-
-def cheapest(found: list[Score], key: str, bound: float) -> CheapestRow | None:
-    """The cheapest timed row whose ``key`` (``motion``, ``forces`` or ``worst``) is within the bound, or None."""
-    good = [
-        CheapestRow(score.index, score.name, error, score.seconds)
-        for score in found
-        if score.seconds is not None and (error := getattr(score, key)) is not None and error <= bound
-    ]
-    return min(good, key=lambda row: row.seconds_per_second, default=None)
 
 
 def closest(content: ReportedComparison) -> Score | None:

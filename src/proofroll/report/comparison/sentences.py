@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,34 +10,27 @@ from typing import Any
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.scores import (
-    EVERYDAY,
-    RowAdvice,
-    Score,
-    cheapest,
-    closest,
-    furthest_off,
-    recommendation,
-    scores,
-)
+from proofroll.report.comparison.scores import Score, closest, furthest_off, scores
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
+from proofroll.report.page.choice_matrix import EVERYDAY, NEEDS, ChoiceMatrix
 
 
 @dataclass(frozen=True)
 class Conclusions:
-    """The answer in one paragraph, sentences, and what to use at each accuracy."""
+    """The answer in one paragraph, and sentences."""
 
     answer: str
     sentences: list[str]
-    recommendation: list[RowAdvice]
 
 
-def conclusions(content: ReportedComparison, truths: Sequence[Any], kind: type[ReportKind] | None) -> Conclusions:
-    """Conclusions of a comparison; its kind of scene adds a sentence about its truths."""
+def conclusions(
+    content: ReportedComparison, choice: ChoiceMatrix, truths: Sequence[Any], kind: type[ReportKind] | None
+) -> Conclusions:
+    """Conclusions of a comparison and of its matrix; its kind of scene adds a sentence about its truths."""
     found = scores(content)
     return Conclusions(
-        _answer(content, found),
+        _answer(content, choice),
         [
             _closest(content),
             _obvious(content, found),
@@ -44,11 +38,10 @@ def conclusions(content: ReportedComparison, truths: Sequence[Any], kind: type[R
             *(kind.sentences(truths) if kind is not None else ()),
             _surprises(content),
         ],
-        recommendation(found),
     )
 
 
-def _answer(content: ReportedComparison, found: list[Score]) -> str:
+def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     """Sentence: what agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
     rows = content.rows
     said = {
@@ -73,11 +66,12 @@ def _answer(content: ReportedComparison, found: list[Score]) -> str:
     if content.as_expected:
         expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
     text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
-    best = cheapest(found, "worst", EVERYDAY)
-    if best:
-        cost = number(best.seconds_per_second)
-        text += f" For motion and forces to {100 * EVERYDAY:g} %, the cheapest is {best.name}: {cost} s of computing "
-        text += "per simulated second."
+    for column in choice.columns:
+        forces = not choice.without_forces.issuperset(column.studies)
+        _, cell = choice.cheapest(column, EVERYDAY, forces)
+        if math.isfinite(cell.cost):
+            text += f" For {NEEDS[forces]} to {100 * EVERYDAY:g} %, the cheapest is {cell.name}: {cell.text} s of "
+            text += "computing per simulated second."
     return text
 
 

@@ -18,8 +18,9 @@ from proofroll.report.pages import packed
 
 # Tolerances among which a reader chooses: powers of ten, as parts of the path or of the largest force.
 DECADES = range(2, 9)
-# The one that a reader sees first.
+# The one that a reader sees first, and the tolerance for which the first paragraphs name a setting.
 FIRST = 4
+EVERYDAY = 1e-3
 # All that a reader can ask for: forces, too, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
 NEEDS = ("motion", "motion and forces")
@@ -125,13 +126,17 @@ class ChoiceMatrix:
         """Rows of engines' models with all their settings, without solutions of the scenes' own equations."""
         return [row for row in self.rows if not row.setting and not row.own_equations]
 
+    def cheapest(self, column: ChoiceColumn, tolerance: float, forces: bool) -> tuple[str, ChoiceCell]:
+        """Name and cell of the formulation that holds a tolerance at the least cost, which is infinite if none does."""
+        cells = [(row.name, self.cell(row, column, tolerance, forces)) for row in self.models]
+        return min(cells, key=lambda item: item[1].cost, default=("", ChoiceCell(NOT_RUN, "", "")))
+
     def answer(self, tolerance: float, forces: bool) -> str:
         """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
         asked = f"{NEEDS[forces]} to {number(tolerance)}"
         said, without = [], []
         for column in (item for item in self.columns if item.whole):
-            cells = [(self.cell(row, column, tolerance, forces), row.name) for row in self.models]
-            cell, name = min(cells, key=lambda item: item[0].cost, default=(ChoiceCell(NOT_RUN, "", ""), ""))
+            name, cell = self.cheapest(column, tolerance, forces)
             if math.isfinite(cell.cost):
                 said.append(f"{column.group}: {name} ({cell.text} s/s)")
             elif not (forces and self.without_forces.issuperset(column.studies)):

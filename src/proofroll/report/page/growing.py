@@ -15,8 +15,7 @@ from proofroll.report.comparison.plots import PointCurves, point_curves
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.page.html import page
-from proofroll.report.page.records import ReportContent, Sentences, report_content
-from proofroll.report.page.summary import three_sentences
+from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
 from proofroll.report.replay.records import Replay
 from proofroll.report.replay.replay import joined, replay_content
@@ -55,10 +54,9 @@ class Report:
         for _, entry in said:
             if isinstance(entry.study, dict):  # of a kept study the versions are those of now
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
-        findings = Sentences(three_sentences(self.compared.comparisons, entries))
         further = [line for part in self.parts for line in self._lines.get(id(part), ())]
         table = LongTable([*self.compared.table.lines, *further])
-        found = replace(self.compared, entries=entries, findings=findings, environment=environment, table=table)
+        found = replace(self.compared, entries=entries, environment=environment, table=table).summarised
         if self.earlier is None:
             return found
         return replace(found, against=against(self.earlier, table.lines, environment.machine, environment.versions))

@@ -19,7 +19,7 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice_matrix import ASKED, DECADES, FIRST, ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.choice_matrix import ASKED, DECADES, FIRST
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -51,8 +51,7 @@ def page(
         pictures: of the further studies, markup by name; what is not there is left out.
         replay: as the comparisons' kind of element gives it; None: the page has none.
     """
-    choice = choice_of(content)
-    words = [[item.sentence for item in advice(choice, tolerance, forces)] for forces, tolerance in ASKED]
+    words = [[item.sentence for item in advice(content.choice, tolerance, forces)] for forces, tolerance in ASKED]
     drawn = {
         "precision": content.precision,
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
@@ -64,7 +63,7 @@ def page(
         content=content,
         curves=curves,
         pictures=pictures,
-        choice=choice,
+        choice=content.choice,
         words=words[FIRST - DECADES.start],
         all_words=packed(json.dumps(words, ensure_ascii=False).encode("utf-8", "replace")),
         styles=[styles(comparison.rows) for comparison in content.comparisons],
@@ -75,17 +74,6 @@ def page(
         datatables=_datatables(),
     )
     return folded(whole)
-
-
-def choice_of(content: ReportContent) -> ChoiceMatrix:
-    """The matrix of a report: of its comparisons, and of the trade-offs that were made."""
-    found = {
-        item.name: ChoiceStudy(item.title, f"c{number}", list(dict.fromkeys(run.point for run in item.runs)))
-        for number, item in enumerate(content.comparisons)
-    }
-    swept = enumerate(content.entries.get("tradeoffs", ()))
-    found |= {item.name: ChoiceStudy(item.title, f"speed{number}") for number, item in swept if item.study}
-    return choice_matrix(content.table.lines, found)
 
 
 def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:

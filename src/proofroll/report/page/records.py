@@ -20,6 +20,7 @@ from proofroll.report.comparison.sentences import Conclusions, conclusions
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
+from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
 from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.page.summary import three_sentences
@@ -126,6 +127,24 @@ class ReportContent:
         """The entries of all further studies."""
         return [item for kind in part_kinds() for item in self.entries.get(kind.key, ())]
 
+    @property
+    def summarised(self) -> ReportContent:
+        """The content with the three sentences that follow from the rest of it."""
+        return dataclasses.replace(
+            self, findings=Sentences(three_sentences(self.comparisons, self.entries, self.choice))
+        )
+
+    @cached_property
+    def choice(self) -> ChoiceMatrix:
+        """The matrix of its comparisons, and of the trade-offs that were made."""
+        studies = {
+            item.name: ChoiceStudy(item.title, f"c{number}", list(dict.fromkeys(run.point for run in item.runs)))
+            for number, item in enumerate(self.comparisons)
+        }
+        swept = enumerate(self.entries.get("tradeoffs", ()))
+        studies |= {item.name: ChoiceStudy(item.title, f"speed{number}") for number, item in swept if item.study}
+        return choice_matrix(self.table.lines, studies)
+
     @cached_property
     def precision(self) -> dict[str, WorkPrecision]:
         """Work–precision pictures by the id of the section that they belong to, of studies whose runs allow them."""
@@ -140,13 +159,14 @@ class ReportContent:
 
 def report_content(outcomes: list[Outcome], store: Store, command: str) -> ReportContent:
     """Content of a report of comparisons; paths of files are relative to its folder."""
-    comparisons = [_comparison(outcome, store) for outcome in outcomes]
+    lines = [lines_of(outcome) for outcome in outcomes]
+    comparisons = [_comparison(outcome, own, store) for outcome, own in zip(outcomes, lines, strict=True)]
     facts = machine()
     versions = {"proofroll": proofroll.__version__, "python": platform.python_version()}
     for run in (run for outcome in outcomes for run in outcome.runs):
         versions |= run.result.versions
     entries: dict[str, list[PartEntry]] = {kind.key: [] for kind in part_kinds()}
-    return ReportContent(
+    content = ReportContent(
         datetime.now(UTC).isoformat(timespec="seconds"),
         comparisons,
         [],
@@ -154,12 +174,13 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> Repor
         [KnownFinding(item.name, item.engine, item.title, item.seen, item.gone) for item in load_findings()],
         entries,
         MadeWith(command, f"{facts['system']}, {facts['processor']}", versions),
-        Sentences(three_sentences(comparisons, entries)),
-        LongTable([line for outcome in outcomes for line in lines_of(outcome)]),
+        Sentences([]),
+        LongTable([line for own in lines for line in own]),
     )
+    return content.summarised
 
 
-def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
+def _comparison(outcome: Outcome, lines: Sequence[TableLine], store: Store) -> ReportedComparison:
     """A comparison's content with its truths, what its kind of scene tells of each run, claims, costs and findings."""
     content, truths = outcome_content(outcome), _truths(outcome, store)
     kind = kind_of(outcome.scene)
@@ -171,7 +192,8 @@ def _comparison(outcome: Outcome, store: Store) -> ReportedComparison:
     content = dataclasses.replace(content, runs=runs)
     points = outcome.points.values()
     sheet = sheet_of(outcome.file, [item.case.parameters for item in points], [item.scene for item in points])
-    evidence = ComparisonEvidence(truths, sheet, conclusions(content, truths, kind), growth(content, truths))
+    choice = choice_matrix(lines, {content.name: ChoiceStudy(content.title, "")})
+    evidence = ComparisonEvidence(truths, sheet, conclusions(content, choice, truths, kind), growth(content, truths))
     return dataclasses.replace(content, evidence=evidence)
 
 

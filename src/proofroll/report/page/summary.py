@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from math import log
-from typing import Any
 
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.scores import EVERYDAY, cheapest, closest, furthest_off, scores
-from proofroll.report.labels import name_of, off_by, step, symbol, unit, with_caveat
+from proofroll.report.comparison.scores import closest, furthest_off
+from proofroll.report.labels import off_by, with_caveat
+from proofroll.report.page.choice_matrix import EVERYDAY, ChoiceMatrix
 from proofroll.report.parts import PartEntry
 from proofroll.studies.stability.records import StabilityStudy
-from proofroll.studies.tradeoff.recommend import Answer
-from proofroll.studies.tradeoff.records import TradeoffStudy
 
 
-def three_sentences(comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]]) -> list[str]:
+def three_sentences(
+    comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], choice: ChoiceMatrix
+) -> list[str]:
     """Three sentences: the best agreement, silent disagreement, and advice.
 
     Args:
         comparisons: of the report.
-        entries: of its further studies by the key of their kind; ``tradeoffs`` and ``stability`` count.
+        entries: of its further studies by the key of their kind; ``stability`` counts.
+        choice: the matrix of the report.
     """
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
-    return [_agrees(comparisons), _silent(comparisons, maps), _use(comparisons, entries.get("tradeoffs", ()))]
+    return [_agrees(comparisons), _silent(comparisons, maps), choice.answer(EVERYDAY, forces=True)]
 
 
 def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
@@ -83,39 +83,3 @@ def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
         text = "a reaction or an event is wrong" if worst is None else off_by(worst)
         found.append((relative, with_caveat(name, row.caveat), text))
     return found
-
-
-def _use(comparisons: Sequence[ReportedComparison], tradeoffs: Sequence[Any]) -> str:
-    """The cheapest that holds the usual tolerance, from the trade-off; else from the first comparison's timings."""
-    for entry in tradeoffs:
-        if entry.study is None:
-            continue
-        answers = [item.answer for item in entry.advice if item.answer.choice is not None]
-        answer = min(answers, key=lambda item: _from_everyday(item, entry.study), default=None)
-        if answer is not None:
-            choice, least = answer.choice.point, answer.least_model
-            wanted = f"{symbol(answer.quantity)} to {number(answer.tolerance)} {unit(answer.unit)}".strip()
-            wanted += f" in {entry.study.scene}"
-            size = step(choice.resolution, choice.step)
-            said = f"For {wanted} use {with_caveat(name_of(choice), choice.caveat)}{f' at {size}' if size else ''}"
-            said += f", at {number(choice.seconds_per_second)} s of computing per simulated second"
-            if least:
-                said += (
-                    f"; where this scene is all there is, its own equations do it at "
-                    f"{number(least.point.seconds_per_second)} s ({name_of(least.point)})"
-                )
-            return f"{said}."
-    for comparison in comparisons:
-        best = cheapest(scores(comparison), "worst", EVERYDAY)
-        if best:
-            return (
-                f"For motion and forces to {100 * EVERYDAY:g} % in {comparison.scene} use {best.name}, at "
-                f"{number(best.seconds_per_second)} s of computing per simulated second."
-            )
-    return f"Nothing that was timed holds motion and forces to {100 * EVERYDAY:g} %, so nothing can be recommended."
-
-
-def _from_everyday(answer: Answer, study: TradeoffStudy) -> tuple[bool, float]:
-    """Distance of a tolerance from the usual one: the study's own quantity first, then by its logarithm."""
-    scale = study.quantities[answer.quantity].scale or 1.0
-    return answer.quantity != study.quantity, abs(log(answer.tolerance / scale / EVERYDAY))
