@@ -15,6 +15,7 @@ import pytest
 from proofroll.cli.report import _of_groups
 from proofroll.report.page.growing import Report
 from proofroll.running.store import alone_in
+from proofroll.running.time_budget import TimeBudget
 from proofroll.studies.comparison import compare
 from proofroll.studies.comparison.outcome import Outcome
 
@@ -225,6 +226,47 @@ def test_a_page_after_the_first_comparison(
     assert content["left_out"] == ["balls/third"]
     assert "leaves out: 1. <code>proofroll report balls/third</code> runs them" in first
     assert "Comparisons left out: 1. proofroll report balls/third runs them." in " ".join(said.split())
+
+
+def test_a_budget_is_spent_briefly_first_and_grows(
+    proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Every comparison is brief before one grows, what is left out contradicts nothing, the same command goes on."""
+    text = COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"')
+    varied = text.replace("{ speed = [4] }", "{ speed = [2, 4] }\nbrief = { speed = [4] }")
+    files(tmp_path, first=f"order = 1\n{varied}")
+    (tmp_path / "balls").mkdir()
+    (tmp_path / "balls" / "second.toml").write_text(varied.replace("0.1", "0.2"), encoding="utf-8")
+    for module in ("comparison_file", "toml"):
+        monkeypatch.setattr(f"proofroll.files.{module}.study_folders", lambda: (tmp_path,))
+    command = ["report", "--out", str(tmp_path / "out"), "--jobs", "1", "--budget", "90"]
+
+    def made(most: int) -> tuple[list[list[float]], list[str], str]:
+        begun: list[str] = []
+
+        def few(_: TimeBudget, case: str, __: int) -> float:
+            begun.append(case)
+            return 60.0 if len(begun) <= most else 0.0
+
+        with monkeypatch.context() as patch:
+            patch.setattr(TimeBudget, "begin", few)
+            patch.setattr(TimeBudget, "end", lambda *_, **__: None)
+            code, said, err = proofroll(*command)
+        assert code == 0, err
+        content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+        found = content["comparisons"]
+        speeds = [[run["parameters"]["speed"] for run in item["runs"]] for item in found]
+        return speeds, [run["verdict"] for item in found for run in item["runs"]], " ".join(said.split())
+
+    speeds, verdicts, said = made(most=3)
+    assert (speeds, verdicts) == ([[4.0], [4.0]], ["agrees", "not-judged"])
+    assert "Runs left out for lack of processor time: 1. The same command goes on with them." in said
+    assert "lack of processor time: 1" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    speeds, verdicts, said = made(most=3)
+    assert (speeds, set(verdicts)) == ([[2.0, 4.0], [4.0]], {"agrees"})
+    assert "left out" not in said
+    speeds, verdicts, said = made(most=3)
+    assert (speeds, set(verdicts)) == ([[2.0, 4.0], [2.0, 4.0]], {"agrees"})
 
 
 def test_a_second_report_into_one_folder(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -80,7 +80,7 @@ def asked(
             raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
         return compared(name, parameters, workers, None if scheduler else budget or BUDGET)
     if budget:
-        raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene instead")
+        raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
     if parameters:
         raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
     return load_comparison(name)
@@ -100,39 +100,60 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
 
 
 def outcomes_of(
-    comparisons: list[Any],
+    comparisons: list[Comparison],
     engines: list[str],
     runner: Runner,
     stage: str = "",
-    finished: Callable[[dict[int, Outcome]], None] | None = None,
+    finished: Callable[[dict[int, Outcome], bool], None] | None = None,
+    budget: float | None = None,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
+
+    Each is brief first; when all have been, they grow by their further combinations.
 
     Args:
         comparisons: in their order.
         engines: to which they are restricted.
         runner: runs their cases.
         stage: is put before what the bar says.
-        finished: called when one has ended, with all that have ended by their numbers.
+        finished: called when one has ended, briefly or whole, with all that have by their numbers; True: the last.
+        budget: processor time of all of them [s]; all runs then come before the first ladder.
     """
-    from proofroll.studies.comparison.compare import evaluate, run_plan
+    from proofroll.running.time_budget import TimeBudget
+    from proofroll.studies.comparison.compare import evaluate, left_out, run_plan
     from proofroll.studies.comparison.planning import plan
 
+    limit = TimeBudget(budget) if budget else None
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
-    cases = {case.key: case for item in plans for case in item.cases}
-    missing = {number: {case.key for case in item.cases} for number, item in enumerate(plans)}
+    brief = [item.brief for item in plans]
+    grown = {at: item for at, item in enumerate(plans) if len(item.truths) > len(brief[at].truths)}
+    parts = [*enumerate(brief), *grown.items()]
+    if limit:
+        order = [[*truths, *runs] for truths, runs, _ in (item.stages for item in brief)]
+        order += [item.stages[-1] for item in brief]
+        order += [item.cases for item in grown.values()]
+    else:
+        order = [item.cases for _, item in parts]
+    place = {case.key: at for at, items in reversed([*enumerate(order)]) for case in items}
+    cases = {case.key: case for items in order for case in items}
+    missing = {number: {case.key for case in item.cases} for number, (_, item) in enumerate(parts)}
     results: dict[str, Result] = {}
     ended: dict[int, Outcome] = {}
     start, reused = time.monotonic(), runner.reused
 
     def end(key: str = "") -> None:
-        """Judges each comparison whose last case this was."""
+        """Judges each comparison, brief or whole, whose last case this was."""
         for number in [number for number, keys in missing.items() if keys <= {key}]:
             del missing[number]
-            ended[number] = evaluate(plans[number], results, runner)
+            at, part = parts[number]
+            if part is plans[at] or at not in grown:
+                part = plans[at].ended(left_out(results))
+            elif not finished:
+                continue
+            ended[at] = evaluate(part, results, runner)
             if finished:
-                finished(ended)
+                finished(ended, not missing)
 
     with options.progress_bar(f"{stage}cases", total=len(cases)) as advance:
 
@@ -140,7 +161,8 @@ def outcomes_of(
             results[case.key] = result
             ran = len(results) - (runner.reused - reused)
             seconds = (time.monotonic() - start) / ran * (len(cases) - len(results)) if ran else 0.0
-            of = f"{len(ended) + 1} of {len(plans)} comparisons, " if len(plans) > 1 else ""
+            seconds = min(seconds, limit.left / runner.jobs) if limit else seconds
+            of = f"{min(len(ended) + 1, len(plans))} of {len(plans)} comparisons, " if len(plans) > 1 else ""
             advance(f"{stage}{of}{f'about {written(seconds, 1)} s left, ' if ran else ''}{case.engine.name}")
             end(case.key)
             for keys in missing.values():
@@ -149,8 +171,7 @@ def outcomes_of(
         for item in plans:
             if item.comparison.budget:
                 run_plan(item, runner, told)
-        place = {case.key: at for at, item in reversed([*enumerate(plans)]) for case in item.cases}
-        runner.run((case for key, case in cases.items() if key not in results), told, place=place)
+        runner.run((case for key, case in cases.items() if key not in results), told, limit, place)
         end()
     if runner.damaged:
         options.complain(f"{len(runner.damaged)} stored results were damaged and have been run again")

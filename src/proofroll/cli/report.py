@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import shlex
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,7 +15,7 @@ from proofroll.cli import options
 from proofroll.cli.comparing import asked, exit_code, outcomes_of, tell_left_out
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
 
     from rich.table import Table
 
@@ -39,7 +41,10 @@ def report(
     fresh: options.Fresh = False,
     jobs: options.Jobs = None,
     scheduler: options.Scheduler = None,
-    budget: options.Budget = None,
+    budget: Annotated[
+        float | None,
+        typer.Option(min=1, help="Processor-seconds of all comparisons; without names all there are, in folders too."),
+    ] = None,
     only: Annotated[
         str | None,
         typer.Option(help="Groups of scenes, as loops,contact: all comparisons of these, and no studies."),
@@ -61,9 +66,11 @@ def report(
     The files are there after the first comparison, and are written again now and then, after all of them and after each
     further study. A report that is stopped (Ctrl-C) keeps what has ended; the same command goes on from there. A study
     that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and
-    the report names the command that makes it whole. --set and --budget are for scenes and robot files: what 60 s of
-    processor time do not suffice for is left out and named.
+    the report names the command that makes it whole. With --budget every comparison is brief first, and grows while
+    there is time; what is left out is named, and the same command goes on with it. --set is for scenes and robot files.
     """
+    from dataclasses import replace
+
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import comparison_names, further_comparison_names
     from proofroll.report.against import EarlierReport
@@ -77,44 +84,41 @@ def report(
         _show_history(history, out, as_json=as_json)
         return
     earlier = EarlierReport.read(against) if against else None
-    names, parts = parts_of(studies, engine or []) if studies else (comparison_names(), all_parts(engine or [], out))
-    if only:
-        names, parts = _of_groups(names if studies else [*names, *further_comparison_names()], only), []
     workers, assigned = Workers(), options.assignments(settings)
+    if budget and scheduler:
+        raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
+    left_out = [] if studies or only or budget else further_comparison_names()
+    known = [*comparison_names(), *([] if left_out else further_comparison_names())]
+    names, parts = parts_of(studies, engine or []) if studies else (known, all_parts(engine or [], out))
+    if only:
+        names, parts = _of_groups(names, only), []
     if assigned and (parts or not studies):
         raise InputError(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
         )
-    left_out = [] if studies or only else further_comparison_names()
-    loaded = [asked(name, assigned, workers, budget, scheduler) for name in names]
-    if not studies:
-        loaded = [item.briefly() for item in loaded]
+    loaded = [asked(name, assigned, workers, None, scheduler) for name in names]
+    if budget or not studies:
+        loaded = [replace(item, budget=None) if budget else item.briefly() for item in loaded]
     options.require_pages()
     templates()  # read before the work, while which the code may change
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
     tell_left_out(loaded, engine or [])
-    keys = list(dict.fromkeys(part.key for part in parts))
+    keys = {part.key: part.words for part in parts}
     total = len(keys) + bool(loaded)
     command = _command(studies or [], engine or [], settings or [], budget, out, only)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
-        outcomes: list[Outcome] = []
-        if loaded:
-            stage = _begin(1, total, "comparisons")
-            growing = _Growing(
-                loaded, parts, out, lambda ended, awaited: begun(ended, runner.store, command, awaited, left_out)
-            )
-            try:
-                outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add)
-            except KeyboardInterrupt:
-                growing.stopped()
-                raise
+        growing = _Growing(
+            loaded, parts, out, lambda ended, awaited: begun(ended, runner.store, command, awaited, left_out)
+        )
+        with growing.told_if_stopped():
+            stage = _begin(1, total, "comparisons") if loaded else ""
+            outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget) if loaded else []
         made = begun(outcomes, runner.store, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)
-        for number, key in enumerate(keys, start=1 + bool(loaded)):
+        for number, (key, words) in enumerate(keys.items(), start=1 + bool(loaded)):
             wanted = [part for part in missing if part.key == key]
-            words = next(part.words for part in parts if part.key == key)
             stage = _begin(number, total, words if wanted else f"{words}: kept from before")
             for part in wanted:
                 _make(made, part, runner, out, stage)
@@ -147,23 +151,28 @@ class _Growing:
         self._ended: dict[int, Outcome] = {}
         self._start, self._spent = time.monotonic(), 0.0
 
-    def add(self, ended: dict[int, Outcome]) -> None:
-        """Writes the page if others are awaited, and writing has taken little time so far."""
+    def add(self, ended: dict[int, Outcome], last: bool) -> None:
+        """Writes the page if something is awaited, and writing has taken little time so far."""
         self._ended = ended
         begin = time.monotonic()
-        if len(ended) == len(self._comparisons) or self._spent > _WRITING * (begin - self._start):
+        if last or self._spent > _WRITING * (begin - self._start):
             return
         self._write()
         if not self._spent:
             options.complain(f"the first of {len(self._comparisons)} comparisons is in {self._out / 'report.html'}")
         self._spent += time.monotonic() - begin
 
-    def stopped(self) -> None:
-        """Writes the comparisons that have ended, and says how to go on."""
-        if self._ended:
-            self._write()
-            many = f"{len(self._ended)} of {len(self._comparisons)} comparisons are in {self._out / 'report.html'}"
-            options.complain(f"stopped: {many}; the same command goes on from there")
+    @contextmanager
+    def told_if_stopped(self) -> Iterator[None]:
+        """Writes the comparisons that have ended if the rest is stopped, and says how to go on."""
+        try:
+            yield
+        except KeyboardInterrupt:
+            if self._ended:
+                self._write()
+                many = f"{len(self._ended)} of {len(self._comparisons)} comparisons are in {self._out / 'report.html'}"
+                options.complain(f"stopped: {many}; the same command goes on from there")
+            raise
 
     def _write(self) -> None:
         ended = [self._ended[at] for at in sorted(self._ended)]
@@ -244,6 +253,8 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     yield from part_lines(content)
     yield from first_lines(content)
     yield from change_lines(content.against)
+    if content.beyond_budget:
+        yield content.beyond_budget
     if content.left_out:
         names = " ".join(content.left_out)
         yield f"Comparisons left out: {len(content.left_out)}. proofroll report {names} runs them."

@@ -167,6 +167,11 @@ class Comparison:
         kept = replace(self, vary=vary, points=[point for point in self.points if _fits(point, self.brief)])
         return replace(kept, left_out=len(self.combinations()) - len(kept.combinations()))
 
+    def at(self, points: list[dict[str, float | Edge]]) -> Comparison:
+        """The comparison at some of its combinations."""
+        left_out = len(self.combinations()) - len(points)
+        return replace(self, vary={}, points=points, left_out=left_out) if left_out else self
+
     def combinations(self, only: Mapping[str, list[float]] | None = None) -> list[dict[str, float | Edge]]:
         """Every combination of parameters, or those that fit ``only``; the scene as it is if nothing varies."""
         points: list[dict[str, float | Edge]] = [*self.points]

@@ -34,7 +34,14 @@ class TimeBudget:
     @property
     def sentence(self) -> str:
         """Reason that a case is left out."""
-        return f"the {self.seconds:g} s of processor time for a first look did not suffice"
+        return f"the {self.seconds:g} s of processor time did not suffice"
+
+    @property
+    def left(self) -> float:
+        """Processor time that is left for cases [s]."""
+        now = time.monotonic()
+        used = processor_seconds() - self._start + self._lost + sum(now - begun for begun in self._begun.values())
+        return max(0.0, _OF_CASES * self.seconds - used)
 
     def wait(self) -> None:
         """Another case waits to be begun."""
@@ -44,10 +51,8 @@ class TimeBudget:
     def begin(self, case: str, abreast: int) -> float:
         """Seconds that a case may take beside at most ``abreast`` - 1 others; 0: it is not to be begun."""
         with self._lock:
-            now = time.monotonic()
-            used = processor_seconds() - self._start + self._lost + sum(now - begun for begun in self._begun.values())
-            share = (_OF_CASES * self.seconds - used) / max(1, min(abreast, self._unfinished))
-            self._begun[case] = now
+            share = self.left / max(1, min(abreast, self._unfinished))
+            self._begun[case] = time.monotonic()
             return share if share > _LEAST else 0.0
 
     def end(self, case: str, *, lost: bool = False) -> None:

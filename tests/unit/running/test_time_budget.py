@@ -64,7 +64,7 @@ def test_cases_beyond_the_budget_are_left_out(
     runner, budget = Runner(Store(tmp_path), jobs=jobs), TimeBudget(4.0)
     first = runner.run([slow], budget=budget)[slow.key]
     assert first.status is Status.LEFT_OUT
-    assert first.message == "the 4 s of processor time for a first look did not suffice"
+    assert first.message == "the 4 s of processor time did not suffice"
     second = runner.run([quick, dataclasses.replace(quick, until=0.2)], budget=budget)
     assert {result.status for result in second.values()} == {Status.LEFT_OUT}
     assert {result.status for result in runner.run([quick], budget=TimeBudget(60.0)).values()} == {Status.DONE}

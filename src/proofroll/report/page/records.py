@@ -145,6 +145,12 @@ class ReportContent:
         studies |= {item.name: ChoiceStudy(item.title, f"speed{number}") for number, item in swept if item.study}
         return choice_matrix(self.table.lines, studies)
 
+    @property
+    def beyond_budget(self) -> str:
+        """Sentence on the cases that a budget of processor time did not suffice for; empty if there are none."""
+        left = sum(len(item.beyond_budget) for item in self.comparisons)
+        return f"Runs left out for lack of processor time: {left}. The same command goes on with them." if left else ""
+
     @cached_property
     def precision(self) -> dict[str, WorkPrecision]:
         """Work–precision pictures by the id of the section that they belong to, of studies whose runs allow them."""

@@ -81,8 +81,18 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             found = replace(found, diagnosis=causes)
         judged.append(found)
+    unfinished = left_out(results)
+    judged = [
+        replace(found, contradictions=[]) if unfinished & run.keys(planned.truths) else found
+        for run, found in zip(planned.runs, judged, strict=True)
+    ]
     scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
     return Outcome(comparison, scene, file, judged, points, _beyond_budget(planned, results))
+
+
+def left_out(results: Mapping[str, Result]) -> set[str]:
+    """Keys of the cases that the processor time did not suffice for."""
+    return {key for key, result in results.items() if result.status is Status.LEFT_OUT}
 
 
 def run_plan(

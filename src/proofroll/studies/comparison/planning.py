@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -27,9 +27,9 @@ from proofroll.studies.step_factors import USUAL, fitting, unfit
 _UNFIT = frozenset({"failed", "refused", "another-scene"})
 
 
-def point_name(parameters: dict[str, float]) -> str:
+def point_name(parameters: Mapping[str, float | Edge]) -> str:
     """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``."""
-    return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items())
+    return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items() if not isinstance(value, Edge))
 
 
 def at_point(parameters: dict[str, float]) -> str:
@@ -45,6 +45,10 @@ class Planned:
     parameters: dict[str, float]
     facts: EngineFacts | ProofrollError
     ladder: dict[float, Case] = field(default_factory=dict)
+
+    def keys(self, truths: Mapping[str, Case]) -> set[str]:
+        """Keys of the cases that its judgement rests on."""
+        return {case.key for case in (truths[point_name(self.parameters)], *self.ladder.values())}
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,24 @@ class Plan:
         runs = [case for run in self.runs for factor, case in run.ladder.items() if factor == 1]
         steps = [case for run in self.runs for factor, case in run.ladder.items() if factor != 1]
         return [[*self.truths.values()], runs, steps]
+
+    @property
+    def brief(self) -> Plan:
+        """The part at the combinations that a brief report has."""
+        return self._part(self.comparison.briefly())
+
+    def ended(self, unfinished: Set[str]) -> Plan:
+        """The part at the combinations of a brief report, and at the others without ``unfinished`` cases."""
+        left = {point_name(run.parameters) for run in self.runs if run.keys(self.truths) & unfinished}
+        left -= self.brief.truths.keys()
+        points = self.comparison.combinations()
+        return self._part(self.comparison.at([point for point in points if point_name(point) not in left]))
+
+    def _part(self, comparison: Comparison) -> Plan:
+        """The part at the combinations of ``comparison``, which has some of this plan's."""
+        names = {point_name(point) for point in comparison.combinations()}
+        truths = {name: case for name, case in self.truths.items() if name in names}
+        return Plan(comparison, truths, [run for run in self.runs if point_name(run.parameters) in names])
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
