@@ -158,7 +158,7 @@ class Reproduces(Protocol):
         """Source of a program with numpy and the engine's own interface alone.
 
         Of a ball it assigns RADIUS [m], MASS [kg], INERTIA [kg m²], GRAVITY [m/s²] and the start, and defines
-        ``frame(p)``, ``gap(p)`` (:func:`proofroll.elements.ball_on_surface.reproducer_source.wall_source`) and
+        ``frame(p)``, ``gap(p)`` (:func:`proofroll.elements.ball_on_surface.reproducer_source.cut_program`) and
         ``run(times)``, a generator of its centre, velocity and angular velocity in the world at each of the times [s];
         where the engine says that it has failed, ``run`` raises RuntimeError with its words.
 

@@ -103,7 +103,7 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
     }
     against = "# What the run is held against; TRUE is what two independent routes say.\n"
     lines = "\n".join(_said(failed, what, imported(head)))
-    return f'"""{lines}\n"""\n\nimport sys\n{head}\n\n{rest}\n{against}' + assigned(**own, **numbers) + signs + _MAIN
+    return f'"""{lines}\n"""\n\n{head}\nimport sys\n\n{rest}\n{against}' + assigned(**own, **numbers) + signs + _MAIN
 
 
 def _said(failed: FailedRun, what: str, needs: list[str]) -> list[str]:

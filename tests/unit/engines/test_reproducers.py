@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import inspect
 from typing import Any
 
 import numpy as np
@@ -133,7 +134,7 @@ def test_the_program_ends_where_the_wall_would_pull(formulation: str, preset: st
     scene = load_scene(CYLINDER, speed=2)
     scene = changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=1.2))
     settings = resolve_settings(kind_of("pinocchio"), {"formulation": formulation, "preset": preset})
-    with pytest.raises(RuntimeError, match="would have to pull"):
+    with pytest.raises(RuntimeError, match="leaves the wall"):
         list(program("pinocchio", settings, scene)["run"]([0.1, 0.4]))
 
 
@@ -202,5 +203,28 @@ def test_the_loop_of_mechanisms_stands_once(engine: str) -> None:
     settings = resolve_settings(kind, {"formulation": {"mujoco": "joints", "pinocchio": "null_space"}[engine]})
     text = kind.reproducer(load_scene("four_bar"), settings)
     assert text.startswith(module_text(loop))
+    assert "proofroll" not in text
+    assert {engine, "numpy"} <= set(imported(text.partition("\n\n")[0])) <= {engine, "numpy", "scipy"}
+
+
+@pytest.mark.parametrize(
+    ("engine", "options", "where"),
+    [
+        ("mujoco", {"formulation": "free", "preset": "tuned"}, "free:Free._add_curvature"),
+        ("mujoco", {"formulation": "chart", "preset": "tuned"}, "chart:Chart._resister"),
+        ("exudyn", {"formulation": "contact", "preset": "matched"}, "integration:Integration.advance"),
+        ("pinocchio", {"formulation": "contact", "preset": "matched"}, "contact:ContactSteps.kick"),
+        ("pinocchio", {"formulation": "composite", "preset": "default"}, "integrators:TangentRungeKutta4._step"),
+    ],
+)
+def test_the_loop_of_a_ball_stands_once(engine: str, options: dict[str, str], where: str) -> None:
+    """The program holds the lines of the adapter's own step, and needs the engine alone."""
+    kind = kind_of(engine)
+    text = kind.reproducer(load_scene(CYLINDER, **RESISTED), resolve_settings(kind, options))
+    module, _, step = where.partition(":")
+    found: Any = importlib.import_module(f"proofroll.engines.{engine}.{module}")
+    for name in step.split("."):
+        found = getattr(found, name)
+    assert "".join(inspect.getsource(found).splitlines(keepends=True)[-5:]) in text
     assert "proofroll" not in text
     assert {engine, "numpy"} <= set(imported(text.partition("\n\n")[0])) <= {engine, "numpy", "scipy"}

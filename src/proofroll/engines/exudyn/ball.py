@@ -80,10 +80,10 @@ def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatAr
     return node, body
 
 
-def add_ball(system: Any, rolling: RollingBall) -> RigidBall:
-    """The ball with its weight and, where there is any, its rolling resistance."""
-    ball = rolling.ball
-    node, body = add_body(system, ball.mass, ball.inertia, rolling.p0, rolling.v0, rolling.w0)
+def add_ball(system: Any, rolling: RollingBall, spin: FloatArray | None = None) -> RigidBall:
+    """The ball with its weight and, where there is any, its rolling resistance; ``spin`` [rad/s] is its start's."""
+    ball, w0 = rolling.ball, rolling.w0 if spin is None else spin
+    node, body = add_body(system, ball.mass, ball.inertia, rolling.p0, rolling.v0, w0)
     marker = system.AddMarker(items.MarkerBodyRigid(bodyNumber=body))
     weight = system.AddLoad(
         items.LoadMassProportional(

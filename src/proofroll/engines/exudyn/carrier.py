@@ -104,20 +104,6 @@ class Carrier(ExudynModel):
             row.item: np.array([-self._factor(row) * relative @ cross(self.spin, row.axis)]) for row in self.rolling
         }
 
-    def numbers(self) -> dict[str, Any]:
-        """Numbers for the program of :mod:`reproducer`: the carrier's start, its joint and the rolling."""
-        rolling = [
-            (row.generator.kind.capitalize(), list(row.generator.axis), row.axis.tolist(), self._factor(row))
-            for row in self.rolling
-        ]
-        return {
-            "CARRIER_VELOCITY": self.velocity,
-            "CARRIER_SPIN": self.spin,
-            "JOINT_AXES": self.axes,
-            "JOINT_CONSTRAINED": self.constrained,
-            "ROLLING": rolling,
-        }
-
     def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The pivot transmits the whole force of the wall."""
         turn = self.system.GetNodeOutput(self.node, Output.RotationMatrix).reshape(3, 3)

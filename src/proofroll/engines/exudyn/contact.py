@@ -79,8 +79,7 @@ class PenaltyContact(ExudynModel):
         if sunk >= body.ball.radius:
             raise Refused(f"the load presses the ball {sunk:.3g} m into so soft a wall; use a larger stiffness")
         super().__init__()
-        rolling = dataclasses.replace(body, w0=body.w0 + np.cross(e1, creep) / body.ball.radius)
-        self.ball = add_ball(self.system, rolling)
+        self.ball = add_ball(self.system, body, body.w0 + np.cross(e1, creep) / body.ball.radius)
         radius = body.ball.radius
         hollow = _hollow_radius(body)
         ground = self.system.AddObject(items.ObjectGround())
@@ -110,7 +109,7 @@ class PenaltyContact(ExudynModel):
             _follower(self.system, self.ball.node, self.follower, body.surface.nearby, hollow - radius)
         )
         self.system.Assemble()
-        self._softened = _softened(body, settings, creep, N, mu, hollow)
+        self._start = body, settings, creep, N, mu, hollow
         self._t = 0.0
         self._left: tuple[float, float] | None = None
         self._sticks = needed <= mu * N and not slips
@@ -159,19 +158,6 @@ class PenaltyContact(ExudynModel):
         force = np.asarray(self.system.GetObjectOutput(self.contact, Output.Force))
         return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
 
-    def numbers(self) -> dict[str, Any]:
-        """Numbers for the program of :mod:`reproducer`: the contact as Exudyn holds it."""
-        contact = self.system.GetObject(self.contact)
-        return {
-            "RADII": [float(radius) for radius in contact["spheresRadii"]],
-            "CONTACT_STATE": self.system.GetNode(self.data)["initialCoordinates"],
-            "FRICTION": contact["dynamicFriction"],
-            "ZONE": contact["frictionProportionalZone"],
-            "BOUNDED": self.bounded,
-            "SURELY": SURELY,
-            "STIFFNESS": contact["contactStiffness"],
-        }
-
     def sample(self) -> BallSample:
         """See :class:`proofroll.core.engine.Engine`. The force is that of the contact."""
         force = self.system.GetObjectOutput(self.contact, Output.Force)
@@ -189,7 +175,7 @@ class PenaltyContact(ExudynModel):
         terms = built.terms or frozenset()
         if mu != self._grip:
             terms |= {BallCapability.BOUNDED_FRICTION}
-        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=self._softened)
+        return dataclasses.replace(built, mu_static=mu, mu_kinetic=mu, terms=terms, regularised=_softened(*self._start))
 
 
 def _impacts(restitution: float | None) -> dict[str, float]:

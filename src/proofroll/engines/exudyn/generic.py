@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.exudyn.friction import KineticFriction, Touch, needed_function
@@ -21,7 +20,6 @@ from proofroll.engines.exudyn.generic_forces import (
     SIZE,
     base,
     force_function,
-    quadratic_terms,
     weight_function,
     weight_turns,
 )
@@ -114,27 +112,6 @@ class Generic(ExudynModel):
         return add_object(
             items.CoordinateVectorConstraint(markerNumbers=all_of, scalingMarker1=rows, velocityLevel=True)
         )
-
-    def numbers(self) -> dict[str, Any]:
-        """Numbers for the program of :mod:`reproducer`.
-
-        Raises:
-            Refused: the weight turns with the coordinates.
-        """
-        body = self._body
-        if weight_turns(body, self.local):
-            raise Refused("the program for this formulation has no gravity across the wall's axis")
-        weight = weight_function(body, self.local, body.ball.mass * base(self.local))
-        return {
-            "MASS_MATRIX": self._mass_matrix(),
-            "QUADRATIC": quadratic_terms(body, self.local),
-            "WEIGHT": weight([]),
-            "ROWS": self._rows(),
-            "COORDINATES": body.u0,
-            "RATES": self._rates,
-            "TANGENTS": self.local.tangents,
-            "GENERATORS": [(generator.kind, list(generator.axis)) for generator in self.local.generators],
-        }
 
     def _mass_matrix(self) -> FloatArray:
         """Mass matrix as Exudyn holds it."""

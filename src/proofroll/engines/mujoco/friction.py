@@ -18,7 +18,7 @@ from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOA
 # MuJoCo raises a smaller coefficient to this without a word (mjMINMU), unless the contact has no friction at all.
 SMALLEST_FRICTION = 1e-5
 # Numbers of user data that BoundedFriction.correct keeps: a Jacobian of three rows and MuJoCo's six velocities.
-MEMORY = 18
+SLIP_MEMORY = 18
 # MuJoCo's solver projects a force onto the cone, so one that slips is there to round-off.
 _ON_CONE = 1 - 1e-9
 # The correction vanishes with the slip, so it may begin a little before; then the stages of RK4 agree about it.
@@ -186,7 +186,7 @@ class BoundedFriction:
         # MuJoCo's tangents jump as the wall turns and the ball's own axes turn fast: the acceleration of the evaluation
         # before is of use only with the Jacobian of that evaluation, in the world.
         tangents = data.contact.frame[0].reshape(3, 3)[1:]
-        memory = data.userdata[-MEMORY:].reshape(3, -1)
+        memory = data.userdata[-SLIP_MEMORY:].reshape(3, -1)
         r1, r2 = (tangents.dot(memory.dot(data.qacc)) - reference).tolist()
         memory[:] = tangents.T.dot(slip)
         lift = self._preload * N

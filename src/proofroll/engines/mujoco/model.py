@@ -17,8 +17,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.mujoco.contact import MEMORY
-from proofroll.engines.mujoco.friction import MEMORY as SLIP_MEMORY
-from proofroll.engines.mujoco.friction import condim, corrects
+from proofroll.engines.mujoco.friction import SLIP_MEMORY, condim, corrects
 from proofroll.engines.mujoco.settings import MujocoSettings
 
 # How much of the wall's tangent plane is drawn, in radii of the ball; for MuJoCo it has no end.

@@ -227,10 +227,10 @@ def test_a_program_does_not_cry_wolf(programs: dict[str, BoundaryPoint]) -> None
     assert point.reproducer is not None
     assert point.shown.beyond is not None
     text, beyond = Path(point.reproducer).read_text(), point.shown.beyond
-    line = f"STEP_SIZE = {beyond!r}"
+    line = f"dt={beyond!r}"
     assert line in text
     run = subprocess.run(
-        [sys.executable, "-"], input=text.replace(line, f"STEP_SIZE = {beyond / 40!r}"), capture_output=True, text=True,
+        [sys.executable, "-"], input=text.replace(line, f"dt={beyond / 40!r}"), capture_output=True, text=True,
         timeout=1500, check=False,
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
+from proofroll.engines.exudyn.integration import Integration
 from proofroll.engines.exudyn.native import exu
-from proofroll.engines.exudyn.reproducer.text import RUN, solver_source
-from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
+from proofroll.engines.exudyn.settings import ExudynSettings
 
 _SYSTEM = """
 exu.config.printToConsole = False
@@ -19,16 +20,17 @@ for add, items in ((mbs.AddNode, NODES), (mbs.AddObject, OBJECTS), (mbs.AddMarke
     for item in items:
         add(item)
 """
-_EXPLICIT = """integration.solverType = exu.DynamicSolverType.{kind}
-solver = exu.MainSolverExplicit()
-"""
-_DEPENDENT = """settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
-settings.linearSolver.ignoreSingularJacobian = True
-"""
-_START = """if not solver.InitializeSolver(mbs, settings):
-    raise SystemExit("Exudyn does not accept the model")
-"""
 _STATE = '''
+mbs.Assemble()
+integration = Integration(mbs, SETTINGS, dependent=DEPENDENT)
+
+
+def run(times):
+    """What is followed, at each time."""
+    for t in times:
+        integration.advance(t)
+        yield seen()
+
 
 def told(number, kind):
     """What Exudyn says of an object; 0 where it has no such quantity."""
@@ -58,8 +60,8 @@ def seen():
             opened = max(opened, np.abs(held * apart).max())
         elif kind == "KinematicTree":
             q, v = mbs.systemData.GetODE2Coordinates(), mbs.systemData.GetODE2Coordinates_t()
-            solver.ComputeMassMatrix(mbs, 1.0)
-            energy += v @ solver.GetSystemMassMatrix() @ v / 2
+            integration.solver.ComputeMassMatrix(mbs, 1.0)
+            energy += v @ integration.solver.GetSystemMassMatrix() @ v / 2
             energy += np.array(item["jointPControlVector"]) @ (q - item["jointPositionOffsetVector"]) ** 2 / 2
             heights = [mbs.GetMarkerOutput(marker, *where) @ GRAVITY for marker in CENTRES]
             energy -= float(np.dot(item["linkMasses"], heights))
@@ -75,19 +77,17 @@ def source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
     system = model.system
     places = [int(model.marker(body, position)) for body, position in followed]
     centres = [int(model.marker(joint.child, com[joint.child])) for joint in mechanism.joints]
-    text = ["import exudyn as exu\nimport numpy as np\n\n# The system as Exudyn lists it.\n"]
+    cut = CutOut([Integration], ["advance", "solver"])
+    text = [f"{cut.head}\n{cut.text}\n\n# The system as Exudyn lists it.\n"]
     data = system.systemData
     for name in ("Node", "Object", "Marker", "Load"):
         count, get = getattr(data, f"NumberOf{name}s")(), getattr(system, f"Get{name}")
         lines = "".join(f"    {_literal(_essential(get(number)))},\n" for number in range(count))
         text.append(f"{name.upper()}S = [\n{lines}]\n")
     text.append(f"GRAVITY = {list(mechanism.gravity)!r}\n# Markers of what is followed, and of the centres of mass.\n")
-    text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n{_SYSTEM}{solver_source(settings)}")
-    if settings.integrator in EXPLICIT:
-        text.append(_EXPLICIT.format(kind=settings.integrator.upper()))
-    if model.integration.options.linearSolver.ignoreSingularJacobian:
-        text.append(_DEPENDENT)
-    return "".join([*text, _START, RUN, _STATE])
+    text.append(f"PLACES = {places!r}\nCENTRES = {centres!r}\n{_SYSTEM}SETTINGS = {cut.literal(settings)}\n")
+    text.append(f"DEPENDENT = {model.integration.options.linearSolver.ignoreSingularJacobian!r}\n")
+    return "".join([*text, _STATE])
 
 
 def _essential(item: dict[str, Any]) -> dict[str, Any]:

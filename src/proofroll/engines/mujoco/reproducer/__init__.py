@@ -13,14 +13,38 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.program_text import assigned, module_text
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, normal_rate_source, wall_source
+from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism import Mechanism
-from proofroll.engines.mujoco.contact import Resistance
-from proofroll.engines.mujoco.friction import NEAR_CONE, corrects
-from proofroll.engines.mujoco.reproducer import mechanism_loop, text
-from proofroll.engines.mujoco.settings import PRELOAD, MujocoSettings
+from proofroll.engines.mujoco.chart import Chart
+from proofroll.engines.mujoco.free import Facets, Free
+from proofroll.engines.mujoco.friction import BoundedFriction
+from proofroll.engines.mujoco.reproducer import mechanism_loop
+from proofroll.engines.mujoco.running import raise_if_fatal
+from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.engines.mujoco.start import EVALUATIONS
 
+_RUN = '''
+
+def run(times):
+    """Centre, velocity and angular velocity of the ball in the world at each time."""
+    look, velocity, done, ball = mujoco.MjData(model), np.zeros(6), 0, model.body("ball").id
+    for t in times:
+        steps = round(t / SETTINGS.dt) - done
+        if steps:
+            formulation.run(data, steps)
+            done += steps
+        raise_if_fatal(data, t)
+        mujoco.mj_copyData(look, model, data)
+        if SETTINGS.velocity_lag:
+            for _ in range(EVALUATIONS):
+                formulation.evaluate(look)
+            look.qvel += SETTINGS.velocity_lag * look.qacc  # velocities are behind the positions
+        mujoco.mj_kinematics(model, look)
+        mujoco.mj_comPos(model, look)
+        mujoco.mj_comVel(model, look)
+        mujoco.mj_objectVelocity(model, look, mujoco.mjtObj.mjOBJ_BODY, ball, velocity, 0)
+        yield look.xpos[ball].copy(), velocity[3:].copy(), velocity[:3].copy()
+'''
 _MECHANISM = '''
 
 def run(times):
@@ -35,55 +59,25 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
     Raises:
         Refused: the scene or the settings have something that the program has not.
     """
-    contact, formulation = body.contact, settings.formulation
-    if math.isfinite(contact.mu_static) and contact.mu_static != contact.mu_kinetic:
+    contact, formulation = body.contact, {"free": Free, "chart": Chart, "facets": Facets}[settings.formulation]
+    bounded = math.isfinite(contact.mu_static)
+    if bounded and contact.mu_static != contact.mu_kinetic:
         raise Refused("the program has one coefficient of friction, as MuJoCo has")
-    corrected = corrects(contact, settings)
-    if corrected and settings.cone != "elliptic":
-        raise Refused("the program corrects the elliptic cone alone")
-    resists, edited = contact.rolling_resistance > 0, settings.curvature or corrected
-    values: dict[str, Any] = {"LEVER": contact.rolling_resistance, "LAG": settings.velocity_lag}
-    if resists:
-        law = Resistance.of(body, settings.dt)
-        values |= {"STOPPING": law.stopping, "PULL": law.pull}
-    if settings.velocity_lag:
-        values["EVALUATIONS"] = EVALUATIONS if resists else 1
-    if settings.curvature:
-        values |= {"SHARE": 1 - settings.own_share, "LEAD": settings.normal_lead}
-    if corrected:
-        values |= {"FRICTION": contact.mu_kinetic, "PRELOAD": PRELOAD / body.ball.mass, "NEAR_CONE": NEAR_CONE}
-    if formulation == "free" and edited:
-        values |= {"CURVED": settings.curvature, "CORRECTED": corrected}
-    if formulation == "chart":
-        values["DEPTH"] = int(model.joint("normal").dofadr[0])
-    # The wall's geom, or the first of its boxes.
-    values["WALL"] = int(model.body("wall").geomadr[0] if formulation == "facets" else model.geom("wall").id)
     xml = textwrap.dedent(xml).strip()
     state = ("qpos", "qvel", "qacc", "qacc_warmstart", "qfrc_constraint", "geom_xmat", "userdata")
-    steps = {
-        "free": [text.FREE_POSE, text.FREE_EDITED if edited else text.FREE_PLAIN],
-        "chart": [text.CHART, text.CHART_RESIST if resists else "", text.CHART_CORRECT if corrected else ""],
-        "facets": [text.FACETS],
-    }
-    return "".join(
-        [
-            "import mujoco\nimport numpy as np\n\n",
-            assigned(**ball_numbers(body), **values),
-            wall_source(body),
-            normal_rate_source(body) if settings.curvature else "",
-            f'\n\nMODEL = """\n{xml}\n"""\nmodel = mujoco.MjModel.from_xml_string(MODEL)\n',
-            "# The file rounds to six digits; these are all of them.\n",
-            *(f"model.{name}[:] = {value.tolist()!r}\n" for name, value in _rounded(xml, model).items()),
-            f"model.opt.timestep = {settings.dt!r}\nBALL = model.body('ball').id\n",
-            "data = mujoco.MjData(model)\n",
-            *(f"data.{name}[:] = {getattr(data, name).tolist()!r}\n" for name in state),
-            text.RESIST if resists else "",
-            text.CURVATURE if settings.curvature else "",
-            text.CORRECT if corrected else "",
-            *steps[formulation],
-            text.RUN,
-        ]
-    )
+    read = [
+        f'\n\nMODEL = """\n{xml}\n"""\nmodel = mujoco.MjModel.from_xml_string(MODEL)\n',
+        "# The file rounds to six digits; these are all of them.\n",
+        *(f"model.{name}[:] = {value.tolist()!r}\n" for name, value in _rounded(xml, model).items()),
+        f"model.opt.timestep = {settings.dt!r}\ndata = mujoco.MjData(model)\n",
+        *(f"data.{name}[:] = {getattr(data, name).tolist()!r}\n" for name in state),
+        f"friction = {'BoundedFriction(model, BODY, SETTINGS)' if bounded else None}\n",
+        f"formulation = {formulation.__name__}(model, BODY, SETTINGS, friction)\n",
+    ]
+    wanted = [formulation, raise_if_fatal, *([BoundedFriction] if bounded else [])]
+    evaluations = EVALUATIONS if contact.rolling_resistance else 1
+    uses = ("run", "evaluate", "velocity_lag", "dt")
+    return cut_program(body, settings, wanted, uses, "".join([*read, _RUN]), EVALUATIONS=evaluations)
 
 
 def mechanism_source(xml: str, mechanism: Mechanism) -> str:

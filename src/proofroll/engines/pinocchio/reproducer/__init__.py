@@ -1,24 +1,41 @@
-"""Writes the program that shows what Pinocchio does with a ball on a wall, without proofroll.
-
-A program is put together from the text of a formulation (:mod:`contact`, :mod:`rows`) and, for those with rows, of an
-integrator (:mod:`stepping`); numbers come from the adapter's own model.
-"""
+"""Writes the program that shows what Pinocchio does with a ball on a wall, without proofroll: the adapter's steps."""
 
 from __future__ import annotations
 
 import math
 
 from proofroll.core.errors import Refused
-from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers, normal_rate_source, wall_source
-from proofroll.engines.pinocchio.reproducer import contact, rows, stepping
+from proofroll.elements.ball_on_surface.reproducer_source import cut_program
+from proofroll.engines.pinocchio.contact import ContactSteps
 from proofroll.engines.pinocchio.rows_run import RowsRun
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-_ADAPTIVE = """from collections.abc import Callable, Iterable, Iterator
-from typing import Any
-from scipy.integrate import DOP853
+_SEEN = '''
+
+def seen(model, ball, q, v):
+    """Centre, velocity and angular velocity of the ball in the world."""
+    data = model.createData()
+    pin.forwardKinematics(model, data, q, v)
+    velocity = pin.getVelocity(model, data, ball, pin.LOCAL_WORLD_ALIGNED)
+    return data.oMi[ball].translation.copy(), velocity.linear.copy(), velocity.angular.copy()
+
+
+def run(times):
+    """What is seen at each time."""
+'''
+_ROWS = """    mechanism = {mechanism}(BODY, bool(SETTINGS.orientation))
+    motion = {motion}(mechanism, SETTINGS)
+    for t in times:
+        motion.advance(t)
+        yield seen(mechanism.model, mechanism.ball, motion.q, motion.v)
+"""
+_CONTACT = """    steps = ContactSteps(BODY, SETTINGS)
+    for t in times:
+        steps.advance(t)
+        # With leapfrog the velocity is half a step ahead: the present one is the mean of two.
+        v = (steps.v + steps.kick().v) / 2 if steps.leapfrog and steps.started else steps.v
+        yield seen(steps.contact.model, steps.contact.ball, steps.q, v)
 """
 
 
@@ -29,25 +46,11 @@ def source(body: RollingBall, settings: PinocchioSettings) -> str:
         Refused: the scene or the settings have something that the program has not.
     """
     if settings.formulation == "contact":
-        numbers, parts = contact.numbers(body, settings), [contact.SOURCE]
-        imports = "import numpy as np\nimport pinocchio as pin\n\n"
-    else:
-        if math.isfinite(body.contact.mu_static):
-            raise Refused("the loop that switches between stick and slip around Pinocchio's terms is proofroll's")
-        mechanism = RowsRun(body, settings).mechanism
-        numbers, program = stepping.numbers(mechanism, settings), rows.FREE_FLYER
-        if settings.formulation == "composite":
-            numbers, program = numbers + rows.carriage(body), rows.COMPOSITE
-        parts = [program, stepping.source(settings)]
-        imports = "import numpy as np\nimport pinocchio as pin\n"
-        imports += (_ADAPTIVE if settings.integrator == "dop853" else "") + "\n"
-    return "".join(
-        [
-            imports,
-            assigned(**ball_numbers(body), LEVER=body.contact.rolling_resistance),
-            numbers,
-            wall_source(body),
-            normal_rate_source(body),
-            *parts,
-        ]
-    )
+        return cut_program(body, settings, [ContactSteps], ["advance", "kick"], _SEEN + _CONTACT)
+    if math.isfinite(body.contact.mu_static):
+        raise Refused("the loop that switches between stick and slip around Pinocchio's terms is proofroll's")
+    run = RowsRun(body, settings)
+    wanted = type(run.mechanism), type(run.motion)
+    mechanism, motion = (kind.__name__ for kind in wanted)
+    text = _SEEN + _ROWS.format(mechanism=mechanism, motion=motion)
+    return cut_program(body, settings, wanted, ["advance", "orientation"], text)

@@ -1,0 +1,237 @@
+"""Source of a part of proofroll that runs without it: definitions of several modules, cut to what a program uses."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import functools
+import importlib
+import math
+import re
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+_OURS = __name__.partition(".")[0]
+_COMMENT = re.compile(r"  # (noqa|type: ignore).*$")
+# What stands in a program for definitions that check input or would bring others with them.
+_INSTEAD = {
+    "Diverged": "class Diverged(RuntimeError):\n    pass",
+    "Refused": "class Refused(RuntimeError):\n    pass",
+    "InputError": "class InputError(RuntimeError):\n    pass",
+    "bounded": "def bounded(*_, **__):\n    pass",
+    "read_only": "def read_only(item):\n    return item",
+}
+_Place = tuple[str, str]  # module, name
+_Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+class _Module(NamedTuple):
+    """Lines of a module, and the definitions and imports at its top."""
+
+    lines: list[str]
+    defined: dict[str, ast.stmt]
+    imported: dict[str, list[str] | tuple[str, ast.alias]]
+
+
+class CutOut:
+    """Definitions that others of the package need, each once, in an order in which they can be executed.
+
+    Methods and fields of classes that nothing calls are left out: a name counts as called where it is an attribute
+    somewhere, or a text. Annotations are kept, and need nothing.
+
+    Attributes:
+        head: lines of imports, all of packages besides this one.
+        text: the definitions.
+        names: of the definitions.
+        attributes: names by which the definitions ask for attributes.
+    """
+
+    def __init__(self, wanted: Sequence[object], uses: Iterable[str], without: Iterable[str] = ()) -> None:
+        """Takes functions and classes, attributes that the program itself asks for, and names that it never needs."""
+        self.attributes = set(uses)
+        self._instead = _INSTEAD | {name: f"{name} = None" for name in without}
+        self._kept: dict[_Place, ast.stmt] = {}
+        self._needs: dict[_Place, list[_Place]] = {}
+        self._imports: set[str] = set()
+        roots = [(getattr(one, "__module__"), getattr(one, "__name__")) for one in wanted]  # noqa: B009 -- of any object
+        before = -1
+        while before != len(self.attributes):  # what is called grows with what is kept
+            before = len(self.attributes)
+            self._kept, self._needs = {}, {}
+            for place in roots:
+                self._take(place)
+        ordered: dict[_Place, None] = {}
+        for place in roots:
+            self._order(place, ordered, set())
+        self.names = [name for _, name in ordered]
+        if twice := {name for name in self.names if self.names.count(name) > 1}:
+            raise ValueError(f"two definitions have one name: {', '.join(sorted(twice))}")
+        self._imports |= {"import numpy as np", "from types import SimpleNamespace"}  # for literals
+        lines = sorted(self._imports, key=lambda line: (line.startswith("from"), line))
+        self.head = "\n".join(["from __future__ import annotations", *lines]) + "\n"
+        self.text = "\n\n".join(self._source(place) for place in ordered)
+        if f" {_OURS}" in self.text:
+            raise ValueError(f"an import of {_OURS} is inside a definition among {', '.join(self.names)}")
+
+    def literal(self, value: Any) -> str:
+        """A value as a program writes it: of an object of no class among these, the attributes that they ask for."""
+        if isinstance(value, np.ndarray):
+            return f"np.array({self.literal(value.tolist())})"
+        if isinstance(value, (list, tuple)):
+            inner = "".join(f"{self.literal(item)}, " for item in value)
+            return f"({inner})" if isinstance(value, tuple) else f"[{inner}]"
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"float('{value}')"
+        if value is None or isinstance(value, (bool, int, float, str)):
+            return repr(value)
+        if (kind := type(value).__name__) in self.names:
+            given = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
+        else:
+            kind, names = "SimpleNamespace", self.attributes.intersection(dir(value))
+            given = {name: getattr(value, name) for name in sorted(names) if not name.startswith("_")}
+            given = {name: one for name, one in given.items() if not callable(one)}
+        return f"{kind}({', '.join(f'{name}={self.literal(one)}' for name, one in given.items())})"
+
+    def _take(self, place: _Place) -> _Place | None:
+        """Keeps a definition with all that it needs; where it is, or None for what is imported."""
+        module, name = place
+        if name in self._instead:
+            place = "", name
+            if place not in self._kept:
+                self._kept[place], self._needs[place] = ast.Pass(), []
+            return place
+        read = _read(module)
+        if name in read.imported:
+            source = read.imported[name]
+            if isinstance(source, list):
+                self._imports |= set(source)
+            elif source[0].partition(".")[0] == _OURS:
+                if name != source[1].name:
+                    raise ValueError(f"{module} takes {source[1].name} under another name: {name}")
+                return self._take((source[0], name))
+            else:
+                self._imports.add(f"from {source[0]} import {ast.unparse(source[1])}")
+            return None
+        if name not in read.defined:
+            return None  # Python's own
+        if place in self._kept:
+            return place
+        node = read.defined[name]
+        self._kept[place] = node
+        names, attributes = _asked(node, self._drops(node))
+        self.attributes |= attributes
+        found = [self._take((module, one)) for one in names if one != name]
+        self._needs[place] = [one for one in found if one is not None]
+        return place
+
+    def _drops(self, node: ast.stmt) -> list[ast.stmt]:
+        """Statements of a class that nothing calls."""
+        if not isinstance(node, ast.ClassDef):
+            return []
+        return [part for part in node.body if (name := _optional(part)) and name not in self.attributes]
+
+    def _order(self, place: _Place, ordered: dict[_Place, None], begun: set[_Place]) -> None:
+        """Adds a definition after what it needs."""
+        if place in begun:
+            return
+        begun.add(place)
+        for need in self._needs[place]:
+            self._order(need, ordered, begun)
+        ordered[place] = None
+
+    def _source(self, place: _Place) -> str:
+        """Text of a definition, without what is left out of it and what only we read."""
+        module, name = place
+        if not module:
+            return self._instead[name].strip("\n") + "\n"
+        lines, node = _read(module).lines, self._kept[place]
+        gone = set[int]()
+        for dropped in self._drops(node):
+            first = _first(dropped)
+            while lines[first - 2].lstrip().startswith("#"):
+                first -= 1
+            gone |= set(range(first - (not lines[first - 2].strip()), (dropped.end_lineno or first) + 1))
+        emptied = {}
+        for part in ast.walk(node):
+            if not isinstance(part, (_Function, ast.ClassDef)):
+                continue
+            words, own = ast.get_docstring(part) or "", part.body[0]
+            if "`" in words or _OURS in words:  # it leads to other places of the package
+                gone |= set(range(own.lineno, (own.end_lineno or own.lineno) + 1))
+                if len(part.body) == 1:
+                    emptied[own.lineno] = " " * own.col_offset + "..."
+        kept = []
+        for number in range(_first(node), (node.end_lineno or 0) + 1):
+            if number in emptied:
+                kept.append(emptied[number])
+            elif number not in gone:
+                kept.append(_COMMENT.sub("", lines[number - 1]))
+        text = "\n".join(kept)
+        if isinstance(node, ast.ClassDef) and not ast.unparse(ast.parse(text + "\n    pass")).count("\n    "):
+            text += "\n    pass"
+        return re.sub(r":\n\n+", ":\n", re.sub(r"\n{3,}", "\n\n", text)) + "\n"
+
+
+@functools.cache
+def _read(module: str) -> _Module:
+    importlib.import_module(module)
+    path = sys.modules[module].__file__ or ""
+    text = Path(path).read_text(encoding="utf-8")
+    defined: dict[str, ast.stmt] = {}
+    imported: dict[str, Any] = {}
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.ImportFrom) and node.module:
+            imported |= {one.asname or one.name: (node.module, one) for one in node.names}
+        elif isinstance(node, ast.Import):
+            for one in node.names:
+                imported.setdefault(one.asname or one.name.partition(".")[0], []).append(ast.unparse(node))
+        elif isinstance(node, (_Function, ast.ClassDef)):
+            defined[node.name] = node
+        elif isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            defined |= {one.id: node for target in targets for one in ast.walk(target) if isinstance(one, ast.Name)}
+    return _Module(text.splitlines(), defined, imported)
+
+
+def _first(node: ast.stmt) -> int:
+    """First line of a statement with its decorators."""
+    decorators: list[ast.expr] = getattr(node, "decorator_list", [])
+    return min([node.lineno, *(one.lineno for one in decorators)])
+
+
+def _optional(part: ast.stmt) -> str:
+    """Name of a method or of a fact of a class that may be left out; empty: it stays."""
+    if isinstance(part, _Function):
+        return "" if part.name.startswith("__") else part.name
+    declared = isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
+    if declared and ast.unparse(part.annotation).startswith("ClassVar"):  # type: ignore[attr-defined]  # it is an AnnAssign
+        return str(part.target.id)  # type: ignore[attr-defined]
+    return ""
+
+
+def _asked(node: ast.AST, drops: Sequence[ast.AST]) -> tuple[list[str], set[str]]:
+    """Names that a statement needs to be executed and called, and its attributes."""
+    names, attributes = dict[str, None](), set[str]()
+    for part in _parts(node, drops):
+        if isinstance(part, ast.Name):
+            names[part.id] = None
+        elif isinstance(part, ast.Attribute):
+            attributes.add(part.attr)
+        elif isinstance(part, ast.Constant) and isinstance(part.value, str) and part.value.isidentifier():
+            attributes.add(part.value)
+    return list(names), attributes
+
+
+def _parts(node: ast.AST, drops: Sequence[ast.AST]) -> Iterator[ast.AST]:
+    """All parts of a statement besides annotations and those that are left out."""
+    yield node
+    for field, value in ast.iter_fields(node):
+        if field in {"annotation", "returns"}:
+            continue
+        for part in value if isinstance(value, list) else [value]:
+            if isinstance(part, ast.AST) and part not in drops:
+                yield from _parts(part, drops)
