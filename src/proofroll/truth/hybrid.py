@@ -279,7 +279,7 @@ def _refined(
         rate = rates(time, state)
         slope = float(guards(state + span * rate)[number] - guards(state - span * rate)[number]) / (2 * span)
         better = time - here / slope if slope > 0 else time
-        if not start <= better <= end + span or abs(better - time) <= 2 * np.spacing(time):
+        if not start - span <= better <= end + span or abs(better - time) <= 2 * np.spacing(time):
             break
         time = better
     return time, number
@@ -300,9 +300,12 @@ def between(
 
 
 def _integrated(rates: Rates, state: State, start: float, end: float, tolerance: FloatArray) -> State:
-    """The state at the end of a part of a step, which takes one step unless its error is too large."""
-    if not end > start:
-        return state
+    """The state at the end of a part of a step, which takes one step unless its error is too large.
+
+    A guard that rose just before the step, by less than its round-off, is a moment before it: in a straight line.
+    """
+    if end <= start:
+        return state + (end - start) * rates(start, state)
     solver = _solver(rates, start, state, end, tolerance)
     solver.h_abs = end - start
     while solver.status == "running":

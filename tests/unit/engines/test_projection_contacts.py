@@ -48,7 +48,9 @@ def test_the_first_switch_is_where_two_routes_have_it(name: str, time: float, ki
     assert event.time == pytest.approx(time, abs=1e-7)
 
 
-@pytest.mark.parametrize("name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder"])
+@pytest.mark.parametrize(
+    "name", ["sled", "eccentric_sphere", "free_turntable", "rattleback", "tilted_disc", "ladder", "flick"]
+)
 def test_a_start_is_certified(name: str) -> None:
     """Geometry, friction and first accelerations of every shape are the scene's to round-off, also on what moves."""
     (element,) = load_scene(name).elements
@@ -82,3 +84,23 @@ def test_contacts_beside_other_switches_are_refused() -> None:
     )
     with pytest.raises(Refused, match="contacts are followed in trees"):
         PROJECTION.build(replace(mechanism, joints=joints), DEFAULT)
+
+
+@pytest.mark.parametrize(
+    ("engine", "formulation", "preset", "bound"),
+    [
+        ("projection", "dependent", "default", 1e-8),
+        # half-implicit steps are half a step of speed ahead, 1.6e-4 m
+        ("pinocchio", "impulses", "matched", 3e-4),
+        ("mujoco", "geoms", "tuned", 3e-4),
+        ("exudyn", "spheres", "matched", 3e-5),
+    ],
+)
+def test_a_clamped_servo_pushes_through_a_contact(engine: str, formulation: str, preset: str, bound: float) -> None:
+    """A finger at its limit has pushed a ball after 0.02 s as far as two routes say, and tells its effort."""
+    plugin = load_engine(engine)
+    run = plugin.build(load_scene("flick"), plugin.presets[formulation][preset])
+    run.advance(0.02)
+    sample = run.sample()
+    assert sample.p_WB[1, 0] == pytest.approx(0.07318356288203501, abs=bound)
+    assert sample.effort == pytest.approx([0.6], abs=1e-6)

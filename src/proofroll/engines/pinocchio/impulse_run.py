@@ -66,6 +66,7 @@ class ImpulseRun(MechanismRun):
         """Data of the present state, q, v, and accelerations and forces of the step that begins."""
         q, v, (acceleration, pressing) = self.steps.q, self.steps.v, self._kick()
         found = self.steps.terms(q, v, self._dt)[-1]
+        self.tree.now = self.steps.t
         data = self._placed(acceleration)
         forces = self.tree.pulls(data)
         for contact, each, force in zip(self.steps.contacts, found, pressing, strict=True):

@@ -29,6 +29,7 @@ PROVIDES: frozenset[str] = (
     ALL_JOINTS
     | FORCES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
+    | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS}
 )
 _OF_A_TREE = "its steps are those of a tree with contacts"
 LACKING: Mapping[str, str] = {
@@ -176,6 +177,7 @@ class ImpulseSteps:
         pin.forwardKinematics(model, data, q, v)
         pin.updateFramePlacements(model, data)
         pulls = tree.pulls(data) if tree.springs else None
+        tree.now = self.t + 0.5 * span * self._midpoint
         tau = tree.drives(q, v)
         found = [
             touch(contact, self._moving(contact.body_a), self._moving(contact.body_b)) for contact in self.contacts

@@ -8,7 +8,7 @@ alike is no news, that both move alike in between is.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
+from proofroll.core.integrators import Accept
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
@@ -56,7 +57,7 @@ class ContactMotion:
     """Motion of a tree whose bodies touch.
 
     Attributes:
-        t, x: present time [s] and state.
+        t, x: present time [s] and state; in what follows a state ends with the time.
         mode: of each contact.
         events: so far.
     """
@@ -66,20 +67,22 @@ class ContactMotion:
         equations: DependentCoordinates,
         mechanism: Mechanism,
         stepper: Stepper,
-        accept: Callable[[float, Array], Array],
+        accept: Accept,
         step: float,
     ) -> None:
         """Takes the size of a fixed ``step`` [s]; 0: it adapts."""
-        self._equations, self._stepper, self._accept = equations, stepper, accept
+        self._equations, self._stepper = equations, stepper
+        self._accept: Accept = lambda t, y: np.append(accept(t, y[:-1]), y[-1])
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._faint = max(_STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._fastest: dict[int, float] = {}
         self._idle, self.events = 0, list[Event]()
-        now = self.at(equations.start)
+        start = np.append(equations.start, 0.0)
+        now = self.at(start)
         closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= _STILL for each in now.touching]
         still = [bool(np.linalg.norm(each.slide) <= _STILL) for each in now.touching]
-        self._enter(0.0, equations.start, self._decided(now, closed, still))
+        self._enter(0.0, start, self._decided(now, closed, still))
 
     @property
     def t(self) -> float:
@@ -88,12 +91,13 @@ class ContactMotion:
 
     @property
     def x(self) -> Array:
-        """State now."""
-        return self._stepper.y
+        """State now, without the time."""
+        return self._stepper.y[:-1]
 
-    def at(self, x: Array) -> ContactsThere:
+    def at(self, y: Array) -> ContactsThere:
         """Contacts at a state, with what forces do to them."""
-        equations, spaces = self._equations, list[Space]()
+        equations, spaces, x = self._equations, list[Space](), y[:-1]
+        equations.applied.now = float(y[-1])
 
         def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
             spaces.append(space)
@@ -160,16 +164,20 @@ class ContactMotion:
             force[k] += size * direction
         return force
 
-    def _settled(self, x: Array, mode: ContactMode) -> Array:
+    def _settled(self, y: Array, mode: ContactMode) -> Array:
         """The state without velocities that closed contacts do not allow."""
-        now = self.at(x)
+        now = self.at(y)
         rows = _rows(now, mode)
         if not rows:
-            return x
+            return y
         K = np.array([row @ now.J[k] for k, row in rows])
         D = np.array([now.response[:, k] @ row for k, row in rows])
         left = np.array([row @ now.touching[k].slide for k, row in rows])
-        return self._equations.pushed(x, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
+        return self._pushed(y, -D.T @ np.linalg.lstsq(K @ D.T, left, rcond=_RANK)[0])
+
+    def _pushed(self, y: Array, change: Array) -> Array:
+        """The state with a change of the velocities ν."""
+        return np.append(self._equations.pushed(y[:-1], change), y[-1])
 
     def _heading(self, k: int, found: Touching) -> Array:
         """Direction of a slip; beyond its end within a step it goes on as before it."""
@@ -179,15 +187,15 @@ class ContactMotion:
             return toward
         return np.asarray(slip / speed if slip @ toward >= 0 else -slip / speed)
 
-    def solve(self, x: Array) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
-        """Equations of motion at a state in the present mode, the forces of contact, and the contacts."""
-        now = self.at(x)
+    def solve(self) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
+        """Equations of motion now, the forces of contact, and the contacts."""
+        now = self.at(self._stepper.y)
         force = self.forces(now, self.mode)
-        return self._equations.solve(x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
+        return self._equations.solve(self.x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
 
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`proofroll.elements.mechanism.sampling.MechanismBuilt`."""
-        found = self.solve(self.x)[2]
+        found = self.solve()[2]
         return {
             "contact_gap": np.array([each.gap for each in found]),
             "contact_normal": np.array([each.normal for each in found]),
@@ -197,9 +205,10 @@ class ContactMotion:
             "contact_family": family_text(Family.HARD),
         }
 
-    def _rates(self, x: Array) -> Array:
-        now = self.at(x)
-        return self._equations.rates(x, np.einsum("kin,ki->n", now.J, self.forces(now, self.mode)))
+    def _rates(self, y: Array) -> Array:
+        now = self.at(y)
+        load = np.einsum("kin,ki->n", now.J, self.forces(now, self.mode))
+        return np.append(self._equations.rates(y[:-1], load), 1.0)
 
     def advance(self, t: float) -> None:
         """Moves to time t [s].
@@ -220,9 +229,9 @@ class ContactMotion:
                 self._idle = 0
                 self._look(stepper.y)
 
-    def _look(self, x: Array) -> None:
+    def _look(self, y: Array) -> None:
         """Keeps the directions of slips, to know when one has turned."""
-        moving = self._moving(x)
+        moving = self._moving(y[:-1])
         for k, (own, each) in enumerate(zip(self.mode, self.contacts, strict=True)):
             if own.kind == "slip":
                 self._toward[k] = self._heading(k, touch(each, moving[each.body_a], moving[each.body_b]))
@@ -301,7 +310,7 @@ class ContactMotion:
             e = 0.0
         c[3 * which.index(hit)] *= 1 + e
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
-        x = self._equations.pushed(x, response @ impulse.ravel())
+        x = self._pushed(x, response @ impulse.ravel())
         closed = [False] * len(self.mode)
         for place, k in enumerate(which):
             closed[k] = bool(impulse[place, 0] > 0 and not (k == hit and e))

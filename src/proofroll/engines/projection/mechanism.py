@@ -69,8 +69,8 @@ class ProjectionMechanism:
             raise Refused("dry friction and stops are followed in trees of joints, and this mechanism has loops")
         self._timed = any(map(varies, mechanism.signals))
         pushed = self._timed or any(actuator.limit is not None for actuator in mechanism.actuators)
-        if mechanism.contacts and (switched or mechanism.loops or mechanism.actuators or pushed):
-            raise Refused("contacts are followed in trees whose joints have no loops, switches, actuators or signals")
+        if mechanism.contacts and (switched or mechanism.loops):
+            raise Refused("contacts are followed in trees whose joints have no loops, dry friction or stops")
         if (switched or pushed or mechanism.contacts) and settings.equations == "compiled":
             raise Refused("equations that switch or change in time are not compiled; choose preset=matched")
         if switched and pushed:
@@ -118,7 +118,7 @@ class ProjectionMechanism:
     @property
     def _state(self) -> Array:
         """State now, without the time."""
-        if not self._timed:
+        if self._touching or not self._timed:
             return self._motion.x
         self._equations.applied.now = self._motion.t
         return self._motion.x[:-1]
@@ -146,8 +146,9 @@ class ProjectionMechanism:
             raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
     def _solved(self, x: Array) -> SolvedState:
-        switching = self._switched or self._touching
-        return switching.solve(x)[0] if switching else self._equations.solve(x)
+        if self._touching:
+            return self._touching.solve()[0]
+        return self._switched.solve(x)[0] if self._switched else self._equations.solve(x)
 
     def events(self) -> Sequence[Event]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
@@ -171,7 +172,7 @@ class ProjectionMechanism:
             joint_force=force,
             joint_torque=torque,
             effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
-            contact_force=self._touching.solve(x)[1] if self._touching else None,
+            contact_force=self._touching.solve()[1] if self._touching else None,
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
         )
 

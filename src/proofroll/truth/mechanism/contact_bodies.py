@@ -40,12 +40,12 @@ class ContactBodies(ContactStretches):
     """The stretches of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
     def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
-        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
+        super().__init__(equations, equations.mechanism, len(equations.equations.equations.start()), tolerance, size)
         self.equations = equations
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
-        state = self.equations.equations.equations.start()
+        state = np.append(self.equations.equations.equations.start(), 0.0)
         found = self.equations.at(state)
         speed = STILL * max([1.0, *(float(np.linalg.norm(each.slide)) for each in found.touching)])
         closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= speed for each in found.touching]

@@ -12,6 +12,7 @@ from proofroll.elements.mechanism.contacts.touching import Moving, Touching, tou
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
+from proofroll.truth.mechanism.maximal_equations import Switched
 
 _AXES = np.eye(3)
 
@@ -71,11 +72,13 @@ class ContactEquations:
         index = mechanism.body_index
         self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in self.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
+        self._limited = {k: motor for k, motor in enumerate(mechanism.actuators) if motor.limit is not None}
+        self._driven = [mechanism.joint_index[motor.joint] for motor in self._limited.values()]
 
     def at(self, state: Array) -> BodiesState:
-        """Bodies at a state, as :meth:`NumericEquations.rate` has them."""
+        """Bodies at a state, as :meth:`NumericEquations.rate` has them; its last component is the time [s]."""
         e = self.equations.equations
-        found, C, bias, half, force = self.equations.loaded(state)
+        found, C, bias, half, force = self.equations.loaded(state[:-1], float(state[-1]), self.clamped(state))
         bodies = []
         for view, com in zip(found.views, self._com, strict=True):
             R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
@@ -180,8 +183,24 @@ class ContactEquations:
         e, unit = self.equations.equations, self.equations.normalised(state)
         found = self.accelerated(self.at(unit), mode)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
-        angles = self.equations.loaded(unit)[0].angle_rate if len(state) > e.nx + e.nu else []
-        return np.array([*self._moving(x, u), *found.moved, *angles], dtype=float)
+        angles = self.equations.loaded(unit[:-1])[0].angle_rate if e.angles else []
+        return np.array([*self._moving(x, u), *found.moved, *angles, 1.0], dtype=float)
+
+    def _wanted(self, state: Array) -> Array:
+        """Efforts of the actuators with a limit before it clamps them [N m, N]."""
+        if not self._limited:
+            return np.zeros(0)
+        q, v = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
+        return np.array([m.wanted(state[-1], *at) for m, *at in zip(self._limited.values(), q, v, strict=True)])
+
+    def excess(self, state: Array) -> Array:
+        """Efforts that are wanted beyond their limits, of those that have one [N m, N]."""
+        return np.abs(self._wanted(state)) - [motor.bound for motor in self._limited.values()]
+
+    def clamped(self, state: Array) -> Switched:
+        """Efforts that are at their limits."""
+        wanted = zip(self._limited.items(), self._wanted(state), strict=True)
+        return Switched(clamped={k: float(np.clip(w, -m.bound, m.bound)) for (k, m), w in wanted if abs(w) > m.bound})
 
     def _moving(self, x: Array, u: Array) -> list[float]:
         """Rates of the coordinates."""
@@ -192,7 +211,7 @@ class ContactEquations:
     def eliminated(self, state: Array, mode: ContactMode) -> Array:
         """The state with violations of rows, closed contacts and unit quaternions removed."""
         e = self.equations.equations
-        state = self.equations.eliminated(state)
+        state = np.append(self.equations.eliminated(state[:-1]), state[-1])
         closed = [k for k, own in enumerate(mode) if own.kind != "open"]
         if not closed:
             return state

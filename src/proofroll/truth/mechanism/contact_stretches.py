@@ -13,7 +13,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import varies
 from proofroll.truth.hybrid import Stretch, Transition, between
 from proofroll.truth.mechanism.contact_guards import (
     AT_REST,
@@ -28,6 +30,9 @@ from proofroll.truth.mechanism.contact_guards import (
     refuse_turning_onset,
 )
 from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
+
+_AHEAD = 1e-9  # s: after a stretch has begun, whether an effort is at its limit
+_CLAMPED = 1e-9  # N m, N: an effort as near to its limit comes from it
 
 
 class SolvedContacts(NamedTuple):
@@ -57,14 +62,20 @@ class _Equations(Protocol):
 
     def eliminated(self, state: Array, mode: ContactMode, /) -> Array: ...
 
+    def excess(self, state: Array, /) -> Array: ...
+
 
 class ContactStretches(Stretches[ContactMode]):
-    """Stretches, ends of them, and what follows. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+    """Stretches, ends of them, and what follows; a state ends with the time.
 
-    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
-        """Takes the length of a state, the tolerance of each step, and the size of the mechanism [m]."""
-        super().__init__(length, tolerance)
-        self._given, self.contacts, self._size = equations, equations.contacts, size
+    See :class:`proofroll.truth.hybrid.HybridRoute`.
+    """
+
+    def __init__(self, equations: _Equations, mechanism: Mechanism, length: int, tolerance: float, size: float) -> None:
+        """Takes the length of a state without time, the tolerance of each step, and the size of the mechanism [m]."""
+        super().__init__(length + 1, tolerance)
+        self._given, self.contacts, self._size = equations, mechanism.contacts, size
+        self._timed = any(map(varies, mechanism.signals))
 
     @abstractmethod
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
@@ -90,13 +101,16 @@ class ContactStretches(Stretches[ContactMode]):
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         """Transition of the motion by an impact."""
 
-    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:  # noqa: ARG002 -- the equations of a mode are the same everywhere
+    def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
         guards, equations = guards_of(self.contacts, mode), self._given
+        # an effort comes to its limit, or back from it
+        side = np.sign(equations.excess(state + _AHEAD * equations.rate(state, mode)))
+        noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
         return StretchLaw(
             lambda y: equations.rate(y, mode),
-            lambda y: self._guards(y, mode, guards),
+            lambda y: np.append(self._guards(y, mode, guards), -side * equations.excess(y)),
             lambda y: equations.eliminated(y, mode),
-            noise_of(guards, self._size),
+            np.append(noise_of(guards, self._size), noise),
         )
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
@@ -112,8 +126,9 @@ class ContactStretches(Stretches[ContactMode]):
         start, begun = self._kicked(time, state, mode)
         leg = super().walk(begun, start, mode, until)
         end, last = leg.end, leg.last
-        if leg.guard is not None:
-            k, kind = guards_of(self.contacts, mode)[leg.guard]
+        guards = guards_of(self.contacts, mode)
+        if leg.guard is not None and leg.guard < len(guards):
+            k, kind = guards[leg.guard]
             if kind == "still":
                 found = self._solved(last, mode)
                 rest = faint_time(mode[k], found.touching[k], found.slide_rate[k])
@@ -138,8 +153,10 @@ class ContactStretches(Stretches[ContactMode]):
 
     def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
-        assert leg.guard is not None  # nothing changes at the end of time
-        k, kind = guards_of(self.contacts, leg.mode)[leg.guard]
+        guards = guards_of(self.contacts, leg.mode)
+        if leg.guard is None or leg.guard >= len(guards):  # a break, or the limit of an effort
+            return Transition(leg.last, leg.mode, ())
+        k, kind = guards[leg.guard]
         mode, name = list(leg.mode), self.contacts[k].name
         if kind == "tear":
             raise self._torn(leg)
@@ -175,7 +192,7 @@ class ContactStretches(Stretches[ContactMode]):
 
     def _stands(self, state: Array, mode: ContactMode) -> bool:
         """True if nothing moves, and nothing will."""
-        if any(own.kind == "slip" for own in mode):
+        if self._timed or any(own.kind == "slip" for own in mode):
             return False
         found = self._solved(state, mode)
         return float(np.abs(found.velocity).max()) <= AT_REST and float(np.abs(found.acceleration).max()) <= STANDS

@@ -9,7 +9,7 @@ import numpy as np
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
-from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, Transition
@@ -22,13 +22,13 @@ class ContactTree(ContactStretches):
     """The stretches of a mechanism in the coordinates of its tree. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
     def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
-        self.dynamics, self._nq = dynamics, dynamics.mechanism.nq
-        super().__init__(dynamics, self._nq + dynamics.mechanism.nv, tolerance, size)
+        self.dynamics = dynamics
+        super().__init__(dynamics, dynamics.mechanism, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         mode, margin = self.dynamics.begin()
-        state = self.dynamics.eliminated(np.concatenate(self.dynamics.mechanism.start()), mode)
+        state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 
     def _torn(self, leg: Stretch[ContactMode]) -> Refused:
@@ -36,7 +36,7 @@ class ContactTree(ContactStretches):
         return Refused(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        found = self.dynamics.solve(*self._parts(state), mode)
+        found = self._forces(state, mode)
         own = mode[k]
         assert own.along is not None  # others are refused
         sign = -float(np.sign(np.dot(own.along, found.force[k])))
@@ -45,7 +45,7 @@ class ContactTree(ContactStretches):
 
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         contacts, dynamics = self.contacts, self.dynamics
-        q, v = self._parts(leg.last)
+        q, v, time = dynamics.parts(leg.last)
         found = dynamics.at(q, v).touching
         hits = striking(leg.mode, found, hit)
         closed = [k for k, own in enumerate(leg.mode) if own.kind != "open" or k in hits]
@@ -55,11 +55,11 @@ class ContactTree(ContactStretches):
         after, impulse, margin = dynamics.struck(q, v, closed, law)
         delay = 0.0
         if contacts[hit].restitution and speed < SETTLED * fastest:
-            free = dynamics.solve(q, after, leg.mode)
+            free = dynamics.solve(q, after, leg.mode, time)
             pull = -float(found[hit].normal @ free.slide_rate[hit])
             delay = 2 * speed * contacts[hit].restitution / (pull * (1 - contacts[hit].restitution))
             after, impulse, margin = dynamics.struck(q, v, closed, np.zeros(len(closed)))
-        state = np.concatenate([q, after])
+        state = np.concatenate([q, after, [time]])
         stays = [False] * len(contacts)
         for place, k in enumerate(closed):
             e = contacts[k].restitution if k in hits and not delay else 0.0
@@ -69,18 +69,19 @@ class ContactTree(ContactStretches):
         first = ("settle" if delay else "impact", contacts[hit].name)
         return self._after(leg, state, stays, (first,), margin, delay)
 
-    def _parts(self, state: Array) -> tuple[Array, Array]:
-        return state[: self._nq], state[self._nq :]
+    def _forces(self, state: Array, mode: ContactMode) -> ContactSolution:
+        q, v, time = self.dynamics.parts(state)
+        return self.dynamics.solve(q, v, mode, time)
 
     def _touching(self, state: Array) -> Sequence[Touching]:
-        return self.dynamics.at(*self._parts(state)).touching
+        return self.dynamics.at(*self.dynamics.parts(state)).touching
 
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
-        q, v = self._parts(state)
-        found = self.dynamics.solve(q, v, mode)
+        found, v = self._forces(state, mode), self.dynamics.parts(state)[1]
         return SolvedContacts(
             found.state.touching, v, found.acceleration, found.slide_rate, found.force, found.response
         )
 
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
-        return self.dynamics.decided(*self._parts(state), closed, still)
+        q, v, time = self.dynamics.parts(state)
+        return self.dynamics.decided(q, v, closed, still, time)

@@ -9,6 +9,7 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.signal import breaks
 from proofroll.truth.hybrid import follow, states_of
 from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
@@ -30,19 +31,21 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     check_start(dynamics.equations, second)
     size = _size(dynamics)
     tree = ContactTree(dynamics, TOLERANCE, size)
-    bodies = ContactBodies(ContactEquations(mechanism, second.lean), TOLERANCE, size)
-    until = float(times[-1])
-    paths = follow(tree, until, (), CLOSE), follow(bodies, until, (), CLOSE)
+    equations = ContactEquations(mechanism, second.lean)
+    bodies = ContactBodies(equations, TOLERANCE, size)
+    until, kinks = float(times[-1]), breaks(mechanism.signals)
+    paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = paths[0].leg_at(times)
     others = [min(number, len(paths[1].legs) - 1) for number in legs]
     samples = [
-        dynamics.sample(state[: mechanism.nq], state[mechanism.nq :], paths[0].legs[number].mode)
+        dynamics.sample(*dynamics.parts(state)[:2], paths[0].legs[number].mode, float(state[-1]))
         for state, number in zip(states_of(tree, paths[0], times, legs), legs, strict=True)
     ]
     one, pressed = gathered(times, [record for record, _ in samples]), np.array([force for _, force in samples])
     states = states_of(bodies, paths[1], times, others)
     applied = [bodies.forces(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)]
-    two = matched(mechanism, one, second.recorded(times, states, applied=[wrench for _, wrench in applied]))
+    wrenches, clamped = [wrench for _, wrench in applied], [equations.clamped(state) for state in states]
+    two = matched(mechanism, one, second.recorded(times, states[:, :-1], clamped, wrenches))
     routes = (
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",

@@ -102,9 +102,11 @@ class NumericEquations:
         into = half @ locked.T
         return Solved(found, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
 
-    def loaded(self, state: Array) -> tuple[ConstrainedEquations, Array, Array, Array, Array]:
-        """Equations at a state: their rows C and biases, H with M⁻¹ = H Hᵀ, and the forces."""
-        found = self.equations.at(state.tolist(), switched=self._switched)
+    def loaded(
+        self, state: Array, time: float = 0.0, switched: Switched | None = None
+    ) -> tuple[ConstrainedEquations, Array, Array, Array, Array]:
+        """Equations at a state and a time [s]: their rows C and biases, H with M⁻¹ = H Hᵀ, and the forces."""
+        found = self.equations.at(state.tolist(), switched=switched, time=time)
         bias = np.array([row.bias for row in found.rows], dtype=float)
         return found, self._matrix(found.rows), bias, *self._driven(found)
 

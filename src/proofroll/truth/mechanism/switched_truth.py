@@ -11,7 +11,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import breaks, varies
+from proofroll.elements.mechanism.signal import breaks
 from proofroll.truth.hybrid import follow, states_of
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
@@ -31,10 +31,6 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Refused: fewer than two routes cover the mechanism; the text says why.
     """
     times = np.asarray(times, dtype=float)
-    if mechanism.contacts and (
-        any(map(varies, mechanism.signals)) or any(actuator.limit for actuator in mechanism.actuators)
-    ):
-        raise Refused("no route follows contacts together with limits of efforts or with what changes in time")
     try:
         return contact_truth(mechanism, times) if mechanism.contacts else _without_contacts(mechanism, times)
     except Diverged as stopped:

@@ -46,8 +46,8 @@ class ContactMutant(MechanismMutant):
         at = np.array([self.clock(self.t)])
         (number,) = self.path.leg_at(at)
         state = states_of(self.tree, self.path, at, [number])[0]
-        q, v = state[: self.mechanism.nq], state[self.mechanism.nq :]
-        record, force = self.dynamics.sample(q, v, self.path.legs[number].mode)
+        q, v, time = self.dynamics.parts(state)
+        record, force = self.dynamics.sample(q, v, self.path.legs[number].mode, time)
         force = np.where(np.isnan(force), 0.0, force)
         motion = {name: record[name] for name in ("p_WB", "v_WB", "w_WB", "q_WB")}
         sample: MechanismSample = self.misreport(MechanismSample(**motion, contact_force=force))

@@ -15,9 +15,11 @@ from proofroll.core.events import events_of
 from proofroll.core.observable import Role
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
+from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion
@@ -304,3 +306,50 @@ def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
     mechanism, _ = as_bodies("inclined_plane", float(friction), 0.3, speed=0.0)
     found = truth_of(mechanism, np.array([0.0, 0.1]))
     assert (found.horizon, tuple(found.events)) == (0.0, ())
+
+
+def test_a_driven_foot_slides_as_newton_says() -> None:
+    """A force that grows in time up to its limit moves a foot against friction by a cubic, then a parabola of time."""
+    inertia = (1.0, 1.0, 1.0)
+    bodies = tuple(Body(name, mass, inertia=inertia) for name, mass in (("cart", 0.5), ("foot", 1.5)))
+    joints = (
+        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,)),
+        Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
+    )
+    geometries = (Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane"))
+    found = truth_of(
+        Mechanism(
+            bodies=bodies,
+            joints=joints,
+            actuators=(Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0),),
+            geometries=geometries,
+            pairs=(Pair("sole", ("ball", "floor"), friction=0.2),),
+            gravity=(0.0, 0.0, -9.81),
+        ),
+        np.array([0.0, 0.1, 0.22]),
+    )
+    slowed = 0.2 * 1.5 * 9.81 / 2
+    moved = [0.1 - slowed * 0.1**2 / 2 + 20 / 2 * 0.1**3 / 6]
+    moved.append(0.22 - slowed * 0.22**2 / 2 + 20 / 2 * (0.2**3 / 6 + 0.2**2 / 2 * 0.02) + 4.0 / 2 * 0.02**2 / 2)
+    assert found.record.q[1:, 0] == pytest.approx(moved, abs=1e-13)
+    assert found.record.named[:, 0] == pytest.approx([0.0, 2.0, 4.0], abs=1e-14)
+    assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
+
+
+def test_a_finger_pushes_a_ball_and_lets_go() -> None:
+    """A servo at its limit pushes a ball over a floor; the tip slips on it, and the bars stay narrow."""
+    found = motion("flick", [0.0, 0.07])
+    assert happened(found) == [("slip", "push")]
+    times_of(found, 0.060258231738)
+    assert found.record.named[:, 0] == pytest.approx([0.6, 0.6], abs=1e-14)
+
+
+@pytest.mark.drill
+@pytest.mark.parametrize(("finger", "swing", "mass"), [(0.1, 0.8, 0.1), (0.08, 0.5, 0.15), (0.12, 0.9, 0.08)])
+def test_a_flicked_ball_has_narrow_bars_at_other_numbers(finger: float, swing: float, mass: float) -> None:
+    """Both routes agree to 1e-9 over the whole motion, with an effort that leaves its limits and comes back."""
+    flicked = mechanism_of("flick", finger_friction=finger, swing=swing, mass=mass)
+    found = truth_of(flicked, np.linspace(0.0, 0.4, 5))
+    assert np.isinf(found.horizon)
+    assert {("lift_off", "push"), ("stick", "ground")} <= set(happened(found))
+    assert max(float(bar[-1]) for bar in found.bars.values()) < 1e-9

@@ -22,7 +22,6 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Sol
 from proofroll.elements.mechanism.kinematics import BodyMotion
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, skew
-from proofroll.elements.mechanism.signal import varies
 
 
 @dataclass(frozen=True)
@@ -70,18 +69,16 @@ class ContactDynamics:
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
-        if self.equations.switches:
+        if self.equations.switched:
             raise Refused("dry friction or stops of joints beside contacts of bodies; no route follows both")
-        if mechanism.actuators or any(varies(signal) for signal in mechanism.signals):
-            raise Refused("drives that change in time beside contacts of bodies; no route follows both")
         self.contacts = mechanism.contacts
         self.friction = np.array([contact.friction for contact in self.contacts])
         index = mechanism.body_index
         self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in self.contacts]
 
-    def at(self, q: Array, v: Array) -> ContactsNow:
-        """Kinematics and free accelerations for coordinates (nq) and velocities (nv)."""
-        found = self.equations.solve(q, v, ())
+    def at(self, q: Array, v: Array, time: float = 0.0) -> ContactsNow:
+        """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s]."""
+        found = self.equations.solve(q, v, (), time=time)
         W: Array = np.asarray(np.linalg.inv(self.equations.inertial(found.motion)[1]), dtype=np.float64)
         if found.split is not None:
             W = W - found.split[0] @ found.split[0].T
@@ -101,13 +98,13 @@ class ContactDynamics:
             bias += sign * (turning + cross(w, found.place_rate - motion.v_WB[body]))
         return J, bias
 
-    def solve(self, q: Array, v: Array, mode: ContactMode) -> ContactSolution:
+    def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
         """Accelerations and forces while each contact does what the mode says.
 
         Raises:
             Refused: forces of contact are not determinate while something moves.
         """
-        return self.solved(self.at(q, v), mode)
+        return self.solved(self.at(q, v, time), mode)
 
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """See :meth:`solve`."""
@@ -152,15 +149,24 @@ class ContactDynamics:
         return ContactSolution(state, acceleration, force, known, slide_rate, response)
 
     def rate(self, y: Array, mode: ContactMode) -> Array:
-        """Right-hand side for the state (q, v)."""
-        q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
-        return np.concatenate([self.equations.tree.rate(q, v), self.solve(q, v, mode).acceleration])
+        """Right-hand side for the state (q, v, time)."""
+        q, v, time = self.parts(y)
+        return np.concatenate([self.equations.tree.rate(q, v), self.solve(q, v, mode, time).acceleration, [1.0]])
+
+    def parts(self, y: Array) -> tuple[Array, Array, float]:
+        """Coordinates, velocities and time [s] of a state."""
+        nq = self.mechanism.nq
+        return y[:nq], y[nq:-1], float(y[-1])
+
+    def excess(self, y: Array) -> Array:
+        """Efforts that are wanted beyond their limits, of those that have one [N m, N]."""
+        q, v, time = self.parts(y)
+        return np.array([abs(m.wanted(time, q[at_q], v[at_v])) - m.bound for m, at_q, at_v in self.equations.limited])
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
-        nq = self.mechanism.nq
-        y = self.equations.eliminated(y)
-        q, v = y[:nq], y[nq:]
+        y = np.append(self.equations.eliminated(y[:-1]), y[-1])
+        q, v, time = self.parts(y)
         closed = [k for k, own in enumerate(mode) if own.kind != "open"]
         if not closed:
             return y
@@ -169,7 +175,7 @@ class ContactDynamics:
         gaps = np.array([state.touching[k].gap for k in closed])
         q = self.equations.tree.moved(q, -_held(state.W, normals, gaps))
         state = self.at(q, v)
-        return np.concatenate([q, v - self._brought(state, v, mode)])
+        return np.concatenate([q, v - self._brought(state, v, mode), [time]])
 
     def _brought(self, state: ContactsNow, v: Array, mode: ContactMode) -> Array:
         """Velocities that closed contacts do not allow."""
@@ -191,7 +197,9 @@ class ContactDynamics:
         still = [bool(np.linalg.norm(each.slide) <= least) for each in state.touching]
         return self.decided(q, v, closed, still)
 
-    def decided(self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
+    def decided(
+        self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool], time: float = 0.0
+    ) -> tuple[ContactMode, float]:
         """Mode that follows from the forces, and how far it is from another one, relative.
 
         Args:
@@ -199,8 +207,9 @@ class ContactDynamics:
             v: velocities.
             closed: whether a contact's gap is closed and does not open by its speed.
             still: whether it does not slide either.
+            time: at which drives and targets are taken [s].
         """
-        state = self.at(q, v)
+        state = self.at(q, v, time)
         which = [k for k, shut in enumerate(closed) if shut]
         if not which:
             return tuple(OPEN for _ in closed), np.inf
@@ -253,16 +262,16 @@ class ContactDynamics:
                     )
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
-    def sample(self, q: Array, v: Array, mode: ContactMode) -> tuple[dict[str, Any], Array]:
-        """Fields of a record at one time, and the forces of contact, (contacts, 3), NaN where not determinate."""
-        found = self.solve(q, v, mode)
+    def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
+        """Fields of a record at one time [s], and the forces of contact, (contacts, 3), NaN where not determinate."""
+        found = self.solve(q, v, mode, time)
         load = np.einsum("kin,ki->n", found.state.J, found.force)
         applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
         for (a, b), each, force in zip(self._bodies, found.state.touching, found.force, strict=True):
             wrench = np.concatenate([force, cross(each.place, force)])
             applied[a] += wrench
             applied[b] -= wrench
-        record = self.equations.sample(q, v, (), load=load, applied=applied)
+        record = self.equations.sample(q, v, (), time, load, applied)
         return record, np.where(found.determinate, found.force, np.nan)
 
 
