@@ -227,7 +227,10 @@ def walked(
         if found is not None:
             end, number = _refined(rates, before, begun, solver.t, found, guards, tolerance)
             return end, corrected(_integrated(rates, before, begun, end, tolerance)), number
-        solver.y = corrected(solver.y)
+        try:
+            solver.y = corrected(solver.y)
+        except Diverged as stopped:
+            raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {stopped}") from None
         solver.f = rates(solver.t, solver.y)
     return until, np.asarray(solver.y), None
 

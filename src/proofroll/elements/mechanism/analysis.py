@@ -17,6 +17,9 @@ from proofroll.elements.mechanism.rotations import Array, cross
 # of the mechanisms seen so far above 1e-3; the square-root middle leaves room to both.
 RANK = 1e-8
 NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
+# Part of its usual size at which the least singular value of a loop's rows is one of a singular pose: the root of 1e-9,
+# for a length that differs by that part leads there, and no file is surer of a length.
+BRANCHES = 3e-5
 State = TypeVar("State")
 _FOLLOWED = 0.3  # least determinant of a space's turn: 1 where it stays, 0 where a direction of it left
 _ZERO = 1e-9  # relative: a component of a null vector that is zero but for round-off
@@ -32,8 +35,7 @@ class Analysis:
         rank_at_start: at the start; smaller where the start is a singular pose.
         redundant: rows that follow from the others.
         mobility: degrees of freedom at a general pose.
-        singular_start: whether the start is a singular pose.
-        gap: the relative singular values at the start on both sides of the rank: (smallest kept, largest dropped).
+        singular_start: whether the start is a singular pose, or as near to one as lengths are known.
         determinate: whether the equations of motion alone determine each component (Fx, Fy, Fz, Mx, My, Mz in world
             axes, at the joint) of the wrench of each joint and then each loop, (joints + loops, 6).
     """
@@ -44,7 +46,6 @@ class Analysis:
     redundant: int
     mobility: int
     singular_start: bool
-    gap: tuple[float, float]
     determinate: NDArray[np.bool_]
 
 
@@ -64,19 +65,19 @@ def analysed(mechanism: Mechanism) -> Analysis:
 
     near = tree.at(general_place(q, of_loops, tree.moved), still)
     near_rows = tree.loop_rows(near)
-    rank = max(at_start, rank_of(singular_values(near_rows.C)))
+    near_values = singular_values(near_rows.C)
+    rank = max(at_start, rank_of(near_values))
     mask = determinate(tree, near, near_rows, rank)
     if at_start == rank:
         mask &= determinate(tree, motion, rows, rank)
-    relative = np.append(values / max(values.max(initial=0.0), 1e-300), 0.0)
     return Analysis(
         rows=len(rows.residual),
         rank=rank,
         rank_at_start=at_start,
         redundant=len(rows.residual) - rank,
         mobility=mechanism.nv - rank,
-        singular_start=at_start < rank,
-        gap=(float(relative[rank - 1]) if rank else 1.0, float(relative[rank]) if rank < len(relative) else 0.0),
+        # nearby, a least value that starts at zero has come to NEARBY of its usual size
+        singular_start=bool(rank and values[rank - 1] < BRANCHES / NEARBY * near_values[rank - 1]),
         determinate=mask,
     )
 
@@ -107,13 +108,17 @@ class RowSign:
 
     def __init__(self, rank: int) -> None:
         self._rank, self._before = rank, (np.zeros((0, 0)), np.zeros((0, 0)))
+        self._usual, self.least = 0.0, 1.0
 
     def changes(self, C: Array) -> bool:
         """True if rank was lost between the pose before and that of these rows, (rows, velocities).
 
-        False also where the spaces turned too far in between.
+        False also where the spaces turned too far in between. ``least`` is then the least singular value here, in parts
+        of the largest that it had.
         """
-        U, _, Vt = np.linalg.svd(C, full_matrices=False)
+        U, S, Vt = np.linalg.svd(C, full_matrices=False)
+        self._usual = max(self._usual, float(S[self._rank - 1]))
+        self.least = float(S[self._rank - 1]) / self._usual
         left, right = U[:, : self._rank], Vt[: self._rank].T
         (left_before, right_before), self._before = self._before, (left, right)
         if not left_before.size:

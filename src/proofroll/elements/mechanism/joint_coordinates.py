@@ -8,7 +8,7 @@ spherical and free joints are states in the child's axes, which keeps digits whe
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -17,7 +17,7 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.analysis import RANK, RowSign, analysed, reactions
+from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analysed, reactions
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
@@ -188,16 +188,23 @@ class JointCoordinates:
         """
         refuse_switching(self.mechanism)
         nq, start = self.mechanism.nq, np.concatenate(self.mechanism.start())
+        states = integrated(self.rate, start, times, tolerance, self.followed(), least=self._least(tolerance))
+        return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
+
+    def followed(self, mode: Mode | None = None) -> Callable[[Array], Array]:
+        """Elimination of violations after each step of one motion, which ends at a singular pose of the loops.
+
+        It raises Diverged where a step has passed one, or has come as near to one as lengths are known.
+        """
         sign = RowSign(self.rank)
 
         def corrected(y: Array) -> Array:
-            y = self.eliminated(y)
-            if self.rank and sign.changes(self.rows(y[:nq]).C):
-                raise Diverged("a step passes a singular pose of the loops")
+            y = self.eliminated(y, mode)
+            if self.rank and (sign.changes(self.rows(y[: self.mechanism.nq]).C) or sign.least < BRANCHES):
+                raise Diverged("a step passes a singular pose of the loops, or one as near as lengths are known")
             return y
 
-        states = integrated(self.rate, start, times, tolerance, corrected, least=self._least(tolerance))
-        return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
+        return corrected
 
     def sensitivity(self) -> tuple[float, float]:
         """Sensitivity of the accelerations to the state at the start.

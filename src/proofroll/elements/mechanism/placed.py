@@ -126,21 +126,25 @@ class Placed:
 
     def energy(self) -> FloatArray:
         """Kinetic energy, and potential energy of gravity and of all springs [J], shape (time,)."""
-        total = np.zeros(len(self.time))
+        return np.asarray(self.energies().sum(-1))
+
+    def energies(self) -> FloatArray:
+        """Parts of the energy [J], shape (time, parts): heights may take away what motion adds."""
+        found: list[FloatArray] = []
         for body in self.mechanism.bodies:
             R, w = self.R_WB[:, self.mechanism.body_index[body.name]], self.spin(body.name)
             local = np.einsum("tji,tj->ti", R, w)
             v = self.velocity(body.name, body.com)
-            total += 0.5 * body.mass * np.sum(v**2, -1) + 0.5 * np.sum(local @ np.array(body.inertia) * local, -1)
-            total -= body.mass * self.point(body.name, body.com) @ np.array(self.mechanism.gravity)
+            found += [0.5 * body.mass * np.sum(v**2, -1), 0.5 * np.sum(local @ np.array(body.inertia) * local, -1)]
+            found += list(-body.mass * np.array(self.mechanism.gravity)[:, None] * self.point(body.name, body.com).T)
         for spring in self.mechanism.springs:
             ends = self.point(spring.body_a, spring.position_a) - self.point(spring.body_b, spring.position_b)
-            total += 0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2
+            found.append(0.5 * spring.stiffness * (np.linalg.norm(ends, axis=-1) - spring.length) ** 2)
         for joint in self.mechanism.joints:
             if joint.stiffness or joint.armature:
                 q, v = self.along(joint)
-                total += 0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1)
-        return total
+                found.append(0.5 * np.sum(joint.stiffness * (q - joint.rest) ** 2 + joint.armature * v**2, -1))
+        return np.array(found).T
 
     def momentum(self) -> tuple[FloatArray, FloatArray]:
         """Momentum [N s] and moment of momentum about the world's origin [N m s], shapes (time, 3)."""

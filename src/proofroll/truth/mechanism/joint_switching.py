@@ -44,10 +44,11 @@ class SwitchedTree(Stretches[Mode]):
     def _law(self, state: Array, mode: Mode) -> StretchLaw:
         q, v = self._parts(state)
         at_q = [joint.coordinate for joint in self.joints]
+        corrected = self.equations.followed(mode)
         return StretchLaw(
             lambda y: np.append(self.equations.rate(float(y[-1]), y[:-1], mode), 1.0),
             lambda y: self._guards(y, mode),
-            lambda y: np.append(self.equations.eliminated(y[:-1], mode), y[-1]),
+            lambda y: np.append(corrected(y[:-1]), y[-1]),
             noise_of(self.joints, self.motors, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
         )
 

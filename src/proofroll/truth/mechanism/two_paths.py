@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close
-from proofroll.truth.mechanism.two_routes import FACTOR, ROUND_OFF, TwoRouteMotion, judged, largest
+from proofroll.truth.mechanism.two_routes import FACTOR, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
 
 TOLERANCE = 1e-14  # of each step
 # Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
@@ -66,12 +66,12 @@ def two_route_motion(
     fields, others = judged(mechanism, masked), judged(mechanism, two)
     if pressed is not None:
         fields["pressed"], others["pressed"] = pressed
-    bars, differences = {}, {}
+    placed = masked.placed(mechanism)
+    bars, differences, least = {}, {}, round_off(fields, placed)
     for field, values in fields.items():
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
-        bars[field] = np.maximum.accumulate(FACTOR * difference + ROUND_OFF * np.maximum.accumulate(largest(values)))
+        bars[field] = np.maximum.accumulate(FACTOR * difference + least[field])
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
-    placed = masked.placed(mechanism)
     reach = np.maximum(size, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
     horizon = min(parted, first_close(paths, CLOSE))

@@ -8,7 +8,7 @@ the horizon.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,7 @@ from proofroll.core.events import Event
 from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
@@ -103,18 +104,17 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         routes = (f"closed form: {form.title}", *routes)
     _check_limits(mechanism, best)
     masked = replace(best, wrench=np.where(found.determinate, best.wrench, np.nan))
-    bars, differences = {}, {}
+    placed, fields = masked.placed(mechanism), judged(mechanism, masked)
+    bars, differences, least = {}, {}, round_off(fields, placed)
     late = np.flatnonzero(chaotic)
     horizon = float(times[late[0]]) if len(late) else np.inf
     rest = [judged(mechanism, record) for record in (one, two, precise)]
-    for field, values in judged(mechanism, masked).items():
+    for field, values in fields.items():
         others = [np.where(np.isnan(values), np.nan, other[field]) for other in rest]
         difference = np.maximum(largest(others[0] - values), largest(others[0] - others[2]))
-        size = np.maximum.accumulate(largest(values))
-        bar = FACTOR * difference + largest(others[1] - others[2]) + ROUND_OFF * size
+        bar = FACTOR * difference + largest(others[1] - others[2]) + least[field]
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
-    placed = masked.placed(mechanism)
     # nothing is open in truth: all that is seen is error, and round-off of places and of cosines
     of_places = ROUND_OFF * np.maximum(1.0, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + of_places)
@@ -130,6 +130,13 @@ def judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
     placed = record.placed(mechanism)
     found = {name: getattr(record, name) for name in JUDGED}
     return found | {"points": placed.points, "energy": placed.energy()}
+
+
+def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:
+    """Round-off of fields at each time, by the largest value so far; of energy by its parts, which may take away."""
+    sizes = {name: largest(values) for name, values in fields.items()}
+    sizes["energy"] = np.abs(placed.energies()).sum(axis=-1)
+    return {name: ROUND_OFF * np.maximum.accumulate(size) for name, size in sizes.items()}
 
 
 def _singular(mechanism: Mechanism, until: float) -> str:

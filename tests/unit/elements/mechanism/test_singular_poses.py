@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
-from proofroll.elements.mechanism.analysis import RowSign
+from proofroll.elements.mechanism.analysis import RowSign, analysed
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.truth.hybrid import follow
 from proofroll.truth.mechanism.closed_forms import closed_form
+from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.plug_in import MechanismTruth
 from proofroll.truth.mechanism.singular_poses import singular_poses
 from proofroll.truth.mechanism.two_routes import find_truth
@@ -79,3 +82,35 @@ def test_a_step_over_a_singular_pose_is_no_truth():
 def test_a_tree_has_none(scene):
     """Without loops there is nothing to lose rank."""
     assert singular_poses(scene("chain"), 1.0) == []
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("part", [1e-13, 1e-12 * (1 + 1e-3), 1e-11, 1e-10, 1e-10 * (1 + 1e-9), 3e-10])
+def test_a_motion_ends_at_what_lengths_cannot_tell_from_a_singular_pose(scene, part):
+    """A crank shorter than its rod by less than 1e-9 may reach it: no error control decides whether that is passed."""
+    with pytest.raises(
+        Diverged, match=r"at t = 0\.382\d* s: a step passes a singular pose of the loops, or one as near"
+    ):
+        JointCoordinates(scene("slider_crank", crank=0.4 * (1 - part), speed=3.0)).run(np.array([0.0, 0.5]), 1e-10)
+
+
+def test_a_motion_beside_a_singular_pose_goes_on(scene):
+    """A length that a file tells from the singular one leads past it."""
+    JointCoordinates(scene("slider_crank", crank=0.4 * (1 - 1e-7), speed=3.0)).run(np.array([0.0, 0.5]), 1e-10)
+
+
+def test_a_stop_elsewhere_ends_no_other_way_at_a_singular_pose(scene):
+    """A mechanism with a stop that it does not reach is followed by other steps, to the same pose."""
+    mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-10), speed=3.0)
+    crank = replace(mechanism.joints[0], limits=(-9.0, 9.0), friction=1e-3)
+    equations = JointCoordinates(replace(mechanism, joints=(crank, *mechanism.joints[1:])))
+    with pytest.raises(Diverged, match=r"at t = 0\.38\d* s: a step passes a singular pose of the loops"):
+        follow(SwitchedTree(equations, 1e-9), 0.5)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("away", "singular"), [(0.0, True), (1e-12, True), (1e-7, True), (1e-5, True), (1e-3, False)])
+def test_a_start_that_lengths_cannot_tell_from_a_singular_pose_is_one(scene, away, singular):
+    """Crank and rod in line but for less than the root of 1e-9 rad: a length that differs by 1e-9 starts there."""
+    mechanism = scene("slider_crank", crank=0.4 * (1 - 1e-13), angle=np.pi / 2 - away - 1e-12)
+    assert analysed(mechanism).singular_start == singular

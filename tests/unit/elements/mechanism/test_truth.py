@@ -312,6 +312,15 @@ def test_the_bar_of_drift_covers_its_round_off(scene):
     assert found.bars["drift"][-1] < 1e-13
 
 
+def test_the_bar_of_energy_knows_the_round_off_of_what_cancels():
+    """Heights of many metres that take away what motion has leave the digits of both parts, and the bar covers them."""
+    slide = Joint("slide", "prismatic", "world", "b", axis=(0, 0, 1), q0=(-8.0,), v0=(np.sqrt(160.0),))
+    mechanism = Mechanism((Body("b", 3.0, (0.1, 0.2, 0.3), np.eye(3)),), (slide,), gravity=(0.0, 0.0, -10.0))
+    found = find_truth(mechanism, np.array([0.0, 0.1]))
+    assert abs(found.record.placed(mechanism).energy()[0] - 9.0) < 1e-12
+    assert 240 * np.finfo(float).eps < found.bars["energy"][0] < 1e-11
+
+
 @pytest.mark.arithmetic
 def test_routes_of_a_spinning_body_agree(scene):
     """Ten seconds about the intermediate axis: attitudes and points within what turning over makes of round-off.
