@@ -45,7 +45,7 @@ def _ball(body: RollingBall, settings: Any) -> Callable[[FloatArray], FloatArray
             x = ball.eliminated(x)
         if mu < math.inf:
             response = ball.response_at(x)
-            if math.hypot(*response.multipliers.tolist()) > mu * response.N:
+            if math.hypot(response.F2, response.F3) > mu * response.N:
                 raise Diverged("the ball slips, for which there is no bare loop")
         return x
 

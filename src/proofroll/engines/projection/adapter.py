@@ -89,7 +89,7 @@ class Projection:
         if settings.formulation == "euler":
             self._orientation = EulerAngles(renews=settings.singularity == "renew")
         else:
-            self._orientation = FollowedFrame(geometry) if follow else RotatingFrame()
+            self._orientation = FollowedFrame() if follow else RotatingFrame()
         self._coordinates = 2 + self._orientation.size
         turning = [generator.kind == "rotation" for generator in body.surface.generators or ()]
         periodic = [*turning, *([False] * (2 - len(turning))), *self._orientation.periodic]
@@ -171,7 +171,7 @@ class Projection:
         """See :class:`proofroll.core.engine.Engine`."""
         x = self._motion.x
         kin = self._ball.kinematics(x)
-        frame = kin.local.frame
+        frame = kin.local.F
         if isinstance(self._motion, Switching):
             force = self._motion.force
             sticking = self._motion.mode.sticking if self._bounded else None
@@ -193,18 +193,19 @@ class Projection:
         ball, x = self._ball, self._motion.x
         friction = self._motion.friction if isinstance(self._motion, Switching) else None
         kin = ball.kinematics(x)
+        frame = kin.local.F
         rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
-        acceleration = kin.D @ rates[self._coordinates : self._coordinates + 5] + kin.drift
+        acceleration = ball.velocity_rate(kin, rates[self._coordinates : self._coordinates + 5].tolist())
         return BallBuilt(
-            mass=float(ball.mass[0]),
-            inertia=ball.mass[3:].copy(),
-            gravity=kin.local.frame @ (ball.weight(kin)[:3] / ball.mass[:3]),
-            ball_radius=float(ball.rows[0, 5]),
+            mass=ball.mass,
+            inertia=np.full(3, ball.inertia),
+            gravity=frame @ ball.weight(kin),
+            ball_radius=ball.radius,
             rolling_resistance=ball.rolling_resistance,
             mu_static=friction.mu_static if friction else None,
             mu_kinetic=friction.mu_kinetic if friction else None,
-            acceleration=kin.local.frame @ acceleration[:3],
-            angular_acceleration=kin.local.frame @ acceleration[3:],
+            acceleration=frame @ acceleration[:3],
+            angular_acceleration=frame @ acceleration[3:],
             terms=terms_held(resists=ball.rolling_resistance, slips=self._bounded, turns=len(x) > _WITHOUT_ORIENTATION),
         )
 

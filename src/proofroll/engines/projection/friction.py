@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.projection.method import Kinematics, ProjectedBall, Response
 
@@ -26,28 +25,30 @@ class SlidingForces(NamedTuple):
     """Equations solved at one state of slip.
 
     Attributes:
+        kin: where.
         response: with the friction as an applied force.
-        direction: d, unit vector along e2 and e3, shape (2,).
-        drive: b [m/s²], shape (2,).
+        direction: d, unit vector along e2 and e3.
+        drive: b [m/s²].
         growth: rate of |u| [m/s²].
         across: component of u̇ at right angles to d [m/s²]; over |u|, the rate at which d turns.
     """
 
+    kin: Kinematics
     response: Response
-    direction: FloatArray
-    drive: FloatArray
+    direction: tuple[float, float]
+    drive: tuple[float, float]
     growth: float
     across: float
 
     @property
     def strength(self) -> float:
         """|b| [m/s²]; the direction of a slip u relaxes towards that of b within the time |u|/|b|."""
-        return math.hypot(*self.drive.tolist())
+        return math.hypot(*self.drive)
 
 
-def along(angle: float) -> FloatArray:
-    """Unit vector at this angle [rad] from e2 towards e3, shape (2,)."""
-    return np.array([math.cos(angle), math.sin(angle)])
+def along(angle: float) -> tuple[float, float]:
+    """Unit vector at this angle [rad] from e2 towards e3."""
+    return math.cos(angle), math.sin(angle)
 
 
 class Friction:
@@ -61,37 +62,27 @@ class Friction:
     """
 
     def __init__(self, ball: ProjectedBall, contact: Contact) -> None:
-        self.rolling, self.sliding = ball, ball.with_rows(ball.rows[:0])
-        self._rows = ball.rows
+        self.rolling, self.sliding = ball, ball.under(None)
         self.bounded = math.isfinite(contact.mu_static)
         self.mu_static, self.mu_kinetic = contact.mu_static, contact.mu_kinetic
-        self._mobility = float(ball.rows[0] ** 2 @ (1 / ball.mass))  # C M⁻¹ Cᵀ [1/kg]
-        self._weight = float(ball.mass[0] * np.linalg.norm(ball.gravity))
+        self._weight = float(ball.mass * np.linalg.norm(ball.gravity))
 
     def reserve(self, response: Response) -> float:
         """Reserve of the static cone [N], from the reactions of sticking; negative where the ball must slip."""
         if not self.bounded:
             return math.inf  # whatever the sign of N
-        F2, F3, *_ = response.multipliers.tolist()
-        available, needed = self.mu_static * response.N, math.hypot(F2, F3)
+        available, needed = self.mu_static * response.N, math.hypot(response.F2, response.F3)
         return available - needed + _ON_CONE * (abs(available) + self._weight)
 
-    def drive(self, kin: Kinematics) -> FloatArray:
-        """Rate b of the slip without friction [m/s²], shape (2,)."""
-        return self._slip_rate(kin, self.sliding.response(kin))
+    def drive(self, kin: Kinematics) -> tuple[float, float]:
+        """Rate b of the slip without friction [m/s²]."""
+        return self.sliding.response(kin).slip_rate
 
-    def slide(self, kin: Kinematics, direction: FloatArray) -> SlidingForces:
-        """The ball slipping along ``direction``, shape (2,)."""
-        response = self.sliding.response(kin, -self.mu_kinetic * (direction @ self._rows))
-        rate = self._slip_rate(kin, response)
-        growth, across = direction @ rate, direction[0] * rate[1] - direction[1] * rate[0]
-        drive = rate + self._mobility * self.mu_kinetic * response.N * direction
-        return SlidingForces(response, direction, drive, float(growth), float(across))
-
-    def force(self, sliding: SlidingForces) -> FloatArray:
-        """Force of the wall on the slipping ball along the local axes [N], shape (3,)."""
-        friction = -self.mu_kinetic * sliding.response.N * (sliding.direction @ self._rows)
-        return self.sliding.contact_force(sliding.response) + friction[:3]
-
-    def _slip_rate(self, kin: Kinematics, response: Response) -> FloatArray:
-        return np.asarray(self._rows @ (kin.D @ response.acceleration) + self.rolling.slip_drift(kin))
+    def slide(self, kin: Kinematics, direction: tuple[float, float]) -> SlidingForces:
+        """The ball slipping along ``direction``."""
+        d2, d3 = direction
+        response = self.sliding.response(kin, (-self.mu_kinetic * d2, -self.mu_kinetic * d3))
+        rate2, rate3 = response.slip_rate
+        held = self.sliding.mobility * self.mu_kinetic * response.N
+        drive = rate2 + held * d2, rate3 + held * d3
+        return SlidingForces(kin, response, direction, drive, d2 * rate2 + d3 * rate3, d2 * rate3 - d3 * rate2)

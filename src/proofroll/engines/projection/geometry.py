@@ -5,6 +5,8 @@ The frame F has the columns e1 (normal, towards the wall), e2 (along the first c
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -13,21 +15,50 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.surfaces import Generator, Surface
 
+Vector = tuple[float, float, float]
 
-class Local(NamedTuple):
-    """Geometry at one point of the surface, all but the frame itself in components along e1, e2, e3.
+
+class Shape(NamedTuple):
+    """Derivatives of the place and of the frame along e1, e2, e3, in plain numbers.
 
     Attributes:
-        frame: F, columns e1, e2, e3 in the world, shape (3, 3).
-        tangents: Fᵀ ∂p/∂u [m/unit], shape (3, 2); the first row is zero.
-        second: Fᵀ ∂²p/∂u∂u [m/unit²], shape (3, 2, 2).
-        turning: Fᵀ ∂F/∂u [1/unit], shape (3, 3, 2); times u̇ it is the skew matrix of the frame's angular velocity.
+        tangents: Fᵀ ∂p/∂u [m/unit]: of e2 along both coordinates, then of e3; there is none of e1.
+        inverse: of the tangents as a matrix: of the first coordinate along e2 and e3, then of the second [unit/m].
+        second: Fᵀ ∂²p/∂u∂u as the factors of u̇², u̇v̇ and v̇² [m/unit²]: of e1, of e2, of e3.
+        turning: angular velocity of the frame per rate of the first coordinate, and of the second [1/unit].
     """
 
-    frame: FloatArray
-    tangents: FloatArray
-    second: FloatArray
-    turning: FloatArray
+    tangents: tuple[float, ...]
+    inverse: tuple[float, ...]
+    second: tuple[float, ...]
+    turning: tuple[float, ...]
+
+
+class Local(NamedTuple):
+    """Geometry at one point of the surface.
+
+    Attributes:
+        frame: e1, e2, e3 in the world, one after the other: the columns of F.
+        shape: what is seen along them.
+    """
+
+    frame: tuple[float, ...]
+    shape: Shape
+
+    @property
+    def F(self) -> FloatArray:
+        """The frame as a matrix, shape (3, 3)."""
+        return np.array(self.frame).reshape(3, 3).T
+
+    def along(self, x: float, y: float, z: float) -> Vector:
+        """Components along e1, e2, e3 of a vector of the world."""
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = self.frame
+        return x1 * x + y1 * y + z1 * z, x2 * x + y2 * y + z2 * z, x3 * x + y3 * y + z3 * z
+
+    def in_world(self, a: float, b: float, c: float) -> Vector:
+        """Components in the world of a vector along e1, e2, e3."""
+        x1, y1, z1, x2, y2, z2, x3, y3, z3 = self.frame
+        return x1 * a + x2 * b + x3 * c, y1 * a + y2 * b + y3 * c, z1 * a + z2 * b + z3 * c
 
 
 @dataclass(frozen=True)
@@ -40,15 +71,20 @@ class GeneralSurface:
 
     surface: Surface
 
-    def at(self, u: FloatArray) -> Local:
-        """Local geometry at the coordinates ``u``, shape (2,)."""
+    def at(self, place: Sequence[float]) -> Local:
+        """Local geometry at two coordinates."""
+        u = np.array(place)
         frame = self.surface.frame(u)
         tangents = frame.T @ self.surface.tangents(u)
         second = np.tensordot(frame.T, self.surface.second(u), axes=1)
         turning = np.zeros((3, 3, 2))
         turning[1:, 0] = -np.linalg.solve(tangents[1:].T, second[0])  # e2, e3 components of ∂e1
         turning[2, 1] = second[2, 0] / tangents[1, 0]  # e3 component of ∂e2; its e1 component follows by skewness
-        return Local(frame, tangents, second, turning - turning.swapaxes(0, 1))
+        turning = turning - turning.swapaxes(0, 1)
+        products = np.stack([second[:, 0, 0], second[:, 0, 1] + second[:, 1, 0], second[:, 1, 1]], axis=1)
+        axes = np.stack([turning[2, 1], turning[0, 2], turning[1, 0]], axis=1)  # of which these are skew matrices
+        parts = tangents[1:], np.linalg.inv(tangents[1:]), products, axes
+        return Local(tuple(frame.T.ravel().tolist()), Shape(*(tuple(part.ravel().tolist()) for part in parts)))
 
 
 class Uniform:
@@ -58,25 +94,45 @@ class Uniform:
 
     Attributes:
         column: which coordinate turns the frame; None if none does.
-        axis: unit direction about which the frame turns; zero if it does not.
-        parts: F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α (Rodrigues).
     """
 
     def __init__(self, surface: Surface, generators: tuple[Generator, Generator]) -> None:
-        self._start = GeneralSurface(surface).at(np.zeros(2))
+        self._start = GeneralSurface(surface).at((0.0, 0.0))
         # Only one of two commuting motions of a surface turns.
         self.column = next((i for i, motion in enumerate(generators) if motion.kind == "rotation"), None)
-        self.axis = (0.0, 0.0, 0.0) if self.column is None else generators[self.column].axis
-        k1, k2, k3 = self.axis
+        k1, k2, k3 = (0.0, 0.0, 0.0) if self.column is None else generators[self.column].axis
         cross = np.array([[0.0, -k3, k2], [k3, 0.0, -k1], [-k2, k1, 0.0]])
-        self.parts = self._start.frame, cross @ self._start.frame, cross @ cross @ self._start.frame
+        # F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α (Rodrigues).
+        self._parts = [(part @ self._start.F).T.ravel().tolist() for part in (np.eye(3), cross, cross @ cross)]
 
-    def at(self, u: FloatArray) -> Local:
-        """See :meth:`GeneralSurface.at`."""
+    def at(self, u: Sequence[float]) -> Local:
+        """See :meth:`GeneralSurface.at`.
+
+        Raises:
+            ArithmeticError: the coordinates are not finite.
+        """
         if self.column is None:
             return self._start
-        angle, (start, once, twice) = u[self.column], self.parts
-        return Local(start + np.sin(angle) * once + (1.0 - np.cos(angle)) * twice, *self._start[1:])
+        angle = u[self.column]
+        if not math.isfinite(angle):
+            raise FloatingPointError("the place on the surface is not finite")
+        sin, back = math.sin(angle), 1.0 - math.cos(angle)
+        # Written out: a loop over the nine makes a whole evaluation a tenth slower.
+        (x1, y1, z1, x2, y2, z2, x3, y3, z3), once, twice = self._parts
+        a1, b1, c1, a2, b2, c2, a3, b3, c3 = once
+        d1, e1, f1, d2, e2, f2, d3, e3, f3 = twice
+        frame = (
+            x1 + sin * a1 + back * d1,
+            y1 + sin * b1 + back * e1,
+            z1 + sin * c1 + back * f1,
+            x2 + sin * a2 + back * d2,
+            y2 + sin * b2 + back * e2,
+            z2 + sin * c2 + back * f2,
+            x3 + sin * a3 + back * d3,
+            y3 + sin * b3 + back * e3,
+            z3 + sin * c3 + back * f3,
+        )
+        return Local(frame, self._start.shape)
 
 
 Geometry = GeneralSurface | Uniform

@@ -6,6 +6,15 @@ world's axes and ω along the body's. A ball's mass matrix M is the same along a
 follows by projection.) The constraints on v are C_h v = 0, the ball stays on the surface, and C v = 0, it does not
 slip.
 
+With v = D s, which satisfies C_h v = 0, the projections onto D and C_h give
+
+    [DᵀMD (CD)ᵀ; CD 0] [ṡ; λ] = [Dᵀ(f - M Ḋs); -ξ],    N = (C_h M⁻¹ C_hᵀ)⁻¹ C_h (M⁻¹ f - Ḋs).
+
+Below its first row D is square and regular, T of the place and A of the rotation, and C has no part along e1. So Dᵀ can
+be taken off the upper rows: S λ = C (M⁻¹ f - R v), v̇ = M⁻¹ (f - Cᵀ λ), ṡ = D⁻¹ (v̇ - Ḋs), with R v the rate that v
+has by the turning of the axes alone and S = C M⁻¹ Cᵀ, which is (1/m + a²/J) 1 for a ball. That leaves products of a few
+numbers, which cost less as plain floats than as arrays.
+
 Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, sections 2.1-2.4, for the projections;
 W. Blajer, Multibody Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
 """
@@ -14,16 +23,17 @@ from __future__ import annotations
 
 import copy
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.projection.geometry import Geometry, Local, Uniform
+from proofroll.engines.projection.geometry import Geometry, Local, Vector
 from proofroll.engines.projection.orientation import Orientation
 
-_STANDS, _NONE = np.zeros((2, 3)), np.zeros(0)
+Active = Literal["contact", "centre"] | None
 
 
 class Kinematics(NamedTuple):
@@ -31,202 +41,208 @@ class Kinematics(NamedTuple):
 
     Attributes:
         local: geometry where the ball is.
-        turning: FᵀḞ, skew matrix of the frame's angular velocity [rad/s], shape (3, 3).
-        D: shape (6, 5), with C_h D = 0 whatever s is.
-        drift: Ḋ s, shape (6,).
-        v: D s, shape (6,).
-        carried: velocity of the wall where the ball touches it, along the local axes, and its rate as seen along
-            them, shape (2, 3); zero where the wall stands.
+        rates: of the coordinates: u̇, and of the angles if there are any.
+        r: velocities of the rotation.
+        pose: of the rotation, see :meth:`Orientation.pose`.
+        v: D s, six numbers.
+        drift: Ḋ s of the centre, along e1, e2, e3 [m/s²].
+        drawn: rate along e2, e3 that the centre must have, besides what its slip gains: by the turning of the axes, and
+            of the wall's velocity where it touches the ball [m/s²].
+        turned: rate of ω' by the turning of the axes alone [rad/s²].
+        carried: velocity of the wall there, along e2 and e3 [m/s]; zero where the wall stands.
     """
 
     local: Local
-    turning: FloatArray
-    D: FloatArray
-    drift: FloatArray
-    v: FloatArray
-    carried: FloatArray
+    rates: tuple[float, ...]
+    r: Sequence[float]
+    pose: tuple[float, ...]
+    v: tuple[float, ...]
+    drift: Vector
+    drawn: tuple[float, float]
+    turned: Vector
+    carried: tuple[float, float]
 
 
 class Response(NamedTuple):
     """Solution of the equations at one state.
 
     Attributes:
-        acceleration: ṡ, shape (5,).
+        acceleration: ṡ, five numbers.
+        rate: v̇ = D ṡ + Ḋ s, six numbers.
         N: λ_h, the normal force [N].
-        multipliers: λ_nh [N], one per active row: -F2 and -F3.
+        F2, F3: friction on the ball along e2 and e3 [N]: -λ_nh of a ball that rolls.
+        slip_rate: rate of the slip velocity along e2 and e3 [m/s²].
     """
 
-    acceleration: FloatArray
+    acceleration: tuple[float, ...]
+    rate: tuple[float, ...]
     N: float
-    multipliers: FloatArray
-
-
-def rolling_rows(radius: float) -> FloatArray:
-    """C: slip velocity of the contact point [m/s] along e2 and e3 from v, shape (2, 6): v2 + a ω3 and v3 - a ω2."""
-    a = radius
-    return np.array([[0.0, 1.0, 0.0, 0.0, 0.0, a], [0.0, 0.0, 1.0, 0.0, -a, 0.0]])
+    F2: float
+    F3: float
+    slip_rate: tuple[float, float]
 
 
 class ProjectedBall:
     """The ball's equations of motion in the state x = [q, s]: coordinates q = [u, angles] and velocities s.
 
     Attributes:
-        mass: diagonal of M [kg, kg m²], shape (6,).
+        mass, inertia: diagonal of M: m [kg] and J [kg m²].
+        radius: a [m].
+        mobility: S, the same along e2 and e3 [1/kg].
         gravity: in the world [m/s²], shape (3,).
         rolling_resistance: f [m].
-        rows: C, the active rows of the non-holonomic constraints, shape (0…2, 6).
+        active: rows C of the non-holonomic constraints: both of the contact point, v2 + a ω3 and v3 - a ω2; these and
+            both of a centre that rests, ω2 and ω3; or none.
     """
 
     def __init__(self, body: RollingBall, geometry: Geometry, orientation: Orientation) -> None:
-        m, J = body.ball.mass, body.ball.inertia
-        self.mass = np.array([m, m, m, J, J, J])
+        self.mass, self.inertia, self.radius = float(body.ball.mass), float(body.ball.inertia), float(body.ball.radius)
+        self.mobility = 1.0 / self.mass + self.radius**2 / self.inertia
         self.gravity = body.gravity
         self.rolling_resistance = body.contact.rolling_resistance
-        self.rows = rolling_rows(body.ball.radius)
+        self.active: Active = "contact"
+        self._g = body.gravity.tolist()
         self._geometry = geometry
         self._orientation = orientation
         self._coordinates = 2 + orientation.size
-        self._surface, self._wall_rate, self._radius = body.surface, body.wall_rate, body.ball.radius
-        self._tangents = geometry.at(body.u0).tangents[1:] if isinstance(geometry, Uniform) else None
+        self._surface, self._wall_rate = body.surface, body.wall_rate
 
     def kinematics(self, x: FloatArray) -> Kinematics:
         """The explicit form of the holonomic constraint at the state x."""
-        q, s = x[: self._coordinates], x[self._coordinates :]
-        local = self._geometry.at(q[:2])
-        turning = local.turning @ s[:2]
-        D, drift = np.zeros((6, 5)), np.empty(6)
-        D[:3, :2], drift[:3] = local.tangents, local.second @ s[:2] @ s[:2]
-        D[3:, 2:], drift[3:] = self._orientation.kinematics(q[2:], s[2:], local.frame, turning)
-        v = D @ s
-        W = self._wall_rate
-        carried = _STANDS if W is None else self._carried(W @ local.frame, q, local.frame, turning, v)
-        return Kinematics(local, turning, D, drift, v, carried)
+        n = self._coordinates
+        state = x.tolist()
+        angles, (first, second, *r) = state[2:n], state[n:]
+        local = self._geometry.at(state[:2])
+        (t2u, t2v, t3u, t3v), _, second_derivatives, (p1, p2, p3, q1, q2, q3) = local.shape
+        uu1, uv1, vv1, uu2, uv2, vv2, uu3, uv3, vv3 = second_derivatives
+        uu, uv, vv = first * first, first * second, second * second
+        drift = uu1 * uu + uv1 * uv + vv1 * vv, uu2 * uu + uv2 * uv + vv2 * vv, uu3 * uu + uv3 * uv + vv3 * vv
+        o1, o2, o3 = p1 * first + q1 * second, p2 * first + q2 * second, p3 * first + q3 * second
+        pose = self._orientation.pose(angles)
+        w1, w2, w3 = self._orientation.angular_velocity(pose, r, local)
+        v2, v3 = t2u * first + t2v * second, t3u * first + t3v * second
+        v = (0.0, v2, v3, w1, w2, w3)
+        drawn, carried = (-o1 * v3, o1 * v2), (0.0, 0.0)
+        if self._wall_rate is not None:
+            carried, gain2, gain3 = self._carried(local, state[:2], self._wall_rate, (v2, v3), (o1, o2, o3))
+            drawn = drawn[0] + gain2, drawn[1] + gain3
+        turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
+        rates = (first, second, *self._orientation.rates(angles, r, local))
+        return Kinematics(local, rates, r, pose, v, drift, drawn, turned, carried)
 
     def _carried(
-        self, W: FloatArray, q: FloatArray, frame: FloatArray, turning: FloatArray, v: FloatArray
-    ) -> FloatArray:
-        """Velocity W × (p + a e1) of a wall that turns at W, and its rate along the turning axes."""
-        contact = self._surface.position(q[:2]) @ frame + [self._radius, 0.0, 0.0]
-        velocity = cross(W, contact)
-        return np.stack([velocity, cross(W, v[:3] + self._radius * turning[:, 0]) - turning @ velocity])
+        self, local: Local, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
+    ) -> tuple[tuple[float, float], float, float]:
+        """Velocity W × (p + a e1) of a wall that turns at W along e2 and e3, and its rate along the turning axes."""
+        a, F, (_, o2, o3) = self.radius, local.F, turning
+        W = W @ F
+        velocity = cross(W, self._surface.position(np.array(place)) @ F + [a, 0.0, 0.0])
+        rate = cross(W, np.array([0.0, v[0] + a * o3, v[1] - a * o2])) - cross(np.array(turning), velocity)
+        return (velocity.item(1), velocity.item(2)), rate.item(1), rate.item(2)
 
     def speed(self, x: FloatArray) -> float:
         """Speed of the centre [m/s]."""
         n = self._coordinates
-        tangents = self._geometry.at(x[:2]).tangents[1:] if self._tangents is None else self._tangents
-        return math.hypot(*tangents.dot(x[n : n + 2]).tolist())
+        t2u, t2v, t3u, t3v = self._geometry.at(x[:2].tolist()).shape.tangents
+        first, second = x[n : n + 2].tolist()
+        return math.hypot(t2u * first + t2v * second, t3u * first + t3v * second)
 
-    def mass_matrix(self, kin: Kinematics) -> FloatArray:
-        """M̄ = DᵀMD, shape (5, 5)."""
-        return np.asarray((kin.D.T * self.mass) @ kin.D)
+    def weight(self, kin: Kinematics) -> Vector:
+        """Gravity along e1, e2, e3 [m/s²]: all of the applied force of a ball without resistance, over its mass."""
+        return kin.local.along(*self._g)
 
-    def bias(self, kin: Kinematics) -> FloatArray:
-        """d̄ = DᵀMḊs, shape (5,)."""
-        return kin.D.T @ (self.mass * kin.drift)
+    def normal_force(self, kin: Kinematics) -> float:
+        """N = λ_h, the orthogonal projection; C_h = [1 0 0 0 0 0] picks e1, along which nothing but gravity acts."""
+        return self.mass * (self.weight(kin)[0] - kin.drift[0])
 
-    def weight(self, kin: Kinematics) -> FloatArray:
-        """The applied force f of gravity alone, shape (6,)."""
-        force = np.zeros(6)
-        force[:3] = self.mass[:3] * (self.gravity @ kin.local.frame)
-        return force
-
-    def normal_force(self, kin: Kinematics, force: FloatArray) -> float:
-        """N = λ_h = (C_h M⁻¹ C_hᵀ)⁻¹ C_h (M⁻¹ f - Ḋs), the orthogonal projection; C_h = [1 0 0 0 0 0] picks e1."""
-        return float(force[0] - self.mass[0] * kin.drift[0])
-
-    def resistance(self, kin: Kinematics, N: float) -> FloatArray:
-        """M_C [N m], shape (3,): moment of the normal force N shifted by f along the centre's velocity.
+    def resistance(self, kin: Kinematics, N: float) -> tuple[float, float]:
+        """M_C along e2 and e3 [N m]: moment of the normal force N shifted by f along the centre's velocity.
 
         At rest the direction does not exist and the moment is zero.
         """
-        _, v2, v3, *_ = kin.v.tolist()
+        _, v2, v3, *_ = kin.v
         speed = math.hypot(v2, v3)
         lever = N * self.rolling_resistance / speed if speed else 0.0
-        return np.array([0.0, -lever * v3, lever * v2])
+        return -lever * v3, lever * v2
 
-    def response(self, kin: Kinematics, drag: FloatArray | None = None) -> Response:
+    def response(self, kin: Kinematics, drag: tuple[float, float] = (0.0, 0.0)) -> Response:
         """Accelerations and reactions: the tangential projection together with the non-holonomic constraints.
 
-        ``drag`` is an applied force per newton of normal force, besides the rolling resistance, along v's components
-        and without one along e1, shape (6,).
+        ``drag`` is a friction on the ball per newton of normal force, along e2 and e3.
         """
-        force = self.weight(kin)
-        N = self.normal_force(kin, force)
-        if self.rolling_resistance:
-            force[3:] = self.resistance(kin, N)
-        if drag is not None:
-            force += N * drag
-        solution = self._solve(kin, kin.D.T @ force - self.bias(kin), -self.slip_drift(kin))
-        return Response(solution[:5], N, solution[5:])
+        a, m, J = self.radius, self.mass, self.inertia
+        g1, a2, a3 = self.weight(kin)  # M⁻¹ f along e2 and e3 of the centre; b is that of the rotation, zero along e1
+        (d1, d2, d3), (r2, r3), (_, q2, q3) = kin.drift, kin.drawn, kin.turned
+        N, b2, b3 = m * (g1 - d1), 0.0, 0.0
+        if self.active == "centre":
+            F2, F3, a2, a3, slip_rate = -m * a2, -m * a3, 0.0, 0.0, (0.0, 0.0)
+        else:
+            if self.rolling_resistance:
+                M2, M3 = self.resistance(kin, N)
+                b2, b3 = M2 / J, M3 / J
+            F2, F3 = N * drag[0], N * drag[1]
+            slip_rate = a2 - r2 + a * (b3 - q3) + self.mobility * F2, a3 - r3 - a * (b2 - q2) + self.mobility * F3
+            if self.active:
+                F2, F3, slip_rate = F2 - slip_rate[0] / self.mobility, F3 - slip_rate[1] / self.mobility, (0.0, 0.0)
+            a2, a3, b2, b3 = a2 + F2 / m, a3 + F3 / m, b2 - a * F3 / J, b3 + a * F2 / J
+        p2, p3, (first2, first3, second2, second3) = a2 - d2, a3 - d3, kin.local.shape.inverse
+        spin = self._orientation.acceleration(kin.pose, kin.r, (0.0, b2, b3), kin.turned, kin.local)
+        acceleration = (first2 * p2 + first3 * p3, second2 * p2 + second3 * p3, *spin)
+        return Response(acceleration, (d1, a2, a3, 0.0, b2, b3), N, F2, F3, slip_rate)
 
     def response_at(self, x: FloatArray) -> Response:
         """Solution of :meth:`response` at the state x."""
         return self.response(self.kinematics(x))
 
-    def slip_drift(self, kin: Kinematics) -> FloatArray:
-        """Ċ_nh s = -ξ [m/s²]: rate of the slip of the active rows when ṡ = 0.
+    def velocity_rate(self, kin: Kinematics, acceleration: Sequence[float]) -> FloatArray:
+        """v̇ = D ṡ + Ḋ s of accelerations ṡ, shape (6,)."""
+        (t2u, t2v, t3u, t3v), (d1, d2, d3), (first, second, *spin) = kin.local.shape.tangents, kin.drift, acceleration
+        still = self._orientation.acceleration(kin.pose, kin.r, (0.0, 0.0, 0.0), kin.turned, kin.local)
+        spin = [one - other for one, other in zip(spin, still, strict=True)]  # ω̇ = A (ṙ - ṙ where ω̇ = 0)
+        rotation = self._orientation.angular_velocity(kin.pose, spin, kin.local)
+        return np.array((d1, t2u * first + t2v * second + d2, t3u * first + t3v * second + d3, *rotation))
 
-        The rows C are constant along the local axes. So the slip changes by C times the rate of v as seen from the
-        turning frame, which is Ḋs less FᵀḞ v, for the translation and the rotation alike.
-        """
-        if not len(self.rows):  # the ball slips
-            return _NONE
-        own = self.rows @ (kin.drift - (kin.v.reshape(2, 3) @ kin.turning.T).ravel())
-        return np.asarray(own - self.rows[:, :3] @ kin.carried[1])
-
-    def contact_force(self, response: Response) -> FloatArray:
+    @staticmethod
+    def contact_force(response: Response) -> FloatArray:
         """Force of the wall on the ball along the local axes, -C_hᵀ N - Cᵀ λ_nh = (-N, F2, F3) [N], shape (3,)."""
-        force = -self.rows[:, :3].T @ response.multipliers
-        force[0] -= response.N
-        return force
+        return np.array((-response.N, response.F2, response.F3))
 
     def rates(self, x: FloatArray) -> FloatArray:
         """ẋ: the angles, if there are any, follow the velocities s."""
-        return self.derivative(x, self.response_at(x))
+        kin = self.kinematics(x)
+        return self.derivative(kin, self.response(kin))
 
-    def derivative(self, x: FloatArray, response: Response) -> FloatArray:
+    def derivative(self, kin: Kinematics, response: Response) -> FloatArray:
         """ẋ with the accelerations of ``response``."""
-        n = self._coordinates
-        turning = self._orientation.rates(x[:2], x[2:n], x[n + 2 : n + 5])
-        return np.concatenate([x[n : n + 2], turning, response.acceleration])
+        return np.array((*kin.rates, *response.acceleration))
 
-    def with_rows(self, rows: FloatArray) -> ProjectedBall:
+    def under(self, active: Active) -> ProjectedBall:
         """The same ball with other active rows of the non-holonomic constraints."""
         other = copy.copy(self)
-        other.rows = rows
+        other.active = active
         return other
 
-    def violation(self, kin: Kinematics) -> FloatArray:
-        """C v of the active rows, less what the wall carries along [m/s]."""
-        return np.asarray(self.rows @ kin.v - self.rows[:, :3] @ kin.carried[0])
+    def slip(self, kin: Kinematics) -> tuple[float, float]:
+        """C v of the contact point along e2 and e3, less what the wall carries along [m/s]."""
+        (_, v2, v3, _, w2, w3), (carried2, carried3) = kin.v, kin.carried
+        return v2 + self.radius * w3 - carried2, v3 - self.radius * w2 - carried3
 
-    def eliminated(self, x: FloatArray, slip: FloatArray | None = None) -> FloatArray:
+    def eliminated(self, x: FloatArray, slip: tuple[float, float] = (0.0, 0.0)) -> FloatArray:
         """The state x with the violation of C v = 0, or of C v = ``slip`` [m/s], removed from s (Blajer 2002).
 
-        s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄. The correction solves
-        a system with the same matrix as the equations of motion.
+        s - M̄⁻¹C_nhᵀ(C_nh M̄⁻¹ C_nhᵀ)⁻¹ C_nh s is the nearest admissible s in the metric of M̄ = DᵀMD, where
+        C_nh = C D: M⁻¹ Cᵀ S⁻¹ C v in the velocities v.
         """
         kin = self.kinematics(x)
-        violation = self.violation(kin) - (0.0 if slip is None else slip)
+        if self.active == "centre":
+            _, v2, v3, _, w2, w3 = kin.v
+        else:
+            slip2, slip3 = self.slip(kin)
+            F2, F3 = (slip2 - slip[0]) / self.mobility, (slip3 - slip[1]) / self.mobility
+            v2, v3, lever = F2 / self.mass, F3 / self.mass, self.radius / self.inertia
+            w2, w3 = -lever * F3, lever * F2
+        first2, first3, second2, second3 = kin.local.shape.inverse
+        spin = self._orientation.solved(kin.pose, (0.0, w2, w3), kin.local)
         result = x.copy()
-        result[self._coordinates :] -= self._solve(kin, np.zeros(5), violation)[:5]
+        result[self._coordinates :] -= (first2 * v2 + first3 * v3, second2 * v2 + second3 * v3, *spin)
         return result
-
-    def _solve(self, kin: Kinematics, upper: FloatArray, lower: FloatArray) -> FloatArray:
-        """Solution of [M̄ C_nhᵀ; C_nh 0] [ṡ; λ] = [upper; lower], where C_nh = C D.
-
-        Raises:
-            ArithmeticError: there is none.
-        """
-        from scipy.linalg.lapack import dgesv
-
-        C = self.rows @ kin.D
-        matrix = np.zeros((5 + len(C), 5 + len(C)))
-        matrix[:5, :5] = self.mass_matrix(kin)
-        matrix[:5, 5:] = C.T
-        matrix[5:, :5] = C
-        # LAPACK directly: numpy's wrapper costs more than the solution of so small a system.
-        _, _, solution, info = dgesv(matrix, np.concatenate([upper, lower]))
-        if info:
-            raise ArithmeticError("the equations of motion are singular")
-        return np.asarray(solution)

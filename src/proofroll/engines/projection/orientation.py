@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.engines.projection.geometry import Geometry
+from proofroll.engines.projection.geometry import Local, Vector
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-_UNIT = np.eye(3)
 # The condition of M̄ grows like 1/sin²θ as θ nears 0 or π. Here, at 30 degrees, nothing is lost yet; the paper's own
 # run, where sin θ stays above 0.75, does not come so far.
 _RENEWED = 0.5
@@ -46,18 +46,34 @@ class Orientation(ABC):
         """Angles [rad], shape (size,), and velocities r, shape (3,), of the angular velocity ω' [rad/s] at time 0."""
 
     @abstractmethod
-    def kinematics(
-        self, angles: FloatArray, r: FloatArray, frame: FloatArray, turning: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """A, shape (3, 3), and Ȧ r [rad/s²], shape (3,), where ``turning`` = FᵀḞ [1/s], shape (3, 3).
+    def pose(self, angles: Sequence[float]) -> tuple[float, ...]:
+        """Numbers on which A depends, besides the frame.
 
         Raises:
             ArithmeticError: the angles are not finite.
         """
 
     @abstractmethod
-    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:
-        """Rates of the angles [1/s], shape (size,), where the ball is at ``u``."""
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], local: Local) -> Vector:
+        """A r [rad/s]."""
+
+    @abstractmethod
+    def solved(self, pose: tuple[float, ...], rate: Vector, local: Local) -> Vector:
+        """A⁻¹ of a vector along e1, e2, e3.
+
+        Raises:
+            ArithmeticError: A is singular.
+        """
+
+    @abstractmethod
+    def acceleration(
+        self, pose: tuple[float, ...], r: Sequence[float], rate: Vector, turned: Vector, local: Local
+    ) -> Vector:
+        """ṙ = A⁻¹ (ω̇ - Ȧ r) [rad/s²], with ω̇ in ``rate``; ``turned`` is its part by the turning of the frame alone."""
+
+    def rates(self, angles: Sequence[float], r: Sequence[float], local: Local) -> Sequence[float]:  # noqa: ARG002 -- there may be none
+        """Rates of the angles [1/s]."""
+        return ()
 
     def check(self, t: float, angles: FloatArray, r: FloatArray, step: float) -> None:  # noqa: B027 -- most never fail
         """Raises Diverged if the description fails at time ``t`` [s]; ``step`` [s] is a fixed step's size, else 0."""
@@ -102,42 +118,41 @@ class EulerAngles(Orientation):
 
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
         """See :class:`Orientation`. θ = π/2 is as far from the singularity as can be."""
-        angles = np.array([0.0, math.pi / 2, 0.0])
-        A, _ = self.kinematics(angles, np.zeros(3), frame, np.zeros((3, 3)))
-        return angles, np.asarray(np.linalg.solve(A, w), dtype=np.float64)
+        angles = [0.0, math.pi / 2, 0.0]
+        return np.array(angles), np.array(_about_the_axes(self.pose(angles), *(frame @ w).tolist()))
 
-    def kinematics(
-        self,
-        angles: FloatArray,
-        r: FloatArray,
-        frame: FloatArray,
-        turning: FloatArray,  # noqa: ARG002 -- the angles are measured in the world, whatever the frame does
-    ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Orientation`. The columns of A are the axes about which φ, θ and ψ turn."""
-        _, theta, psi = angles.tolist()
-        phi_rate, theta_rate, psi_rate = r.tolist()
+    def pose(self, angles: Sequence[float]) -> tuple[float, ...]:
+        """See :class:`Orientation`: sine and cosine of θ and of ψ."""
+        _, theta, psi = angles
         if not math.isfinite(theta + psi):
             raise FloatingPointError("the Euler angles overflow inside a step")
-        sin, cos, sin_psi, cos_psi = math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
-        axes = np.array(
-            [
-                [sin * sin_psi, cos_psi, 0.0],
-                [-sin * cos_psi, sin_psi, 0.0],
-                [cos, 0.0, 1.0],
-            ]
-        )
-        # Rates of the axes times r: θ̇ tilts the axis of φ, and ψ̇ turns the axes of φ and θ about the vertical.
-        tilted, turned, node = phi_rate * theta_rate, phi_rate * psi_rate * sin, theta_rate * psi_rate
-        drift = np.array(
-            [
-                tilted * cos * sin_psi + turned * cos_psi - node * sin_psi,
-                -tilted * cos * cos_psi + turned * sin_psi + node * cos_psi,
-                -tilted * sin,
-            ]
-        )
-        return frame.T @ axes, frame.T @ drift
+        return math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
 
-    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:  # noqa: ARG002 -- r is their rate
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], local: Local) -> Vector:
+        """See :class:`Orientation`."""
+        return local.along(*_turning(pose, r))
+
+    def solved(self, pose: tuple[float, ...], rate: Vector, local: Local) -> Vector:
+        """See :class:`Orientation`."""
+        return _about_the_axes(pose, *local.in_world(*rate))
+
+    def acceleration(
+        self,
+        pose: tuple[float, ...],
+        r: Sequence[float],
+        rate: Vector,
+        turned: Vector,  # noqa: ARG002 -- the angles are measured in the world, whatever the frame does
+        local: Local,
+    ) -> Vector:
+        """See :class:`Orientation`. θ̇ tilts the axis of φ, and ψ̇ turns the axes of φ and θ about the vertical."""
+        sin, cos, sin_psi, cos_psi = pose
+        phi_rate, theta_rate, psi_rate = r
+        x, y, z = local.in_world(*rate)
+        along, across = phi_rate * psi_rate * sin, phi_rate * theta_rate * cos - theta_rate * psi_rate
+        x, y = x - along * cos_psi - across * sin_psi, y - along * sin_psi + across * cos_psi
+        return _about_the_axes(pose, x, y, z + phi_rate * theta_rate * sin)
+
+    def rates(self, angles: Sequence[float], r: Sequence[float], local: Local) -> Sequence[float]:  # noqa: ARG002 -- r is their rate
         """See :class:`Orientation`."""
         return r
 
@@ -163,16 +178,12 @@ class EulerAngles(Orientation):
         """See :class:`Orientation`. The new axis of φ is horizontal, in line with the angular velocity: then θ̇ = 0."""
         if not self._renews or abs(math.sin(angles[1])) >= _RENEWED:
             return None
-        still = np.zeros((3, 3))
-        A, _ = self.kinematics(angles, r, np.eye(3), still)
-        w = A @ r
-        psi = math.atan2(w[0], -w[1])
-        chosen = np.array([0.0, math.pi / 2, psi])
-        A, _ = self.kinematics(chosen, r, np.eye(3), still)
+        w = _turning(self.pose(angles.tolist()), r.tolist())
+        chosen = [0.0, math.pi / 2, math.atan2(w[0], -w[1])]
         self._orientation_then = self._orientation(angles)
         self._axes_then = _body_axes(chosen)
         self.renewals.append(t)
-        return chosen, np.asarray(np.linalg.solve(A, w), dtype=np.float64)
+        return np.array(chosen), np.array(_about_the_axes(self.pose(chosen), *w))
 
     def quaternion(self, angles: FloatArray) -> FloatArray:
         """See :class:`Orientation`."""
@@ -183,7 +194,24 @@ class EulerAngles(Orientation):
         return _body_axes(angles) * self._axes_then.inv() * self._orientation_then
 
 
-def _body_axes(angles: FloatArray) -> Rotation:
+def _turning(pose: tuple[float, ...], r: Sequence[float]) -> Vector:
+    """Angular velocity in the world of the rates r of φ, θ and ψ [rad/s]: the columns of A are their axes."""
+    sin, cos, sin_psi, cos_psi = pose
+    phi_rate, theta_rate, psi_rate = r
+    level = phi_rate * sin
+    return level * sin_psi + theta_rate * cos_psi, theta_rate * sin_psi - level * cos_psi, phi_rate * cos + psi_rate
+
+
+def _about_the_axes(pose: tuple[float, ...], x: float, y: float, z: float) -> Vector:
+    """The rates of φ, θ and ψ of an angular velocity in the world: the inverse of :func:`_turning`."""
+    sin, cos, sin_psi, cos_psi = pose
+    if not sin:
+        raise ArithmeticError("the equations of motion are singular")
+    phi_rate = (x * sin_psi - y * cos_psi) / sin
+    return phi_rate, x * cos_psi + y * sin_psi, z - phi_rate * cos
+
+
+def _body_axes(angles: FloatArray | Sequence[float]) -> Rotation:
     """Orientation of the body's axes in the world."""
     from scipy.spatial.transform import Rotation
 
@@ -201,19 +229,30 @@ class RotatingFrame(Orientation):
         """See :class:`Orientation`."""
         return np.empty(0), w
 
-    def kinematics(
-        self,
-        angles: FloatArray,  # noqa: ARG002 -- there are none
-        r: FloatArray,
-        frame: FloatArray,  # noqa: ARG002 -- everything is along its axes already
-        turning: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
-        return _UNIT, turning @ r
-
-    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:  # noqa: ARG002 -- no angles
+    def pose(self, angles: Sequence[float]) -> tuple[float, ...]:  # noqa: ARG002 -- there are none
         """See :class:`Orientation`."""
-        return angles
+        return ()
+
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], local: Local) -> Vector:  # noqa: ARG002 -- A = 1
+        """See :class:`Orientation`."""
+        w1, w2, w3 = r
+        return w1, w2, w3
+
+    def solved(self, pose: tuple[float, ...], rate: Vector, local: Local) -> Vector:  # noqa: ARG002 -- A = 1
+        """See :class:`Orientation`."""
+        return rate
+
+    def acceleration(
+        self,
+        pose: tuple[float, ...],  # noqa: ARG002 -- there are no angles
+        r: Sequence[float],  # noqa: ARG002 -- known by what it turns
+        rate: Vector,
+        turned: Vector,
+        local: Local,  # noqa: ARG002 -- everything is along its axes already
+    ) -> Vector:
+        """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
+        (a1, a2, a3), (b1, b2, b3) = rate, turned
+        return a1 - b1, a2 - b2, a3 - b3
 
 
 class FollowedFrame(RotatingFrame):
@@ -222,18 +261,20 @@ class FollowedFrame(RotatingFrame):
     size: ClassVar[int] = 4
     periodic: ClassVar[tuple[bool, ...]] = (False,) * 4
 
-    def __init__(self, geometry: Geometry) -> None:
-        self._geometry = geometry
-
     def start(self, frame: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:  # noqa: ARG002 -- it starts at the identity
         """See :class:`Orientation`."""
         return np.array([1.0, 0.0, 0.0, 0.0]), w
 
-    def rates(self, u: FloatArray, angles: FloatArray, r: FloatArray) -> FloatArray:
+    def rates(self, angles: Sequence[float], r: Sequence[float], local: Local) -> Sequence[float]:
         """See :class:`Orientation`. q̇ = ½ ω ∘ q with ω in the world."""
-        x, y, z = (self._geometry.at(u).frame @ r).tolist()
-        turning = np.array([[0.0, -x, -y, -z], [x, 0.0, -z, y], [y, z, 0.0, -x], [z, -y, x, 0.0]])
-        return np.asarray(0.5 * turning @ angles)
+        x, y, z = (0.5 * w for w in local.in_world(*r))
+        q0, q1, q2, q3 = angles
+        return (
+            -x * q1 - y * q2 - z * q3,
+            x * q0 - z * q2 + y * q3,
+            y * q0 + z * q1 - x * q3,
+            z * q0 - y * q1 + x * q2,
+        )
 
     def quaternion(self, angles: FloatArray) -> FloatArray:
         """See :class:`Orientation`."""

@@ -53,7 +53,7 @@ class _Slip(ABC):
 
     def force(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
-        return self._friction.force(self.look(y))
+        return self._ball.contact_force(self.look(y).response)
 
 
 class SlavedSlip(_Slip):
@@ -72,8 +72,8 @@ class SlavedSlip(_Slip):
         span = self._span(kin, sliding)
         if rho == 0.0 or span == 0.0:
             return sliding
-        ahead = self._friction.drive(self._ball.kinematics(x + span * self._ball.derivative(x, sliding.response)))
-        turned = math.atan2(drive[0] * ahead[1] - drive[1] * ahead[0], float(drive @ ahead))
+        ahead = self._friction.drive(self._ball.kinematics(x + span * self._ball.derivative(kin, sliding.response)))
+        turned = math.atan2(drive[0] * ahead[1] - drive[1] * ahead[0], drive[0] * ahead[0] + drive[1] * ahead[1])
         lag = rho * turned / span / (sliding.strength + sliding.growth)
         return self._friction.slide(kin, along(psi - lag))
 
@@ -82,17 +82,17 @@ class SlavedSlip(_Slip):
         span = DIFFERENCE * self._pace.time
         if not self._ball.rolling_resistance:
             return span
-        acceleration = (kin.D @ sliding.response.acceleration + kin.drift)[1:3]
-        return min(span, 0.1 * math.hypot(*kin.v[1:3].tolist()) / (math.hypot(*acceleration.tolist()) or 1.0))
+        return min(span, 0.1 * math.hypot(*kin.v[1:3]) / (math.hypot(*sliding.response.rate[1:3]) or 1.0))
 
     def rates(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
         sliding = self.look(y)
-        return np.append(self._ball.derivative(y[:-1], sliding.response), sliding.growth)
+        return np.append(self._ball.derivative(sliding.kin, sliding.response), sliding.growth)
 
     def eliminated(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
-        return np.append(self._friction.rolling.eliminated(y[:-1], y[-1] * self.look(y).direction), y[-1])
+        (d2, d3), rho = self.look(y).direction, float(y[-1])
+        return np.append(self._friction.rolling.eliminated(y[:-1], (rho * d2, rho * d3)), rho)
 
     def survey(self, y: FloatArray) -> Survey:
         """See :class:`ContactMode`."""
@@ -124,20 +124,21 @@ class FreeSlip(_Slip):
     def rates(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
         sliding = self.look(y)
-        rate = self._ball.derivative(y[:-2], sliding.response)
+        rate = self._ball.derivative(sliding.kin, sliding.response)
         return np.concatenate([rate, [sliding.growth, sliding.across / float(y[-2])]])
 
     def eliminated(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
-        x = self._friction.rolling.eliminated(y[:-2], y[-2] * along(float(y[-1])))
+        (d2, d3), rho = along(float(y[-1])), float(y[-2])
+        x = self._friction.rolling.eliminated(y[:-2], (rho * d2, rho * d3))
         return np.concatenate([x, y[-2:]])
 
     def survey(self, y: FloatArray) -> Survey:
         """See :class:`ContactMode`. The stiff direction bounds a step before it would make the method unstable."""
         sliding, rho = self.look(y), float(y[-2])
         N, span = sliding.response.N, DIFFERENCE * self._pace.time
-        ahead = self._ball.kinematics(y[:-2] + span * self._ball.derivative(y[:-2], sliding.response))
-        trend = (self._ball.normal_force(ahead, self._ball.weight(ahead)) - N) / span
+        ahead = self._ball.kinematics(y[:-2] + span * self._ball.derivative(sliding.kin, sliding.response))
+        trend = (self._ball.normal_force(ahead) - N) / span
         relaxation = rho / sliding.strength if sliding.strength else math.inf
         # Not at the same bounds at which a slaved slip ends, so that the two do not alternate.
         slaved = relaxation < 0.5 * START * self._pace.time and sliding.growth > -0.5 * _DYING * sliding.strength

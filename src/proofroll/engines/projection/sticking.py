@@ -38,7 +38,7 @@ class _Held:
 
     def force(self, y: FloatArray) -> FloatArray:
         """See :class:`ContactMode`."""
-        return self._ball.contact_force(self._ball.response(self._ball.kinematics(y)))
+        return self._ball.contact_force(self._ball.response_at(y))
 
 
 class Stick(_Held):
@@ -53,21 +53,21 @@ class Stick(_Held):
 
     def survey(self, y: FloatArray) -> Survey:
         """See :class:`ContactMode`. Rolling resistance shortens steps towards where the centre stands still."""
-        response, trend = self._ball.response_at(y), 0.0
+        kin, trend = self._ball.kinematics(y), 0.0
+        response = self._ball.response(kin)
         cone: tuple[float, ...] = ()
         if self._friction.bounded:
             reserve = self._friction.reserve(response)
             cone = (reserve,)
             if reserve <= _CLEAR * self._friction.mu_static * response.N:
                 span = DIFFERENCE * self._pace.time
-                ahead = self._ball.response_at(y + span * self._ball.derivative(y, response))
+                ahead = self._ball.response_at(y + span * self._ball.derivative(kin, response))
                 trend = (self._friction.reserve(ahead) - reserve) / span
         if not self.halts:
             return Survey(cone, trend)
-        kin = self._ball.kinematics(y)
-        (v2, v3), along = kin.v[1:3].tolist(), kin.local.tangents[1:] @ response.acceleration[:2] + kin.drift[1:3]
+        (v2, v3), along = kin.v[1:3], response.rate[1:3]
         speed = math.hypot(v2, v3)
-        slowing = float(v2 * along[0] + v3 * along[1]) / speed if speed else 0.0
+        slowing = (v2 * along[0] + v3 * along[1]) / speed if speed else 0.0
         longest = self._pace.reach * time_left(speed, slowing)
         return Survey((*cone, speed - self._pace.still), trend, longest=longest)
 
@@ -85,34 +85,31 @@ class Stick(_Held):
 class Rest(_Held):
     """The centre stands still, held by friction and rolling resistance; the ball may spin about the normal.
 
-    Two more rows, ω2 = 0 and ω3 = 0, whose multipliers are the moment of the resistance.
+    Two more rows, ω2 = 0 and ω3 = 0, whose multipliers are the moment of the resistance: a bound, as friction is.
     """
 
     exits = ()
 
     def __init__(self, friction: Friction) -> None:
-        ball = friction.rolling
-        rows = np.vstack([ball.rows, np.eye(6)[4:]])
-        super().__init__(ball.with_rows(rows), friction)
-        self._lever, self._ball.rolling_resistance = ball.rolling_resistance, 0.0
+        super().__init__(friction.rolling.under("centre"), friction)
 
     def holds(self, x: FloatArray) -> bool:
         """True if friction and resistance can both hold the ball at x."""
-        response = self._ball.response(self._ball.kinematics(x))
-        moment = math.hypot(*response.multipliers[2:].tolist())
-        return self._friction.reserve(response) >= 0 and moment <= self._lever * response.N
+        response = self._ball.response_at(x)
+        moment = self._ball.radius * math.hypot(response.F2, response.F3)  # that holds the ball against the friction
+        return self._friction.reserve(response) >= 0 and moment <= self._ball.rolling_resistance * response.N
 
     def released(self, x: FloatArray, speed: float) -> FloatArray:
         """The state x with a speed of the centre [m/s], too small to matter, in the direction in which it sets off.
 
         It gives the resistance a direction, which it has not at rest.
         """
-        ball = self._ball.with_rows(self._ball.rows[:2])
-        kin = ball.kinematics(x)
-        acceleration = ball.response(kin).acceleration
-        pull = math.hypot(*(kin.D @ acceleration)[1:3].tolist())
+        ball = self._ball.under("contact")
+        ball.rolling_resistance = 0.0
+        response = ball.response_at(x)
+        pull = math.hypot(*response.rate[1:3])  # nothing drifts where the centre stands still
         result = x.copy()
-        result[-5:-3] += speed / pull * acceleration[:2]
+        result[-5:-3] += speed / pull * np.array(response.acceleration[:2])
         return ball.eliminated(result)
 
     def survey(self, y: FloatArray) -> Survey:  # noqa: ARG002 -- nothing changes any more

@@ -204,7 +204,7 @@ class Switching:
         else:
             if speed <= 2 * self._pace.still:
                 x = self._rest.released(x, 10 * self._pace.still)
-            holds = self.friction.reserve(ball.response(ball.kinematics(x))) >= 0
+            holds = self.friction.reserve(ball.response_at(x)) >= 0
             mode = self._stick if holds else self._slaved
         if mode.sticking != was_sticking:
             self._event("stick" if mode.sticking else "slip", low, high)
