@@ -48,10 +48,8 @@ def test_efforts_are_those_of_each_stage(made: Mechanism, preset: str, error: fl
 
 
 def test_what_is_not_followed_is_refused() -> None:
-    """Stops together with a limit, and compiled equations, have their reason."""
+    """Compiled equations have their reason."""
     limited = Actuator("a", "j", "torque", 3.0, limit=2.0)
-    with pytest.raises(Refused, match="neither change in time nor have a limit"):
-        ProjectionMechanism(wheel(limited, friction=0.1), PRESETS["dependent"]["default"])
     compiled = replace(PRESETS["dependent"]["tuned"])
     with pytest.raises(Refused, match="not compiled"):
         ProjectionMechanism(wheel(limited), compiled)

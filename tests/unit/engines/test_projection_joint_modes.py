@@ -1,4 +1,4 @@
-"""Dry friction and stops of joints in the projection method, against closed forms."""
+"""Laws that switch, and couplings, in the projection method: against closed forms and the truth."""
 
 from dataclasses import replace
 
@@ -8,6 +8,9 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.truth.mechanism.switched_truth import truth_of
 
 CUBE = Body("mass", 1.0, inertia=(0.1, 0.1, 0.1))
 G = 9.81
@@ -104,9 +107,93 @@ def test_a_joint_that_is_held_feels_the_others():
     assert abs(truth.sample().joint_torque[0, 2]) == pytest.approx(6.0, abs=1e-7)
 
 
-def test_loops_with_friction_are_refused():
-    """Dry friction in a mechanism with loops is refused with the reason."""
-    mechanism = runs.model("slider_crank")
-    rubbing = replace(mechanism, joints=(replace(mechanism.joints[0], friction=1.0), *mechanism.joints[1:]))
-    with pytest.raises(Refused, match="this mechanism has loops"):
-        runs.build("dependent", rubbing)
+def test_friction_in_a_loop_is_a_drive_against_the_motion():
+    """A crank drive whose shaft rubs moves as one whose shaft is driven backwards, until it turns."""
+    made = runs.model("slider_crank")
+    rubbing, driven = (
+        replace(made, joints=(replace(made.joints[0], **law), *made.joints[1:]))
+        for law in ({"friction": 0.3}, {"torque": -0.3})
+    )
+    one, two = runs.build("dependent", rubbing, rtol=1e-10), runs.build("dependent", driven, rtol=1e-10)
+    one.advance(0.1)
+    two.advance(0.1)
+    np.testing.assert_allclose(one.sample().v_WB, two.sample().v_WB, atol=1e-10)
+
+
+@pytest.mark.drill
+def test_a_loop_with_friction_turns_when_it_should():
+    """A crank drive whose shaft rubs has the true motion, through the turn of its friction."""
+    made = runs.model("slider_crank")
+    rubbing = replace(made, joints=(replace(made.joints[0], friction=0.3), *made.joints[1:]))
+    times = np.array([0.0, 0.4, 0.8])
+    run, truth = runs.build("dependent", rubbing), truth_of(rubbing, times).record
+    for k, t in enumerate(times[1:], 1):
+        run.advance(float(t))
+        np.testing.assert_allclose(run.sample().p_WB, truth.p_WB[k], atol=1e-10)
+    (turn,) = run.events()
+    assert (turn.kind, turn.name) == ("turn", "shaft")
+
+
+@pytest.mark.parametrize(("options", "tolerance"), [({}, 1e-12), ({"integrator": "rk4", "dt": 4e-3}, 1e-7)])
+def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
+    """The clamp of a servo is a switch: its times are exact to the order of the method, and so is what follows."""
+    options |= {"rtol": 2.220446049250313e-14} if options else {}
+    run = runs.build("dependent", runs.model("saturated_servo"), **options)
+    run.advance(1.0)
+    times = [0.245657137141714, 0.324272287425472, 0.726726594852378, 0.843002288039135]
+    assert [event.kind for event in run.events()] == ["release", "saturate"] * 2
+    np.testing.assert_allclose([event.time for event in run.events()], times, atol=tolerance)
+    assert run.sample().p_WB[0, 0] == pytest.approx(0.694076613248125506, abs=tolerance)
+    assert run.sample().v_WB[0, 0] == pytest.approx(0.127876511755251, abs=20 * tolerance)
+
+
+@pytest.mark.parametrize("target", [Formula("2*sin(9*t)"), Table((0.0, 0.15, 0.3), (0.0, 2.0, -2.0))])
+def test_friction_a_stop_a_limit_and_a_target_in_time_switch_together(target):
+    """A servo with a limit pushes a mass that rubs onto its stop and off it: the motion and the forces are true."""
+    servo = Actuator("servo", "guide", "position", target, kp=200.0, kd=5.0, limit=60.0)
+    made = replace(slider(friction=2.0, limits=(-0.05, 0.1)), actuators=(servo,))
+    times = np.array([0.0, 0.11, 0.23, 0.4])
+    run, truth = runs.build("dependent", made), truth_of(made, times)
+    for k, t in enumerate(times[1:], 1):
+        run.advance(float(t))
+        assert place(run) == pytest.approx(truth.record.p_WB[k, 0, 2], abs=1e-10)
+        assert run.sample().effort[0] == pytest.approx(truth.record.named[k, 0], abs=1e-8)
+    assert [(event.kind, event.name) for event in run.events()] == [(e.kind, e.name) for e in truth.events]
+
+
+def test_a_rack_and_pinion_on_a_spring():
+    """A coupling of a hinge and a slide is one row more: ratio, force and motion are those of one oscillator."""
+    joints = (
+        Joint("pinion", "revolute", "world", "wheel", stiffness=5.0, v0=(0.2,)),
+        Joint("slide", "prismatic", "world", "rack", q0=(0.05,), v0=(0.1,)),
+    )
+    bodies = (Body("wheel", 1.0, inertia=(0.1, 0.1, 0.1)), Body("rack", 2.0, inertia=(0.1, 0.1, 0.1)))
+    made = Mechanism(bodies, joints, gravity=(0, 0, 0), couplings=(Coupling("teeth", "pinion", "slide", 0.5, 0.05),))
+    run, rate = runs.build("dependent", made), np.sqrt(5.0 / (0.1 + 0.5**2 * 2.0))
+    run.advance(4.0)
+    angle = 0.2 / rate * np.sin(rate * 4.0)
+    assert run.sample().p_WB[1, 2] == pytest.approx(0.05 + 0.5 * angle, abs=1e-10)
+    assert run.sample().coupling[0] == pytest.approx(-2.0 * 0.5 * rate**2 * angle, abs=1e-9)
+    built = run.built()
+    assert (built.rows, built.rank, built.mobility) == (11, 11, 1)
+
+
+def test_a_coupling_and_a_stop_hold_together():
+    """Of two geared wheels one meets its stop: both stop, and the gear carries what drives the other."""
+    made = runs.model("gear_pair")
+    stopped = replace(made, joints=(made.joints[0], replace(made.joints[1], limits=(-0.5, 1.0))))
+    run = runs.build("dependent", stopped)
+    run.advance(1.0)
+    (hit,) = run.events()
+    assert (hit.kind, hit.name) == ("impact", "axle2")
+    assert hit.time == pytest.approx(np.sqrt(0.4), abs=1e-10)
+    assert run.sample().coupling[0] == pytest.approx(-2.0, abs=1e-10)
+    assert run.sample().stop[1] == pytest.approx(2.0, abs=1e-10)
+
+
+def test_what_holds_one_freedom_twice_is_refused():
+    """Two stops of geared wheels at once leave open which of them carries: the reason says so."""
+    made = runs.model("gear_pair")
+    both = replace(made, joints=(replace(made.joints[0], friction=3.0), replace(made.joints[1], friction=3.0)))
+    with pytest.raises(Refused, match="not determinate"):
+        runs.build("dependent", both)

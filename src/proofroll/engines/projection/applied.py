@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -40,6 +40,7 @@ class Applied:
         springs: whether there are any between points.
         laws: whether joints have any.
         now: time at which drives and targets are taken [s].
+        modes: of efforts with a limit, by the actuator's number; without one its own size clamps an effort.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:
@@ -47,9 +48,12 @@ class Applied:
         self._laws = [law for number, joint in enumerate(mechanism.joints) for law in _laws(number, joint)]
         number = {joint.name: index for index, joint in enumerate(mechanism.joints)}
         self._motors = [
-            _motor(actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
-            for actuator in mechanism.actuators
+            self._motor(place, actuator, number[actuator.joint], mechanism.joints[number[actuator.joint]])
+            for place, actuator in enumerate(mechanism.actuators)
         ]
+        self._limited = [k for k, actuator in enumerate(mechanism.actuators) if actuator.limit is not None]
+        self._actuators = mechanism.actuators
+        self.modes: Mapping[int, str] = {}
         self._laws += self._motors
         self.now = 0.0
         sprung = [law for law in self._laws if (law.stiffness or law.push) and law.axis != "slide"]
@@ -61,14 +65,12 @@ class Applied:
             if joint.kind == "spherical" and joint.damping
         ]
         self.laws = bool(self._laws or self._balls)
-        # dry friction and stops: coordinates to look at, without a law of their own here
-        self._watched = [
-            _Law(
-                joint.number, "slide" if mechanism.joints[joint.number].kind == "prismatic" else "z", 0.0, 0.0, 0.0, 0.0
-            )
-            for joint in switched_joints(mechanism)
-        ]
-        turning = [law for law in self._watched if law.axis != "slide"]
+        # coordinates to look at, without a law of their own here
+        watched = {joint.number for joint in switched_joints(mechanism)}
+        watched |= {number[name] for item in mechanism.couplings for name in (item.joint_a, item.joint_b)}
+        axes = {k: "slide" if mechanism.joints[k].kind == "prismatic" else "z" for k in sorted(watched)}
+        self._watched = {k: _Law(k, axis, 0.0, 0.0, 0.0, 0.0) for k, axis in axes.items()}
+        turning = [law for law in self._watched.values() if law.axis != "slide"]
         self._angles |= {law: mechanism.joints[law.connection].q0[0] for law in turning}
         com = np.array([*(body.com for body in mechanism.bodies), (0.0, 0.0, 0.0)])
         self._springs = [
@@ -114,9 +116,33 @@ class Applied:
         size = law.drive - law.damping * self._rate(law, ends)
         return size - law.stiffness * (self._coordinate(law, ends) - law.rest) if law.stiffness else size
 
-    def watched(self, ends: Ends) -> list[tuple[float, float]]:
-        """Coordinate and velocity of each joint with dry friction or stops."""
-        return [(self._coordinate(law, ends), self._rate(law, ends)) for law in self._watched]
+    def watched(self, ends: Ends) -> dict[int, tuple[float, float]]:
+        """Coordinate and velocity of each joint, by its number, that has dry friction, stops or a coupling."""
+        return {k: (self._coordinate(law, ends), self._rate(law, ends)) for k, law in self._watched.items()}
+
+    def along(self, joints: Sequence[int], ends: Ends) -> tuple[Array, Array]:
+        """Forces and moments of joints that push by 1 along their coordinates, on body b at its point, (joints, 3)."""
+        laws = [self._watched[k] for k in joints]
+        ways, slides = np.array([_direction(law, ends) for law in laws]), [[law.axis == "slide"] for law in laws]
+        return np.where(slides, ways, 0.0), np.where(slides, 0.0, ways)
+
+    def wanted(self, ends: Ends) -> list[float]:
+        """Efforts with a limit before they are clamped."""
+        places = ((self._actuators[k], self._motors[k]) for k in self._limited)
+        return [
+            float(actuator.wanted(self.now, self._coordinate(law, ends), self._rate(law, ends)))
+            for actuator, law in places
+        ]
+
+    def _motor(self, place: int, actuator: Actuator, number: int, joint: Joint) -> _Law:
+        """The effort of an actuator: a spring, damper and drive at its joint, or a push with a limit or in time."""
+        n, target = actuator.gear, actuator.target
+        axis = "slide" if joint.kind == "prismatic" else "z"
+        if actuator.limit is not None or not isinstance(target, float):
+            push = lambda t, q, v: actuator.effort(t, q, v, self.modes.get(place))  # noqa: E731 -- closes over its number
+            return _Law(number, axis, 0.0, 0.0, 0.0, 0.0, push)
+        gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
+        return _Law(number, axis, n * n * actuator.kp, 0.0, n * n * actuator.kd, n * gain * target)
 
     @staticmethod
     def _rate(law: _Law, ends: Ends) -> float:
@@ -150,16 +176,6 @@ class Applied:
 
 def _direction(law: _Law, ends: Ends) -> Array:
     return ends.B[law.connection, :, 0] if law.axis == "x" else ends.A[law.connection, :, 2]
-
-
-def _motor(actuator: Actuator, number: int, joint: Joint) -> _Law:
-    """The effort of an actuator: a spring, damper and drive at its joint, or a push with a limit or in time."""
-    n, target = actuator.gear, actuator.target
-    axis = "slide" if joint.kind == "prismatic" else "z"
-    if actuator.limit is not None or not isinstance(target, float):
-        return _Law(number, axis, 0.0, 0.0, 0.0, 0.0, actuator.effort)
-    gain = {"torque": 1.0, "velocity": actuator.kd, "position": actuator.kp}[actuator.kind]
-    return _Law(number, axis, n * n * actuator.kp, 0.0, n * n * actuator.kd, n * gain * target)
 
 
 def _laws(number: int, joint: Joint) -> list[_Law]:

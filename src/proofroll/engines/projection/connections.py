@@ -124,14 +124,17 @@ class ProjectedConnections:
         """The rows of some connections."""
         return Constraints(self._kinds[chosen])
 
-    def on_bodies(self, bodies: Bodies, ends: Ends, rows: ConnectionRows, owner: NDArray[np.intp]) -> Array:
-        """Rows on the velocities (v, ω along their own axes) of all bodies, shape (rows, 6 bodies)."""
+    def on_bodies(self, bodies: Bodies, ends: Ends, owner: NDArray[np.intp], force: Array, torque: Array) -> Array:
+        """Rows on the velocities (v, ω along their own axes) of all bodies, (rows, 6 bodies).
+
+        ``force`` and ``torque`` are those of a unit multiplier on body b of the connection that is a row's ``owner``.
+        """
         number, count = np.arange(len(owner)), len(bodies.pose)
         C, place = np.zeros((len(owner), count, 6)), ends.place[owner]
         for body, sign in ((self.a[owner], -1.0), (self.b[owner], 1.0)):
             pose = bodies.pose[body]
-            moment = cross(place - pose[:, :3, 3], rows.force) + rows.torque
-            C[number, body, :3] += sign * rows.force
+            moment = cross(place - pose[:, :3, 3], force) + torque
+            C[number, body, :3] += sign * force
             C[number, body, 3:] += sign * turned(pose[:, :3, :3].swapaxes(1, 2), moment)
         return C[:, :-1].reshape(len(owner), 6 * (count - 1))
 

@@ -6,8 +6,9 @@ one tangent to them, spanned by D with C D = 0, in which the applied forces alon
 DᵀM D ν̇ = Dᵀ(h − M u̇₀) with any u̇₀ that obeys the constraints, gives the motion; what is left, M u̇ − h, lies in the
 first and gives the reactions, joint by joint from the tips of the tree.
 
-D comes from elimination along the tree (see :mod:`proofroll.engines.projection.elimination`); loops are projected once
-more, in the velocities ν. The number of their independent rows is found at the start and kept.
+D comes from elimination along the tree (see :mod:`proofroll.engines.projection.elimination`); loops, couplings and
+joints that are held are projected once more, in the velocities ν, by a row for each. The number of independent rows of
+loops and couplings is found at the start and kept.
 
 Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, for the projections; W. Blajer, Multibody
 Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
@@ -22,12 +23,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import cross
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
-from proofroll.elements.mechanism.sampling import independent_anywhere
+from proofroll.elements.mechanism.sampling import DEPENDENT, independent_anywhere
 from proofroll.engines.projection.applied import Applied
 from proofroll.engines.projection.connections import SKEW, Bodies, ConnectionRows, ProjectedConnections
-from proofroll.engines.projection.elimination import Closing, Elimination, Loads, LoopSplit, Space, solved
+from proofroll.engines.projection.elimination import Closing, Elimination, Loads, RowSplit, Space
 
 
 class SolvedState(NamedTuple):
@@ -38,13 +40,15 @@ class SolvedState(NamedTuple):
         linear: of the centres of mass, world axes, (bodies, 3).
         angular: along the bodies' own axes, (bodies, 3).
         forces: that the bodies need besides their weight, matrices as in :meth:`Elimination.forces`.
-        multipliers: of the rows of loops.
+        rates: of the velocities ν, (nv,).
+        multipliers: of the rows of loops, of couplings (forces on their second joints), and of what is held.
     """
 
     bodies: Bodies
     linear: Array
     angular: Array
     forces: Array
+    rates: Array
     multipliers: Array
 
 
@@ -58,8 +62,9 @@ class DependentCoordinates:
         nq, nv: numbers of coordinates and of velocities of the tree.
         gravity: acceleration of it.
         start: the state at time 0.
-        regularity: of the rows of loops where the equations were solved last: the least singular value that counts
-            over the largest; 1 without loops.
+        loop_rows, coupled: numbers of rows of loops, and of these with those of couplings.
+        regularity: of these rows where the equations were solved last: the least singular value that counts over the
+            largest; 1 without any.
     """
 
     def __init__(self, mechanism: Mechanism, elimination: type[Elimination] = Elimination) -> None:
@@ -77,6 +82,13 @@ class DependentCoordinates:
         ends = np.stack([connections.a, connections.b])[:, self._loops_at]
         self._loop_a, self._loop_b = ends[:, self._loop_rows.owner]
         self._between = self.tree.moves[self._loop_b] - self.tree.moves[self._loop_a]
+        number = mechanism.joint_index
+        self._couplings = [(number[c.joint_a], number[c.joint_b], c.ratio, c.offset) for c in mechanism.couplings]
+        self._geared = np.zeros((len(self._couplings), self.nv))
+        for row, (a, b, ratio, _) in zip(self._geared, self._couplings, strict=True):
+            row[mechanism.v_slices[a]], row[mechanism.v_slices[b]] = -ratio, 1.0
+        self.loop_rows = len(self._loop_rows.owner)
+        self.coupled = self.loop_rows + len(self._geared)
         # of other joints the axes stand still in one of the two bodies
         self._bent = any(joint.kind == "universal" for joint in mechanism.joints)
         self.gravity = np.array(mechanism.gravity)
@@ -120,13 +132,16 @@ class DependentCoordinates:
         own[:n, :3, 3:] = back @ v[:, :, None]
         return Bodies(pose, inverse, own, pose @ own @ inverse, origin)
 
-    def solve(self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None) -> SolvedState:
+    def solve(
+        self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None, held: Sequence[int] = ()
+    ) -> SolvedState:
         """Projections of the equations of motion at a state.
 
         Args:
             x: the state.
-            drives: further forces along the velocities ν, (nv,).
+            drives: further forces along the velocities ν, (nv,); several at once, (…, nv), give as many accelerations.
             closing: of a tree what its velocities are, if not those of free joints.
+            held: velocities that do not change.
         """
         bodies, joints = self.bodies(x), self._joints
         pose, inverse, own = bodies.pose[:-1], bodies.inverse[:-1], bodies.own[:-1]
@@ -145,37 +160,45 @@ class DependentCoordinates:
                 loads = loads._replace(drives=drives + self.tree.of_joints(bodies, *self.applied.of_joints(ends)))
         if self.applied.springs:
             loads = loads._replace(pulls=self.applied.pulls(bodies))
-        if self._locked:
+        if self._locked or held:
             ends = self.connections.ends(bodies, self._loops_at)
             rows = self._loop_rows.at(ends)
             drift = self._loop_rows.bending(ends, rows)
             drift -= (rows.form * still[joints:][self._loop_rows.owner]).sum(1)
-            closing = partial(self._closed, rows, -drift)
-        found, multipliers = self.tree.motions(bodies, relative, loads, closing)
-        rates = inverse @ found[:-1] @ pose
-        linear = (pose @ (rates + bent))[:, :3, 3] + self.gravity
-        angular = 0.5 * rates[:, :3, :3].reshape(-1, 9) @ SKEW.T
-        return SolvedState(bodies, linear, angular, rates + bent, multipliers)
+            closing = partial(self._closed, rows, self._with_zeros(-drift, held), held)
+        found, velocities, multipliers = self.tree.motions(bodies, relative, loads, closing)
+        rates = inverse @ found[..., :-1, :, :] @ pose
+        linear = (pose @ (rates + bent))[..., :3, 3] + self.gravity
+        angular = 0.5 * rates[..., :3, :3].reshape(*rates.shape[:-2], 9) @ SKEW.T
+        return SolvedState(bodies, linear, angular, rates + bent, velocities, multipliers)
 
-    def _closed(self, rows: ConnectionRows, wanted: Array, space: Space, given: Array, push: Array) -> Any:
-        """Velocities (…, nv) and multipliers by which the rows of loops have the rates that are wanted, (…, rows)."""
+    def _with_zeros(self, of_loops: Array, held: Sequence[int]) -> Array:
+        """Rates wanted of all rows where couplings and what is held change nothing, (…, rows)."""
+        more = len(self._geared) + len(held)
+        return np.concatenate([of_loops, np.zeros((*of_loops.shape[:-1], more))], axis=-1) if more else of_loops
+
+    def _closed(
+        self, rows: ConnectionRows, wanted: Array, held: Sequence[int], space: Space, given: Array, push: Array
+    ) -> Any:
+        """Velocities (…, nv) and multipliers by which the rows have the rates that are wanted, (…, rows)."""
         flat = given.reshape(*given.shape[:-2], 16)
+        C = rows.form @ space.S.T * self._between
         of_given = (rows.form * (flat[..., self._loop_b, :] - flat[..., self._loop_a, :])).sum(-1)
-        split = LoopSplit(space.H, rows.form @ space.S.T * self._between, self._locked)
-        self.regularity = split.least
-        velocities, multipliers = split(push.T, (wanted - of_given).T)
+        if self.coupled > self.loop_rows or held:
+            C, of_given = np.vstack([C, self._geared, np.eye(self.nv)[list(held)]]), self._with_zeros(of_given, held)
+        split = RowSplit(space.H, C, self._locked + len(held))
+        if not held:
+            self.regularity = split.least
+        elif split.least < DEPENDENT:
+            raise Refused("joints that hold lock more than can move: their forces are not determinate")
+        velocities, multipliers = split(push.T, np.broadcast_to(wanted - of_given, (*push.shape[:-1], len(C))).T)
         return velocities.T, multipliers.T
 
     def responses(self, x: Array, drives: Array, at: Sequence[int]) -> tuple[Array, Array]:
-        """ν̇ of a tree at a state, (nv,), and what unit forces along some of the velocities add, (nv, forces)."""
-        found = np.zeros((len(drives), 1 + len(at)))
-
-        def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
-            found[:] = solved(space.H, np.column_stack([push, np.eye(len(push))[:, at]]))
-            return found[:, 0], np.zeros(0)
-
-        self.solve(x, drives, closing)
-        return found[:, 0], found[:, 1:]
+        """ν̇ at a state, (nv,), and what unit forces along some of the velocities add, (nv, forces)."""
+        units = np.vstack([np.zeros(self.nv), np.eye(self.nv)[list(at)]])
+        found = self.solve(x, drives + units).rates
+        return found[0], (found[1:] - found[0]).T
 
     def pushed(self, x: Array, change: Array) -> Array:
         """The state after a change of the velocities ν, (nv,)."""
@@ -187,28 +210,44 @@ class DependentCoordinates:
         w += 0.5 * (inverse @ motion @ pose)[:, :3, :3].reshape(-1, 9) @ SKEW.T
         return x
 
-    def watched(self, x: Array) -> list[tuple[float, float]]:
-        """Coordinate and velocity of each joint with dry friction or stops."""
+    def watched(self, x: Array) -> dict[int, tuple[float, float]]:
+        """Coordinate and velocity of each joint, by its number, that has dry friction, stops or a coupling."""
         return self.applied.watched(self.connections.ends(self.bodies(x), slice(0, self._joints)))
 
-    def rates(self, x: Array, drives: Array | float = 0.0, closing: Closing | None = None) -> Array:
+    def wanted(self, x: Array) -> list[float]:
+        """Efforts with a limit before they are clamped."""
+        return self.applied.wanted(self.connections.ends(self.bodies(x), slice(0, self._joints)))
+
+    def _apart(self, bodies: Bodies) -> Array:
+        """Violations of couplings in coordinates and in velocities, (2, couplings)."""
+        at = self.applied.watched(self.connections.ends(bodies, slice(0, self._joints)))
+        found = [np.subtract(at[b], ratio * np.array(at[a])) - (offset, 0.0) for a, b, ratio, offset in self._couplings]
+        return np.transpose(found)
+
+    def rates(self, x: Array, drives: Array | float = 0.0, held: Sequence[int] = ()) -> Array:
         """ẋ; for the arguments see :meth:`solve`."""
         _, q, v, w = self.parts(x)
-        found = self.solve(x, drives, closing)
+        found = self.solve(x, drives, held=held)
         return _joined(v, quaternion_rates(q, w), found.linear, found.angular)
 
-    def eliminated(self, x: Array) -> Array:
-        """The state with its violations taken away within the constrained subspace; quaternions of unit length."""
+    def eliminated(self, x: Array, held: Sequence[int] = ()) -> Array:
+        """The state with its violations taken away within the constrained subspace; quaternions of unit length.
+
+        Velocities that are ``held`` stay what they are.
+        """
         x = self._with_unit_quaternions(x)
-        if not self.rank:
+        if not self.rank and not held:
             return x
         bodies, closing = self.bodies(x), None
         rows = self._joint_rows.at(self.connections.ends(bodies, slice(0, self._joints)))
         # of places and of velocities: motions that take the violations away, then these without what D allows
         relative = -self._joint_rows.twists(rows, np.stack([rows.residual, rows.rate]))
-        if self._locked:
+        if self._locked or held:
             rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
-            closing = partial(self._closed, rows, -np.stack([rows.residual, rows.rate]))
+            wanted = self._with_zeros(-np.stack([rows.residual, rows.rate]), held)
+            if self._couplings:
+                wanted[:, self.loop_rows : self.coupled] = -self._apart(bodies)
+            closing = partial(self._closed, rows, wanted, held)
         motion = self.tree.motions(bodies, relative, Loads(), closing)[0][:, :-1]
         pose, inverse = bodies.pose[:-1], bodies.inverse[:-1]
         linear = (motion @ pose[:, :, 3:])[:, :, :3, 0]
@@ -228,12 +267,13 @@ class DependentCoordinates:
             forces -= self.applied.pulls(bodies)
         ends = self.connections.ends(bodies)
         force, torque = np.zeros((2, len(ends.d), 3))
-        if self._locked:
+        if self.loop_rows:
             rows = self._loop_rows.at(self.connections.ends(bodies, self._loops_at))
-            np.add.at(force, self._joints + self._loop_rows.owner, solved.multipliers[:, None] * rows.force)
-            np.add.at(torque, self._joints + self._loop_rows.owner, solved.multipliers[:, None] * rows.torque)
+            of_loops = solved.multipliers[: self.loop_rows, None]
+            np.add.at(force, self._joints + self._loop_rows.owner, of_loops * rows.force)
+            np.add.at(torque, self._joints + self._loop_rows.owner, of_loops * rows.torque)
             pulls = np.zeros((len(bodies.pose), 4, 4))
-            on_b = (solved.multipliers[:, None] * rows.form).reshape(-1, 4, 4)
+            on_b = (of_loops * rows.form).reshape(-1, 4, 4)
             np.add.at(pulls, self._loop_b, on_b)
             np.add.at(pulls, self._loop_a, -on_b)
             forces -= pulls[:-1]
@@ -248,9 +288,15 @@ class DependentCoordinates:
         return self.applied.efforts(self.connections.ends(bodies, slice(0, self._joints)))
 
     def constraint_rows(self, bodies: Bodies) -> Array:
-        """Rows of all connections on the velocities of the bodies, (rows, 6 bodies)."""
+        """Rows of all connections and couplings on the velocities of the bodies, (rows, 6 bodies)."""
         ends, every = self.connections.ends(bodies), self.connections.constraints()
-        return self.connections.on_bodies(bodies, ends, every.at(ends), every.owner)
+        rows, on_bodies = every.at(ends), partial(self.connections.on_bodies, bodies, ends)
+        found = [on_bodies(every.owner, rows.force, rows.torque)]
+        for a, b, ratio, _ in self._couplings:
+            push, turn = self.applied.along([a, b], ends)
+            of_a, of_b = on_bodies(np.array([a, b]), push, turn)
+            found.append((of_b - ratio * of_a)[None])
+        return np.concatenate(found)
 
     def accept(self, x: Array) -> None:
         """Tells the forces that the motion goes on from a state."""
@@ -265,7 +311,7 @@ class DependentCoordinates:
 
 
 def _rank_of_loops(mechanism: Mechanism) -> int:
-    if not mechanism.loops:
+    if not mechanism.loops and not mechanism.couplings:
         return 0
     tree, (q, v) = Tree(mechanism), mechanism.start()
 

@@ -9,7 +9,7 @@ on differences of two twists, and are few: their singular vectors in the metric 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -137,7 +137,7 @@ class Elimination:
 
     def motions(
         self, bodies: Bodies, relative: Array, loads: Loads, closing: Closing | None = None
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
         """Projected motions of the bodies: rates of their twists, or, of violations, twists.
 
         Args:
@@ -145,17 +145,17 @@ class Elimination:
             relative: what the joints ask of the twists of their children, less those of their parents, but for what
                 they leave free, (…, joints, 16).
             loads: forces on the bodies.
-            closing: what loops make of it.
+            closing: what further rows make of it.
 
         Returns:
-            (…, bodies + 1, 4, 4), and the multipliers of the loops' rows.
+            (…, bodies + 1, 4, 4), the same of the velocities, (…, nv), and the multipliers of the further rows.
         """
         space = self.space(bodies)
         given = _matrices(self._steps @ relative)
         needed = self.forces(bodies, bodies.inverse[:-1] @ given[..., :-1, :, :] @ bodies.pose[:-1] + loads.bent)
         push = loads.drives - (space.S * (self._sums @ _flat(needed - loads.pulls))).sum(-1)
         velocities, multipliers = (closing or _without_loops)(space, given, push)
-        return given + _matrices(self.moves @ (space.S * velocities[..., None])), multipliers
+        return given + _matrices(self.moves @ (space.S * velocities[..., None])), velocities, multipliers
 
     def twists(self, bodies: Bodies, velocities: Array) -> Array:
         """Twists of the bodies for velocities (nv,), (bodies + 1, 4, 4)."""
@@ -176,8 +176,8 @@ def _matrices(flat: Array) -> Array:
     return flat.reshape(*flat.shape[:-1], 4, 4)
 
 
-class LoopSplit:
-    """Velocities that rows of loops lock, and those they allow, in the metric of the mass matrix H.
+class RowSplit:
+    """Velocities that rows lock, and those they allow, in the metric of the mass matrix H.
 
     Attributes:
         least: of the singular values that count the smallest, relative to the largest.
@@ -193,6 +193,8 @@ class LoopSplit:
         U, values, Vt, failed = dgesdd(C @ self._into, full_matrices=0)
         if failed:
             raise np.linalg.LinAlgError("the singular values were not found")
+        if rank > len(values):
+            raise np.linalg.LinAlgError("more rows hold than there are velocities")
         self.least = float(values[rank - 1] / values[0])
         self._locked, self._back = self._into @ Vt[:rank].T, U[:, :rank].T / values[:rank, None]
 
@@ -221,24 +223,3 @@ def solved(H: Array, push: Array) -> Array:
     if failed:
         raise np.linalg.LinAlgError("the mass matrix is not positive definite")
     return np.asarray(found)
-
-
-class Held:
-    """Velocities without some directions, which are held; see :data:`Closing`.
-
-    Attributes:
-        force: along each of these, that holds it.
-    """
-
-    def __init__(self, held: Sequence[int]) -> None:
-        self._held, self.force = list(held), np.zeros(len(held))
-
-    def __call__(self, space: Space, _: Array, push: Array) -> tuple[Array, Array]:
-        """Velocities (nv,), those held zero."""
-        free = np.setdiff1d(np.arange(len(push)), self._held)
-        H = space.H + np.triu(space.H, 1).T
-        velocities = np.zeros(len(push))
-        if len(free):
-            velocities[free] = solved(H[np.ix_(free, free)], push[free])
-        self.force = H[self._held] @ velocities - push[self._held]
-        return velocities, np.zeros(0)

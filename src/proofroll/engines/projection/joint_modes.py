@@ -1,34 +1,25 @@
-"""Dry friction and stops of joints: which holds, when that ends, and what comes next.
+"""Dry friction, stops and limits of efforts: which law holds, when that ends, and what comes next.
 
-A joint that is held is locked: its direction leaves the null space of the constraints, and the force that holds it
-follows as a reaction does. Between two switches the equations are smooth; a switch is located within a step by shorter
-steps of the same method, so that it is as accurate as these. Modes follow by complementarity from the forces.
+A joint that is held is locked: a row more of the constraints, whose multiplier is the force that holds it. Between two
+switches the equations are smooth; a switch is located within a step by shorter steps of the same method, so that it is
+as accurate as these. Of joints at rest, those that hold follow from a quadratic program with bounds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from proofroll.core.errors import Diverged
+from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
+from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import (
-    HOLDING,
-    STOPPED,
-    Mode,
-    SwitchedJoint,
-    changes,
-    decided,
-    held_by,
-    load_of,
-    struck,
-)
+from proofroll.elements.mechanism.signal import breaks
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, load_of, switched_joints
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
-from proofroll.engines.projection.elimination import Held
 from proofroll.engines.projection.stepping import Stepper
 
 # Speed of an impact, over that of the first one of this joint, below which what is left of the rebounds is left out.
@@ -36,33 +27,36 @@ SETTLED = 1e-6
 # A mode that ends where it started is possible; as many in a row as this are an endless loop.
 _WITHOUT_PROGRESS = 20
 _ULPS = 4  # of the time, to which switches are located
+_DEPENDENT = 1e-12  # of the largest response: directions that respond less hold one degree of freedom together
 
 
 class SwitchedMotion:
-    """Motion of a tree whose joints rub or have stops.
+    """Motion of a mechanism with joints that rub or have stops, efforts that have limits, or drives with breaks.
 
     Attributes:
-        t, x: present time [s] and state.
-        mode: of each switched joint.
-        events: of impacts, sticking and slipping, so far.
+        mode: of each switched joint, then of each effort with a limit.
+        events: of impacts, sticking, slipping and limits, so far.
     """
 
     def __init__(
         self,
         equations: DependentCoordinates,
-        joints: Sequence[SwitchedJoint],
+        mechanism: Mechanism,
         stepper: Stepper,
-        accept: Callable[[float, Array], Array],
+        accept: Callable[[float, Array, Sequence[int]], Array],
     ) -> None:
-        self._equations, self._joints, self._stepper, self._accept = equations, tuple(joints), stepper, accept
+        self._equations, self._stepper, self._accept = equations, stepper, accept
+        self._joints, self._breaks = switched_joints(mechanism), breaks(mechanism.signals)
+        self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         self._fastest: dict[int, float] = {}
         self._idle = 0
         self.events: list[Event] = []
         self.mode: Mode = ("free",) * len(self._joints)
-        q, v = self._joint_state(equations.start)
-        for joint in self._joints:  # a start at a stop is known to digits of a file
-            q[joint.coordinate] = np.clip(q[joint.coordinate], joint.low, joint.high)
-        self._enter(0.0, equations.start, self._decided(equations.start, q, v))
+        start = np.append(equations.start, 0.0)
+        q, v = self._joint_state(start)
+        for k, joint in enumerate(self._joints):  # a start at a stop is known to digits of a file
+            q[k] = np.clip(q[k], joint.low, joint.high)
+        self._enter(0.0, start, self._decided(start, q, v))
 
     @property
     def t(self) -> float:
@@ -72,22 +66,31 @@ class SwitchedMotion:
     @property
     def x(self) -> Array:
         """State now."""
-        return self._stepper.y
+        return self._stepper.y[:-1]
 
-    def solve(self, x: Array) -> tuple[SolvedState, Array]:
-        """Equations of motion at a state in the present mode, and the forces that hold joints."""
-        held = Held(self._held)
-        return self._equations.solve(x, self._load(self.mode), held), held.force
+    def solve(self, y: Array | None = None) -> SolvedState:
+        """Equations of motion in the present mode, now or at a state with its time."""
+        x = self._at(self._stepper.y if y is None else y)
+        return self._equations.solve(x, self._load(self.mode), held=self._held)
 
     def along_joints(self, count: int) -> dict[str, Array]:
         """Forces of dry friction and of stops along the coordinates of all joints."""
-        held = self.solve(self.x)[1]
-        forces = dict(zip(held_by(self.mode), held.tolist(), strict=True))
+        forces = self._holding(self.solve())
         found = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
-        for k, (joint, own) in enumerate(zip(self._joints, self.mode, strict=True)):
+        for k, joint in enumerate(self._joints):
+            own = self.mode[k]
             on = on_joint(own in STOPPED, joint.friction, forces.get(k, joint.push(own)))
             found["friction"][joint.number], found["stop"][joint.number] = on
         return found
+
+    def _at(self, y: Array) -> Array:
+        """The state without its time, to which drives are set."""
+        self._equations.applied.now = float(y[-1])
+        return y[:-1]
+
+    def _holding(self, solved: SolvedState) -> dict[int, float]:
+        """Forces that hold joints, by their numbers among the switched ones."""
+        return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=False))
 
     def _load(self, mode: Mode) -> Array:
         return load_of(self._joints, mode, self._equations.nv)
@@ -101,51 +104,102 @@ class SwitchedMotion:
         stepper = self._stepper
         stepper.aim(t)
         while stepper.t < t:
-            stepper.step(t, np.inf)
-            ends = [self._crossing(k, kind) for k, kind in self._ended(stepper.y)]
+            until = min([t, *(at for at in self._breaks if at > stepper.t)])
+            stepper.step(until, np.inf)
+            ends = [
+                self._crossing(k, kind)
+                for k, kind, excess, closing in self._excess(stepper.y)
+                if excess > 0 and closing
+            ]
             if ends:
-                at, k, kind = min(ends)
-                self._switch(at, k, kind)
-            else:
-                self._idle = 0
+                self._switch(*min(ends))
+                continue
+            self._idle = 0
+            if stepper.t in self._breaks:
+                self._enter(stepper.t, stepper.y, self.mode)
 
-    def _enter(self, t: float, x: Array, mode: Mode) -> None:
-        self.mode = mode
-        self._held = [self._joints[number].velocity for number in held_by(mode)]
-        rates = partial(self._equations.rates, drives=self._load(mode), closing=Held(self._held))
-        self._stepper.begin(t, x, rates, self._accept, np.ones(len(x)))
+    def _enter(self, t: float, y: Array, mode: Mode) -> None:
+        self.mode, equations, load = mode, self._equations, self._load(mode)
+        self._held = held = [self._joints[number].velocity for number in held_by(mode)]
+        equations.applied.modes = dict(zip(self._motors, mode[len(self._joints) :], strict=True))
 
-    def _joint_state(self, x: Array) -> tuple[Array, Array]:
-        """Coordinates and velocities of the tree, of switched joints alone, where held exactly."""
-        q, v = np.zeros(self._equations.nq), np.zeros(self._equations.nv)
-        found = self._equations.watched(x)
-        for joint, own, (place, rate) in zip(self._joints, self.mode, found, strict=True):
-            q[joint.coordinate] = {"low": joint.low, "high": joint.high}.get(own, place)
-            v[joint.velocity] = 0.0 if own in HOLDING else rate
+        def accept(at: float, y: Array) -> Array:
+            x = self._at(y)
+            accepted = self._accept(at, x, held)
+            return y if accepted is x else np.append(accepted, y[-1])
+
+        self._stepper.begin(
+            t, y, lambda y: np.append(equations.rates(self._at(y), load, held), 1.0), accept, np.ones(len(y))
+        )
+
+    def _joint_state(self, y: Array) -> tuple[Array, Array]:
+        """Coordinates and velocities of the switched joints, where held exactly."""
+        q, v = np.zeros((2, len(self._joints)))
+        found = self._equations.watched(self._at(y))
+        for k, joint in enumerate(self._joints):
+            place, rate = found[joint.number]
+            q[k] = {"low": joint.low, "high": joint.high}.get(self.mode[k], place)
+            v[k] = 0.0 if self.mode[k] in HOLDING else rate
         return q, v
 
-    def _decided(self, x: Array, q: Array, v: Array) -> Mode:
-        return decided(self._joints, q, v, partial(self._responses, x))[0]
+    def _decided(self, y: Array, q: Array, v: Array) -> Mode:
+        """Mode that follows from the forces: a joint at rest is held where the force that this needs is within bounds.
 
-    def _responses(self, x: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
-        return self._equations.responses(x, self._load(mode), at)
+        All at once, for they feel each other.
+        """
+        x, equations = self._at(y), self._equations
+        equations.applied.modes = {}
+        wanted = zip(self._motors.values(), equations.wanted(x), strict=True)
+        motors = [motor.mode_of(effort) for motor, effort in wanted]
+        mode = [
+            joint.moving(rate) if rate else joint.resting(place)
+            for joint, place, rate in zip(self._joints, q.tolist(), v.tolist(), strict=True)
+        ]
+        still = held_by(tuple(mode))
+        if still:
+            moving = tuple("free" if k in still else own for k, own in enumerate(mode))
+            at = [self._joints[k].velocity for k in still]
+            free, response = equations.responses(x, self._load(moving), at)
+            low, high = np.array([self._joints[k].bounds(mode[k]) for k in still]).T
+            for k, side in zip(still, _bounded(free[at], response[at], low, high)[1], strict=True):
+                if side:
+                    mode[k] = self._joints[k].moving(-side)
+        return (*mode, *motors)
 
-    def _ended(self, x: Array) -> list[tuple[int, str]]:
-        """Joints whose mode has ended at a state, and how."""
-        return [(k, kind) for k, kind, excess, closing in self._excess(x) if excess > 0 and closing]
+    def _struck(self, y: Array, q: Array, v: Array, hit: int) -> Array:
+        """Change of all velocities ν by an impact of a joint on its stop, by Newton's law; ``v`` becomes that after it.
 
-    def _excess(self, x: Array) -> list[tuple[int, str, float, bool]]:
+        Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
+        """
+        rests = [k for k, joint in enumerate(self._joints) if not v[k] and joint.resting(q[k]) in STOPPED]
+        at_stop = sorted({hit, *rests})
+        at = [self._joints[k].velocity for k in at_stop]
+        _, response = self._equations.responses(self._at(y), self._load(()), at)
+        elastic = np.array([self._joints[k].restitution for k in at_stop])
+        below = np.array([q[k] <= self._joints[k].low for k in at_stop])
+        low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
+        impulse, side = _bounded((1 + elastic) * v[at_stop], response[at], low, high)
+        if np.count_nonzero(impulse) > 1 and elastic.any():
+            raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+        change = np.asarray(response @ impulse)
+        v += change[[joint.velocity for joint in self._joints]]
+        for k, free, e in zip(at_stop, side, elastic, strict=True):
+            if not free and not e:
+                v[k] = 0.0
+        return change
+
+    def _excess(self, y: Array) -> list[tuple[int, str, float, bool]]:
         """Excess of each mode over each of its ends, and whether it moves towards it.
 
         ``up``, ``down``: the force that holds is beyond its bound, and the joint moves so; ``still``: a joint that
-        moves against friction has turned; ``low``, ``high``: it is beyond a stop.
+        moves against friction has turned; ``low``, ``high``: it is beyond a stop; ``least``, ``linear``, ``greatest``:
+        an effort comes to be so.
         """
-        q, v = self._joint_state(x)
-        holding = self.solve(x)[1] if self._held else np.zeros(0)
-        forces = dict(zip(held_by(self.mode), holding.tolist(), strict=True))
+        q, v = self._joint_state(y)
+        forces = self._holding(self.solve(y)) if self._held else {}
         found = []
-        for k, (joint, own) in enumerate(zip(self._joints, self.mode, strict=True)):
-            place, rate = float(q[joint.coordinate]), float(v[joint.velocity])
+        for k, joint in enumerate(self._joints):
+            own, place, rate = self.mode[k], float(q[k]), float(v[k])
             if k in forces:
                 low, high = joint.bounds(own)
                 found += [(k, "up", low - forces[k], True), (k, "down", forces[k] - high, True)]
@@ -153,44 +207,78 @@ class SwitchedMotion:
             if own != "free":
                 found.append((k, "still", -rate if own == "forward" else rate, True))
             found += [(k, "low", joint.low - place, rate < 0), (k, "high", place - joint.high, rate > 0)]
+        efforts = zip(self._motors.values(), self._equations.wanted(self._at(y)), strict=True)
+        for k, (motor, wanted) in enumerate(efforts, len(self._joints)):
+            over, under = wanted - motor.bound, -motor.bound - wanted
+            if self.mode[k] == "linear":
+                found += [(k, "least", under, True), (k, "greatest", over, True)]
+            else:
+                found.append((k, "linear", -over if self.mode[k] == "greatest" else -under, True))
         return found
 
     def _crossing(self, k: int, kind: str) -> tuple[float, int, str]:
-        """Time just after a mode ended within the last step, with that mode's joint and end."""
+        """Time just after a mode ended within the last step, with that mode's number and end."""
 
-        def margin(x: Array) -> float:
-            return -next(excess for joint, end, excess, _ in self._excess(x) if (joint, end) == (k, kind))
+        def margin(y: Array) -> float:
+            return -next(excess for number, end, excess, _ in self._excess(y) if (number, end) == (k, kind))
 
         now = self._stepper.t
         return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1], k, kind
 
     def _switch(self, t: float, k: int, kind: str) -> None:
-        stepper, joint = self._stepper, self._joints[k]
+        stepper = self._stepper
         self._idle = self._idle + 1 if t <= stepper.t_before else 0
         if self._idle > _WITHOUT_PROGRESS:
-            raise Diverged(f"friction and stops of joints alternate without end at t = {t:.6g} s")
-        x = stepper.inside(t)
-        (q, v), was, happened = self._joint_state(x), self.mode, list[tuple[str, str]]()
-        if kind in {"up", "down"}:
-            leaves = joint.moving(1.0 if kind == "up" else -1.0)
-            mode = tuple(leaves if number == k else own for number, own in enumerate(was))
+            raise Diverged(f"friction, stops and limits of efforts alternate without end at t = {t:.6g} s")
+        y, was, happened = stepper.inside(t), self.mode, list[tuple[str, str]]()
+        if k >= len(self._joints):
+            motor = list(self._motors.values())[k - len(self._joints)]
+            happened = [("release" if kind == "linear" else "saturate", motor.name)]
+            mode = (*was[:k], kind, *was[k + 1 :])
+        elif kind in {"up", "down"}:
+            mode = (*was[:k], self._joints[k].moving(1.0 if kind == "up" else -1.0), *was[k + 1 :])
         else:
-            rates = v.copy()
-            if kind == "still":
-                v[joint.velocity] = 0.0
-            else:
-                happened = [("impact", joint.name)]
-                q[joint.coordinate] = joint.low if kind == "low" else joint.high
-                speed = abs(float(v[joint.velocity]))
-                v = struck(self._joints, q, v, k, partial(self._responses, x))[0]
-                if speed < SETTLED * self._fastest.setdefault(k, speed):
-                    v[joint.velocity] = 0.0
-            x = self._equations.pushed(x, v - rates)
-            mode = self._decided(x, q, v)
+            y, mode = self._stopped(y, k, kind)
+            happened = [("impact", self._joints[k].name)] if kind != "still" else []
         # a joint that stays where it hit has come to rest by its impact
-        happened += [item for item in changes(self._joints, was, mode) if not happened or item[1] != joint.name]
+        named = {name for _, name in happened}
+        happened += [item for item in changes(self._joints, was, mode) if item[1] not in named]
         self.events += [
             Event(each, t, *stepper.bracket(max(stepper.t_before, t - _ULPS * float(np.spacing(t))), t), name)
             for each, name in happened
         ]
-        self._enter(t, x, mode)
+        self._enter(t, y, mode)
+
+    def _stopped(self, y: Array, k: int, kind: str) -> tuple[Array, Mode]:
+        """State and mode after a joint has turned (``still``) or hit a stop."""
+        joint, (q, v) = self._joints[k], self._joint_state(y)
+        at, change = joint.velocity, np.zeros(self._equations.nv)
+        speed = float(v[k])
+        if kind == "still":
+            v[k], change[at] = 0.0, -speed
+        else:
+            q[k] = joint.low if kind == "low" else joint.high
+            change = self._struck(y, q, v, k)
+            if abs(speed) < SETTLED * self._fastest.setdefault(k, abs(speed)):
+                v[k], change[at] = 0.0, -speed
+        y = np.append(self._equations.pushed(self._at(y), change), y[-1])
+        return y, self._decided(y, q, v)
+
+
+def _bounded(free: Array, G: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.int_]]:
+    """Forces f between bounds that leave the least of ½ f·G f + free·f: free + G f is zero but where f is at a bound.
+
+    Returns:
+        The forces; of each -1, 0, 1: at its lower bound, between, at its upper one.
+
+    Raises:
+        Refused: G is singular, so that the forces are not determinate.
+    """
+    from scipy.optimize import lsq_linear
+
+    sizes = np.linalg.eigvalsh(G)
+    if sizes[0] <= _DEPENDENT * sizes[-1]:
+        raise Refused("several joints hold one degree of freedom: their forces are not determinate")
+    L = np.linalg.cholesky(G)
+    found = lsq_linear(L.T, -np.linalg.solve(L, free), (low, high), method="bvls", tol=np.finfo(float).tiny)
+    return np.asarray(found.x), np.asarray(found.active_mask)

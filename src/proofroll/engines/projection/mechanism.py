@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from proofroll.elements.mechanism.sampling import (
     mechanism_of,
     unsaid,
 )
-from proofroll.elements.mechanism.signal import varies
+from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.contact_modes import ContactMotion
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
@@ -38,6 +38,7 @@ PROVIDES = frozenset(
     | FORCES
     | {
         MechanismCapability.REDUNDANT,
+        MechanismCapability.COUPLINGS,
         MechanismCapability.ACTUATORS,
         MechanismCapability.SATURATION,
         MechanismCapability.SIGNALS,
@@ -50,9 +51,6 @@ PROVIDES = frozenset(
         MechanismCapability.CONTACT_REBOUNDS,
     }
 )
-LACKING: Mapping[str, str] = {
-    MechanismCapability.COUPLINGS: "its tree has no rows between joints",
-}
 # Regularity of the loops' rows over the largest on the way: accelerations lose as many digits as it has zeros. Loops
 # that pass a singular pose by a hundredth of a radian have some hundredth.
 SINGULAR = 1e-6
@@ -63,20 +61,15 @@ class ProjectionMechanism:
 
     def __init__(self, scene: Any, settings: ProjectionSettings) -> None:
         mechanism = mechanism_of(scene)
-        require(mechanism, PROVIDES, LACKING)
-        switched = switched_joints(mechanism)
-        if switched and mechanism.loops:
-            raise Refused("dry friction and stops are followed in trees of joints, and this mechanism has loops")
+        require(mechanism, PROVIDES, {})
         self._timed = any(map(varies, mechanism.signals))
-        pushed = self._timed or any(actuator.limit is not None for actuator in mechanism.actuators)
-        if mechanism.contacts and (switched or mechanism.loops):
-            raise Refused("contacts are followed in trees whose joints have no loops, dry friction or stops")
-        if (switched or pushed or mechanism.contacts) and settings.equations == "compiled":
+        rubbing = bool(switched_joints(mechanism))
+        limited = any(actuator.limit is not None for actuator in mechanism.actuators)
+        switched = rubbing or limited or bool(breaks(mechanism.signals))
+        if mechanism.contacts and (rubbing or mechanism.loops or mechanism.couplings):
+            raise Refused("contacts are followed in trees whose joints have no loops, couplings, dry friction or stops")
+        if (switched or self._timed or mechanism.contacts) and settings.equations == "compiled":
             raise Refused("equations that switch or change in time are not compiled; choose preset=matched")
-        if switched and pushed:
-            raise Refused(
-                "dry friction and stops are followed under drives that neither change in time nor have a limit"
-            )
         for body in mechanism.bodies:
             if not body.mass or np.linalg.eigvalsh(body.inertia)[0] <= 0:
                 raise Refused(
@@ -100,7 +93,7 @@ class ProjectionMechanism:
             return
         if switched:
             stepper = STEPPERS[settings.integrator](resolution)
-            self._motion = self._switched = SwitchedMotion(self._equations, switched, stepper, self._accepted)
+            self._motion = self._switched = SwitchedMotion(self._equations, mechanism, stepper, self._accepted)
             return
         integrator = INTEGRATORS[settings.integrator]
         accepted: Accept = self._accepted
@@ -118,16 +111,14 @@ class ProjectionMechanism:
     @property
     def _state(self) -> Array:
         """State now, without the time."""
-        if self._touching or not self._timed:
-            return self._motion.x
         self._equations.applied.now = self._motion.t
-        return self._motion.x[:-1]
+        return self._motion.x[: len(self._equations.start)]
 
-    def _accepted(self, t: float, x: Array) -> Array:
+    def _accepted(self, t: float, x: Array, held: Sequence[int] = ()) -> Array:
         if not np.isfinite(x.sum()):
             raise Diverged(f"the state is not finite at t = {t:.6g} s")
         if self._eliminates:
-            x = self._without_violations(x)
+            x = self._equations.eliminated(x, held) if held else self._without_violations(x)
         self._equations.accept(x)
         if self._equations.regularity < SINGULAR * self._most_regular:
             raise Stalled(f"a singular pose at t = {t:.6g} s, where the rows of loops become dependent")
@@ -145,10 +136,10 @@ class ProjectionMechanism:
         except Stalled as error:
             raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
 
-    def _solved(self, x: Array) -> SolvedState:
+    def _solved(self) -> SolvedState:
         if self._touching:
             return self._touching.solve()[0]
-        return self._switched.solve(x)[0] if self._switched else self._equations.solve(x)
+        return self._switched.solve() if self._switched else self._equations.solve(self._state)
 
     def events(self) -> Sequence[Event]:
         """See :class:`proofroll.core.engine_abilities.LocatesEvents`."""
@@ -158,7 +149,7 @@ class ProjectionMechanism:
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
         equations, x = self._equations, self._state
-        solved = self._solved(x)
+        solved = self._solved()
         # reactions beside forces of contact, which are no part of the matrices of the bodies' loads, are not told
         force, torque = unsaid(self._mechanism) if self._touching else equations.reactions(solved)
         r, q, v, _ = equations.parts(x)
@@ -172,6 +163,7 @@ class ProjectionMechanism:
             joint_force=force,
             joint_torque=torque,
             effort=equations.efforts(solved.bodies) if self._mechanism.actuators else None,
+            coupling=solved.multipliers[equations.loop_rows : equations.coupled] if self._mechanism.couplings else None,
             contact_force=self._touching.solve()[1] if self._touching else None,
             **(self._switched.along_joints(len(self._mechanism.joints)) if self._switched else {}),
         )
@@ -179,7 +171,7 @@ class ProjectionMechanism:
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         equations = self._equations
-        solved = self._solved(self._state)
+        solved = self._solved()
         bodies, count, joints = solved.bodies, len(equations.mass), len(self._mechanism.joints)
         R, w = bodies.rotation, bodies.spin
         arm = np.einsum("nij,nj->ni", R, equations.com)

@@ -35,7 +35,7 @@ class Recursion(Elimination):
 
     def motions(
         self, bodies: Bodies, relative: Array, loads: Loads, closing: Closing | None = None
-    ) -> tuple[Array, Array]:
+    ) -> tuple[Array, Array, Array]:
         """See :meth:`Elimination.motions`."""
         assert closing is None
         S = _six(self.directions(bodies))
@@ -59,13 +59,15 @@ class Recursion(Elimination):
                 inertia[parent] = inertia[parent] + solid
                 pushes[..., parent, :] += push
         found = np.zeros((*relative.shape[:-2], self._world + 1, 6), dtype=S.dtype)
+        velocities = np.zeros((*relative.shape[:-2], len(S)), dtype=S.dtype)
         for number, (body, parent) in enumerate(zip(self._child, self._parent, strict=True)):
             motion = found[..., parent, :]
             for k in self._velocities[number]:
                 part, rate = parts[k]
-                motion = motion + np.multiply.outer(rate - motion @ part, S[k])
+                velocities[..., k] = rate - motion @ part
+                motion = motion + np.multiply.outer(velocities[..., k], S[k])
             found[..., body, :] = motion + steps[..., number, :]
-        return _four(found), np.zeros(0)
+        return _four(found), velocities, np.zeros(0)
 
 
 def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
@@ -77,6 +79,8 @@ def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[
     """
     if mechanism.loops:
         raise Refused("singular values of loops are not compiled; choose preset=matched")
+    if mechanism.couplings:
+        raise Refused("rows of couplings are not compiled; choose preset=matched")
     equations = DependentCoordinates(mechanism, Recursion)
     if equations.applied.remembers:
         raise Refused(
