@@ -17,7 +17,6 @@ from screenshot import screenshot
 from proofroll.ball_studies.regimes import load_regimes, regime_maps
 from proofroll.ball_studies.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
-from proofroll.files.trajectory_file import read
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.page.growing import write_report
 from proofroll.report.tradeoff.work_precision import svg
@@ -47,17 +46,17 @@ SHOWN = (
 COLOURS = mpl.colormaps["viridis"](np.linspace(0.92, 0.0, len(SHOWN)))
 
 
-def draw(outcome: Outcome, store: Store, path: Path) -> None:
+def draw(outcome: Outcome, path: Path) -> None:
     """Height over time, and distance from the truth over time, for a selection of engines."""
-    truth = read(outcome.points[point_name(POINT)].file)
+    truth = outcome.points[point_name(POINT)].trajectory.dataset
     runs = {run.row.engine: run for run in outcome.runs if run.parameters == POINT}
     mpl.rcParams.update({"svg.hashsalt": "proofroll", "svg.fonttype": "none", "font.size": 9})
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8), constrained_layout=True)
     for name, colour in zip(SHOWN, COLOURS, strict=True):
         run = runs[name]
-        if run.case is None or run.result.trajectory is None:
+        if run.trajectory is None:
             continue
-        z = read(store.trajectory(run.case))["z"]
+        z = run.trajectory.dataset["z"]
         left.plot(z["time"], z, color=colour, lw=1)
         error = np.abs(z - truth["z"])[1:]
         right.semilogy(
@@ -99,8 +98,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         runner = Runner(Store(Path(folder)))
         outcome = compare(load_comparison("paper"), runner)
-        draw(outcome, runner.store, ROOT / "docs" / "picture.svg")
-        write_report([outcome], runner.store, Path(folder), "proofroll report paper")
+        draw(outcome, ROOT / "docs" / "picture.svg")
+        write_report([outcome], Path(folder), "proofroll report paper")
         screenshot(Path(folder) / "report.html", ROOT / "docs" / "report.png")
         study = measured(runner)
     write_text(ROOT / "docs" / "work_precision.svg", svg(study, [study.quantity]))

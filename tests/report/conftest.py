@@ -75,7 +75,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             return Case("sphere_in_cylinder", point, digest, facts, UNTIL, EVERY)
 
         known = case("truth")
-        points[point_name(point)] = ComparedPoint(scene, known, Result(Status.DONE, "done"), store.trajectory(known))
+        points[point_name(point)] = ComparedPoint(scene, known, Result(Status.DONE, "done"), store.stored(known))
         write(true, store.trajectory(known))
         sizes = scales(scene, true)
         expected = observe(scene, true)
@@ -117,7 +117,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
                 trajectory=store.trajectory(run_case).name,
             )
             silent = sorted(bounds.keys() - {judgement.observable for judgement in judgements})
-            runs.append(Run(row, point, run_case.engine, result, judgements, [], run_case, silent))
+            motion = store.stored(run_case)
+            runs.append(Run(row, point, run_case.engine, result, judgements, [], run_case, silent, trajectory=motion))
         missing = Result(Status.MISSING, "gamma is not installed here", versions={})
         runs.append(Run(rows[3], point, None, missing, [], ["gamma at this point missing"]))
     usual, file = load_scene("sphere_in_cylinder"), read_scene_file("sphere_in_cylinder")
@@ -128,14 +129,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 def written(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
     """What stands in report.json, and the folder of a written report."""
     out = tmp_path_factory.mktemp("out")
-    write_report([made[0]], made[1], out, "proofroll report invented")
+    write_report([made[0]], out, "proofroll report invented")
     return json.loads((out / "report.json").read_text(encoding="utf-8")), out
 
 
 @pytest.fixture(scope="session")
 def content(made: tuple[Outcome, Store]) -> ReportContent:
     """What the report says, as records."""
-    return report_content([made[0]], made[1], "proofroll report invented")
+    return report_content([made[0]], "proofroll report invented")
 
 
 class Elements(HTMLParser):
@@ -214,7 +215,7 @@ def everything(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFac
 
     Its first row has a ladder of steps: for z a limit, for γ one that holds the truth exactly.
     """
-    whole = begun([made[0]], made[1], "proofroll report invented")
+    whole = begun([made[0]], "proofroll report invented")
     for part in (figures_part(tmp_path_factory.mktemp("figures")), regimes_part(), *further()):
         whole.parts.append(part)
         whole.make(part, lambda: None)

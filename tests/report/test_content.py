@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
+
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files import scene_file, trajectory_file
 from proofroll.files.data_folders import data_folder
 from proofroll.report.comparison.summary import _worst
 from proofroll.report.page.growing import begun
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
-from proofroll.studies.comparison.compare import compare
+from proofroll.studies.comparison.compare import evaluate, run_plan
+from proofroll.studies.comparison.planning import plan
 
 
 def _run(speed: float, error: float, tolerance: float) -> Any:
@@ -34,10 +39,23 @@ def test_the_largest_error_of_a_row_is_that_of_all_its_cases() -> None:
     assert found.largest == 0.9
 
 
+def counted(load: Callable[..., Any], counts: Counter[str]) -> Callable[..., Any]:
+    """The function, with its calls counted by what they load."""
+
+    def loading(place: Any, *others: Any) -> Any:
+        counts[str(place)] += 1
+        return load(place, *others)
+
+    return loading
+
+
 def test_nothing_is_loaded_again_after_judging(
-    install_engines: Callable[[Mapping[str, str]], None], tmp_path: Path
+    install_engines: Callable[[Mapping[str, str]], None], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The report of a judged comparison is the same when its scene and the file of its truth are gone."""
+    """The report of a judged comparison is the same when its scene and the files of its runs and truth are gone.
+
+    Judging and reporting read each run and the truth once, and load no scene.
+    """
     install_engines({"oracle": "hostile:Oracle"})
     scene = tmp_path / "wall"
     shutil.copytree(data_folder("models") / "sphere_in_cylinder", scene)
@@ -45,13 +63,21 @@ def test_nothing_is_loaded_again_after_judging(
     rows = [Row("oracle", "close", list(Verdict), because="a look")]
     asked = Comparison("gone", "Gone", "Is it read?", str(scene), 0.2, 0.1, bands={"close": band}, rows=rows)
     runner = Runner(Store(tmp_path / "out" / "cases"), jobs=1)
-    outcome = compare(dataclasses.replace(asked, timed=False), runner)
+    planned = plan(dataclasses.replace(asked, timed=False), workers=runner.workers)
+    results = run_plan(planned, runner)
+    counts: Counter[str] = Counter()
+    for place, what in ((trajectory_file, "read"), (scene_file, "_read")):
+        monkeypatch.setattr(place, what, counted(getattr(place, what), counts))
+    outcome = evaluate(planned, results, runner)
     assert outcome.runs[0].judgements
-    before = begun([outcome], runner.store, "proofroll report gone")
+    before = begun([outcome], "proofroll report gone")
+    assert set(counts.values()) == {1}, "each run once, and the truth"
+    assert counts.keys() == {str(runner.store.trajectory(case)) for case in planned.cases}, "and no scene"
     shutil.rmtree(scene)
-    for point in outcome.points.values():
-        point.file.unlink()
-    after = begun([outcome], runner.store, "proofroll report gone")
+    for item in (*outcome.points.values(), *outcome.runs):
+        assert item.trajectory is not None
+        item.trajectory.file.unlink()
+    after = begun([outcome], "proofroll report gone")
     assert dataclasses.replace(after.content, date=before.content.date) == before.content
     assert after.curves == before.curves
     assert after.replay == before.replay

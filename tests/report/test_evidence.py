@@ -19,7 +19,7 @@ from proofroll.core.number_format import error
 from proofroll.core.verdict import Verdict, judge_curve
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read, write
+from proofroll.files.trajectory_file import StoredTrajectory, write
 from proofroll.report.comparison.plots import MOST_POINTS, kept, point_curves
 from proofroll.report.comparison.records import Claims, Cost
 from proofroll.report.comparison.tables import cost_title, costs, expectations
@@ -54,7 +54,7 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
     name = "speed=4"
     scene = load_scene("sphere_in_cylinder", **point)
     point_of_made = outcome.points[name]
-    true = read(point_of_made.file)
+    true = point_of_made.trajectory.dataset
     times = np.linspace(0.0, 1.0, 6001)
     fine = true.interp(time=times)
     file = store.trajectory(point_of_made.case)
@@ -74,8 +74,10 @@ def test_largest_error_that_is_drawn_is_the_judged_one(made: tuple[Outcome, Stor
         for key, curve in observe(scene, off).items()
         if key in {"gamma", "z", "N", "F2", "F3"}
     }
-    one = dataclasses.replace(outcome, runs=[run], points={name: dataclasses.replace(point_of_made, file=file)})
-    drawn = {item.name: item.engines[0] for item in point_curves(one, store)[0].observables}
+    run = dataclasses.replace(run, trajectory=store.stored(run.case))
+    point_there = dataclasses.replace(point_of_made, trajectory=StoredTrajectory(file))
+    one = dataclasses.replace(outcome, runs=[run], points={name: point_there})
+    drawn = {item.name: item.engines[0] for item in point_curves(one)[0].observables}
     for key, judgement in judged.items():
         assert len(drawn[key].at or ()) < times.size / 5
         largest = max(abs(value) for value in drawn[key].difference if value is not None)
@@ -92,15 +94,15 @@ def test_turns_that_no_sample_tells_are_no_error_of_a_curve(made: tuple[Outcome,
     turned["gamma"] = turned["gamma"] + 1e-3 + 4 * np.pi
     turned["gamma"].attrs |= {UNCERTAIN: "samples are far apart", PERIOD: 2 * np.pi}
     write(turned, store.trajectory(run.case))
-    one = dataclasses.replace(outcome, runs=[run])
-    gamma = next(item for item in point_curves(one, store)[0].observables if item.name == "gamma")
+    one = dataclasses.replace(outcome, runs=[dataclasses.replace(run, trajectory=store.stored(run.case))])
+    gamma = next(item for item in point_curves(one)[0].observables if item.name == "gamma")
     assert gamma.engines[0].difference[:30] == pytest.approx([1e-3] * 30)
     assert gamma.engines[0].difference[30] is None
 
 
 def test_tolerances_and_limits_go_with_the_curves(made: tuple[Outcome, Store]) -> None:
     """A judged curve has its tolerance; one with a ladder its limit; one that was not judged neither."""
-    outcome, store = made
+    outcome, _ = made
     first = outcome.runs[0]
     limited = [
         dataclasses.replace(judgement, limit_error=3.21e-7, limit_error_bar=1.5e-8, order=2.0)
@@ -110,7 +112,7 @@ def test_tolerances_and_limits_go_with_the_curves(made: tuple[Outcome, Store]) -
         if judgement.observable != "F3"
     ]
     runs = [dataclasses.replace(first, judgements=limited), *outcome.runs[1:]]
-    curves = point_curves(dataclasses.replace(outcome, runs=runs), store)[0].observables
+    curves = point_curves(dataclasses.replace(outcome, runs=runs))[0].observables
     drawn = {item.name: next(engine for engine in item.engines if engine.row == 0) for item in curves}
     z = next(judgement for judgement in first.judgements if judgement.observable == "z")
     assert drawn["z"].tolerance == pytest.approx(z.tolerance, rel=1e-3)
@@ -147,18 +149,18 @@ def test_cost_has_an_interval_where_there_is_one() -> None:
 
 def test_costs_are_on_the_page(made: tuple[Outcome, Store], parse: Any) -> None:
     """Slowest and fastest case of each timed row with their intervals; a row that never ran has no line."""
-    outcome, store = made
+    outcome, _ = made
     seconds = [[0.2, 0.25, 0.3], [0.4, 0.45, 0.5]]
     runs, seen = [], 0
     for run in outcome.runs:
         timings = seconds[seen] if run.row is outcome.runs[0].row else run.result.timings
         seen += run.row is outcome.runs[0].row
         runs.append(dataclasses.replace(run, result=dataclasses.replace(run.result, timings=timings)))
-    content = report_content([dataclasses.replace(outcome, runs=runs)], store, "proofroll report invented")
+    content = report_content([dataclasses.replace(outcome, runs=runs)], "proofroll report invented")
     lines = costs(content.comparisons[0])
     assert len(lines) == 3
     assert [run.cost.median for run in lines[0][1:] if run.cost] == [0.45, 0.25]
-    text = " ".join(parse(page(content, [point_curves(*made)])).text.split())
+    text = " ".join(parse(page(content, [point_curves(made[0])])).text.split())
     assert "0.4 to 0.5" in text
     assert "0.2 to 0.3" in text
 
@@ -202,8 +204,8 @@ def test_legend_has_lines_symbols_and_verdicts_and_can_be_reached(html: str, par
 
 def test_whatever_the_limits_the_page_is_json(made: tuple[Outcome, Store], unpack: Any) -> None:
     """Curves with limits that are not finite do not break the script's data."""
-    content = report_content([made[0]], made[1], "proofroll report invented")
-    curves = point_curves(*made)
+    content = report_content([made[0]], "proofroll report invented")
+    curves = point_curves(made[0])
     engines = curves[0].observables[0].engines
     engines[0] = dataclasses.replace(engines[0], limit=[None, None, None])
     assert json.loads(unpack(page(content, [curves]), "curves"))["points"]

@@ -98,8 +98,8 @@ def test_cells_can_be_read_without_colour(html: str) -> None:
 def test_nothing_that_others_write_becomes_markup(made: tuple[Outcome, Store], parse: Any, unpack: Any) -> None:
     """Poison in every string is shown as text: no element, no handler, no end of a script."""
     poison = Poison()
-    content = report_content([made[0]], made[1], COMMAND)
-    curves = [point_curves(*made)]
+    content = report_content([made[0]], COMMAND)
+    curves = [point_curves(made[0])]
     clean = parse(page(content, curves))
     html = page(poison.content(content), poison.content(curves, names=False))
     elements = parse(html)
@@ -115,17 +115,17 @@ def test_a_comparison_that_varies_nothing(made: tuple[Outcome, Store]) -> None:
     """Of a scene as it is nothing is said to vary."""
     for vary, said in (({"speed": [1.0]}, True), ({}, False)):
         comparison = dataclasses.replace(made[0].comparison, vary=vary)
-        content = report_content([dataclasses.replace(made[0], comparison=comparison)], made[1], COMMAND)
-        assert ("; varied:" in page(content, [point_curves(*made)])) is said
+        content = report_content([dataclasses.replace(made[0], comparison=comparison)], COMMAND)
+        assert ("; varied:" in page(content, [point_curves(made[0])])) is said
 
 
 def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """An infinite error is null in JSON and a sign on the page."""
-    outcome, store = made
+    outcome, _ = made
     first = outcome.runs[0]
     lost = [dataclasses.replace(judgement, error=math.inf, order=math.nan) for judgement in first.judgements]
     runs = [dataclasses.replace(first, judgements=lost), *outcome.runs[1:]]
-    content = write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
+    content = write_report([dataclasses.replace(outcome, runs=runs)], tmp_path, COMMAND)
     assert plain(content)["comparisons"][0]["runs"][0]["judgements"][0]["error"] is None
     assert (
         "∞" in whole((tmp_path / "report.html").read_text(encoding="utf-8")).rpartition('<script type="text/plain"')[0]
@@ -134,7 +134,7 @@ def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, 
 
 def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> None:
     """Six points, 24 rows and 201 samples: what the default study has."""
-    content = report_content([made[0]], made[1], COMMAND)
+    content = report_content([made[0]], COMMAND)
     comparison, change = content.comparisons[0], dataclasses.replace
     rows, points = 24, [f"p{number}" for number in range(6)]
     row, good = comparison.rows[0], comparison.runs[0]
@@ -145,7 +145,7 @@ def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> 
     assert comparison.evidence
     truths = comparison.evidence.truths
     truths[:] = [change(truths[0], point=point) for point in points]
-    curves = point_curves(*made)[0]
+    curves = point_curves(made[0])[0]
     for observable in curves.observables:  # the longest form that a rounded number has
         observable.engines[:] = [EngineCurve(row, [-1.23e-10] * 201, None, None, None) for row in range(rows)]
     html = page(content, [[change(curves, point=point) for point in points]])
@@ -154,7 +154,7 @@ def test_the_largest_report_we_make_stays_small(made: tuple[Outcome, Store]) -> 
 
 def test_curves_are_the_difference_from_the_truth(made: tuple[Outcome, Store]) -> None:
     """Rows keep their numbers, and what an engine does not say is not drawn."""
-    entry = point_curves(*made)[1]
+    entry = point_curves(made[0])[1]
     z = next(observable for observable in entry.observables if observable.name == "z")
     assert entry.point == "speed=4"
     assert [engine.row for engine in z.engines] == [0, 1, 2]
@@ -199,14 +199,14 @@ def test_findings_are_written_from_the_data(written: tuple[dict[str, Any], Path]
 
 def test_where_runs_were_made_is_told(made: tuple[Outcome, Store], html: str, tmp_path: Path) -> None:
     """Who ran on machines of a cluster is told once for the comparison, with each run, and nowhere where nobody did."""
-    outcome, store = made
+    outcome, _ = made
     away = [
         dataclasses.replace(run, result=dataclasses.replace(run.result, host="node<7>"))
         for run in outcome.runs
         if run.row.engine == "beta"
     ]
     runs = [run for run in outcome.runs if run.row.engine != "beta"] + away
-    write_report([dataclasses.replace(outcome, runs=runs)], store, tmp_path, COMMAND)
+    write_report([dataclasses.replace(outcome, runs=runs)], tmp_path, COMMAND)
     shown = whole((tmp_path / "report.html").read_text(encoding="utf-8"))
     line = "Made on machines of a cluster: 2 on node&lt;7&gt;. No speed is measured there."
     assert f"<dt>Elsewhere</dt><dd>An invented comparison: {line}</dd>" in shown
@@ -217,9 +217,9 @@ def test_where_runs_were_made_is_told(made: tuple[Outcome, Store], html: str, tm
 
 def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """Every engine missing: the page says so, and what cannot be said."""
-    outcome, store = made
+    outcome, _ = made
     lost = [run for run in outcome.runs if run.row.engine == "gamma"]
-    content = write_report([dataclasses.replace(outcome, runs=lost)], store, tmp_path, COMMAND)
+    content = write_report([dataclasses.replace(outcome, runs=lost)], tmp_path, COMMAND)
     assert content.comparisons[0].evidence
     found = content.comparisons[0].evidence.findings
     assert found.answer.startswith("Of 1 engine setting, 1 gives no result at some points")

@@ -72,7 +72,7 @@ def test_the_documented_line_reads_the_table(
     made: tuple[Outcome, Store], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The lines of docs/json.md give pandas the same frame from JSON and from CSV, trade-offs among its rows."""
-    whole = begun([made[0]], made[1], "proofroll report")
+    whole = begun([made[0]], "proofroll report")
     for part in further():
         whole.parts.append(part)
         whole._put(part, part.entry())

@@ -17,7 +17,6 @@ from proofroll.core.truth import truth
 from proofroll.elements.mechanism.report.replay import _turned, drawn
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.page.growing import write_report
 from proofroll.report.replay.records import Replayed
@@ -41,16 +40,16 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store, 
 @pytest.fixture(scope="module")
 def report(compared: tuple[Outcome, Store, Path]) -> Path:
     """The folder of its report."""
-    outcome, store, folder = compared
-    write_report([outcome], store, folder, "proofroll report slider_crank")
+    outcome, _, folder = compared
+    write_report([outcome], folder, "proofroll report slider_crank")
     return folder
 
 
 @pytest.mark.slow
 def test_only_single_curves_are_drawn(compared: tuple[Outcome, Store, Path]) -> None:
     """Coordinates of points and joints and determinate reactions have curves; an array of many components has none."""
-    outcome, store, _ = compared
-    (entry,) = point_curves(outcome, store)
+    outcome, _, _ = compared
+    (entry,) = point_curves(outcome)
     drawn = {item.name: item for item in entry.observables}
     assert {"slider.x", "q.shaft"} <= set(drawn)
     assert not {"positions", "attitudes", "forces", "torques"} & set(drawn)
@@ -91,7 +90,7 @@ def test_a_mechanism_is_replayed(
         opened.page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
         assert canvas.screenshot() != before
         shown = opened.page.locator('.replay [data-part="values"]').inner_text().replace("−", "-").split()
-        true = read(next(iter(outcome.points.values())).file)
+        true = next(iter(outcome.points.values())).trajectory.dataset
         assert abs(float(shown[shown.index("slider.x") + 1]) - float(true["slider.x"][-1])) < 1e-4
         assert opened.messages == []
 

@@ -84,9 +84,9 @@ def slipping(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
             if true:
                 judged.append(judgement("event_order", float(worse is not Verdict.AGREES), worse))
             result = Result(Status.DONE, "done", seconds_per_second=1.0, trajectory=store.trajectory(case).name)
-            runs.append(Run(row, point, case.engine, result, judged, [], case))
+            runs.append(Run(row, point, case.engine, result, judged, [], case, trajectory=store.stored(case)))
         known = Case("sphere_in_cylinder", point, "d", EngineFacts("truth", "1", "c", {}), UNTIL, EVERY)
-        points[point_name(point)] = ComparedPoint(scene, known, Result(Status.DONE, "done"), store.trajectory(known))
+        points[point_name(point)] = ComparedPoint(scene, known, Result(Status.DONE, "done"), store.stored(known))
         write(dataset, store.trajectory(known))
     order = {id(row): index for index, row in enumerate(rows)}
     usual, file = load_scene("sphere_in_cylinder"), read_scene_file("sphere_in_cylinder")
@@ -96,12 +96,12 @@ def slipping(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 @pytest.fixture(scope="module")
 def content(slipping: tuple[Outcome, Store]) -> ReportContent:
     """The report's content."""
-    return report_content([slipping[0]], slipping[1], COMMAND)
+    return report_content([slipping[0]], COMMAND)
 
 
 def shown(content: ReportContent, slipping: tuple[Outcome, Store]) -> str:
     """The page."""
-    return page(content, [point_curves(*slipping)])
+    return page(content, [point_curves(slipping[0])])
 
 
 def runs_at(content: ReportContent, point: dict[str, float]) -> dict[str, ReportedRun]:
@@ -163,7 +163,7 @@ def test_conditioning_names_the_edges(content: ReportContent) -> None:
 
 def test_first_slips_are_marked_on_the_needed_friction(content: ReportContent, slipping: tuple[Outcome, Store]) -> None:
     """The bound and every onset, on that curve alone and only where friction is bounded."""
-    entries = mark(content.comparisons[0], point_curves(*slipping))
+    entries = mark(content.comparisons[0], point_curves(slipping[0]))
     by_point = {entry.point: {item.name: item for item in entry.observables} for entry in entries}
     marked = by_point[point_name(WELL)][CURVE]
     assert [item.row for item in marked.marks or ()] == [-1, 0, 1]
@@ -241,7 +241,7 @@ def test_times_are_shown_to_the_digits_of_their_brackets(event: tuple[float, ...
 
 def test_written_report_names_no_finite_number_it_has_not(slipping: tuple[Outcome, Store], tmp_path: Path) -> None:
     """The file is JSON that every reader accepts, infinite distances included."""
-    write_report([slipping[0]], slipping[1], tmp_path, COMMAND)
+    write_report([slipping[0]], tmp_path, COMMAND)
     text = (tmp_path / "report.json").read_text(encoding="utf-8")
     assert "Infinity" not in text
     assert "NaN" not in text

@@ -60,7 +60,7 @@ def test_file_is_a_picture_of_its_own(maps: list[xr.Dataset], tmp_path: Path) ->
 
 def test_report_shows_the_maps(made: tuple[Outcome, Store], maps: Any, tmp_path: Path, parse: Any) -> None:
     """Twice on one page, no id is used twice."""
-    whole = begun([made[0]], made[1], "proofroll report")
+    whole = begun([made[0]], "proofroll report")
     parts = [RegimesPart(load_regimes("regimes"), maps=maps) for _ in range(2)]
     whole.expect(parts, tmp_path)
     for part in parts:

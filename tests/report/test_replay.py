@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import dataclasses
 import gzip
 import json
 from collections.abc import Callable, Iterator
@@ -26,7 +27,7 @@ from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene
-from proofroll.files.trajectory_file import read, write
+from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.plots import point_curves
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
@@ -189,7 +190,7 @@ def test_numbers_survive_being_packed() -> None:
 
 def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) -> None:
     """One ghost of each engine is shown at first: the default one where there is one; the numbers fill what is said."""
-    content = plain(replay_content([made[0]], made[1], BallReport.replay()))
+    content = plain(replay_content([made[0]], BallReport.replay()))
     assert [case["label"] for case in content["cases"]] == ["speed=3", "speed=4"]
     assert content["start"] == 1, "the scene as its file has it"
     for case, numbers in zip(content["cases"], content["packed"], strict=True):
@@ -204,17 +205,14 @@ def test_every_truth_is_a_case_with_the_default_settings_as_ghosts(made: Any) ->
 
 def replay_with(made: Any, engine: str, change: Callable[[Any], Any]) -> dict[str, Any]:
     """The first case of the replay with the ball of an engine's first run elsewhere."""
-    outcome, store = made
+    outcome, _ = made
     run = next(run for run in outcome.runs if run.row.engine == engine)
-    assert run.case is not None
-    file = store.trajectory(run.case)
-    kept = file.read_bytes()
-    try:
-        dataset = read(file)
-        write(dataset.assign(p_WB=dataset["p_WB"].copy(data=change(dataset["p_WB"].to_numpy()))), file)
-        return dict(plain(replay_content([outcome], store, BallReport.replay()))["cases"][0])
-    finally:
-        file.write_bytes(kept)
+    dataset = run.trajectory.dataset
+    moved = StoredTrajectory(run.trajectory.file)
+    vars(moved)["dataset"] = dataset.assign(p_WB=dataset["p_WB"].copy(data=change(dataset["p_WB"].to_numpy())))
+    runs = [dataclasses.replace(run, trajectory=moved) if item is run else item for item in outcome.runs]
+    changed = dataclasses.replace(outcome, runs=runs)
+    return dict(plain(replay_content([changed], BallReport.replay()))["cases"][0])
 
 
 def test_the_furthest_of_the_other_settings_is_there_if_it_is_seen(made: Any) -> None:
@@ -276,11 +274,11 @@ def test_without_three_js_there_is_no_library(what: str, monkeypatch: pytest.Mon
 def test_what_engines_and_files_say_stays_text(made: Any, parse: Callable[[str], Any]) -> None:
     """Markup in a title, a point, a name or a message makes no element."""
     evil = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
-    replay = replay_content([made[0]], made[1], BallReport.replay())
+    replay = replay_content([made[0]], BallReport.replay())
     case = replay.cases[0]
     case.runs[1] = replace(case.runs[1], name=evil, message=evil)
     replay.cases[0] = replace(case, group=evil, label=evil, scene=evil)
-    html = page(report_content([made[0]], made[1], "proofroll report"), [point_curves(*made)], replay=replay)
+    html = page(report_content([made[0]], "proofroll report"), [point_curves(made[0])], replay=replay)
     elements = parse(html)
     assert "img" not in {tag for tag, _ in elements.tags}
     assert not any("alert(1)" in script and '"runs"' not in script for script in elements.scripts)
@@ -379,7 +377,7 @@ def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     )
     settle(opened)
     shown = part(opened, "values").inner_text().replace("−", "-").split("\n")
-    dataset = read(made[0].points["speed=4"].file).sel(time=0.5, method="nearest")
+    dataset = made[0].points["speed=4"].trajectory.dataset.sel(time=0.5, method="nearest")
     assert abs(float(shown[shown.index("z") + 1].split()[0]) - float(dataset["z"])) < 2e-4
     assert abs(float(shown[shown.index("N") + 1].split()[0]) - float(dataset["N"])) < 2e-2
     opened.page.keyboard.press("Tab")
@@ -414,7 +412,7 @@ def test_without_a_picture_the_values_follow_the_time(
     lacking: str, made: Any, content: ReportContent, tmp_path: Path, visit: Visiting
 ) -> None:
     """One sentence says what is missing; time and values run, and nothing fails."""
-    replay = replay_content([made[0]], made[1], BallReport.replay())
+    replay = replay_content([made[0]], BallReport.replay())
     if lacking == "three.js":
         replay = replace(replay, library=None)
     file = tmp_path / "report.html"

@@ -134,7 +134,7 @@ def test_a_refusal_is_told_as_one(made: tuple[Outcome, Store]) -> None:
     assert "did not even finish" not in " ".join(found.sentences)
     assert "⊘ 1 refused" in counted(content)
     assert "; 1 refuses the scene or a case of it" in three_sentences([content], {}, NOTHING)[0]
-    text = whole(page(report_content([with_runs(made[0], {number: [refused]})], made[1], ""), [[]], {}, None))
+    text = whole(page(report_content([with_runs(made[0], {number: [refused]})], ""), [[]], {}, None))
     assert '<p class="status refused"><b>refused</b>: no wall, no ball</p>' in text
 
 
@@ -202,10 +202,10 @@ def test_who_is_silent_or_shares_equations_is_marked(outcome: Outcome) -> None:
     assert said.startswith("Of 4 settings in one comparison, 1 agrees with the truth everywhere")
 
 
-def test_the_page_says_all_of_it(outcome: Outcome, made: tuple[Outcome, Store], parse: Any) -> None:
+def test_the_page_says_all_of_it(outcome: Outcome, parse: Any) -> None:
     """Matrix, evidence and remarks name the kind of difference, its numbers, what is missing and what is shared."""
-    content = report_content([outcome], made[1], "proofroll report invented")
-    text = " ".join(parse(page(content, [point_curves(outcome, made[1])])).text.split())
+    content = report_content([outcome], "proofroll report invented")
+    text = " ".join(parse(page(content, [point_curves(outcome)])).text.split())
     for words in (
         "✗ differs another limit",
         "✗ differs no limit shown",
@@ -239,7 +239,7 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
             rung = dataclasses.replace(run.result, timings=[coarse], seconds_per_second=coarse)
             step = LadderRun(4e-3, rung, {item.observable: 1e-8 for item in run.judgements})
             runs[number].append(dataclasses.replace(run, result=fine, rungs=[step]))
-    content = report_content([with_runs(made[0], runs)], made[1], "proofroll report invented")
+    content = report_content([with_runs(made[0], runs)], "proofroll report invented")
     (column,) = content.choice.columns
     name, cell = content.choice.cheapest(column, EVERYDAY, forces=True)
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2

@@ -31,7 +31,7 @@ COMMAND = "proofroll report"
 @pytest.fixture(scope="module")
 def report(made: tuple[Outcome, Store]) -> Report:
     """A report with one comparison, a trade-off and a map; no test changes it."""
-    whole = begun([made[0]], made[1], COMMAND)
+    whole = begun([made[0]], COMMAND)
     for part in further():
         whole.parts.append(part)
         whole._put(part, part.entry())
@@ -197,7 +197,7 @@ def test_a_part_that_fails_leaves_a_sentence(
     made: tuple[Outcome, Store], tmp_path: Path, parse: Any, error: Exception
 ) -> None:
     """The report stands; the section says in one sentence what is missing and which command makes it."""
-    whole, part = begun([made[0]], made[1], COMMAND), Broken(error)
+    whole, part = begun([made[0]], COMMAND), Broken(error)
     assert whole.expect([part], tmp_path) == [part]
     whole.write(tmp_path)
     text = parse((tmp_path / "report.html").read_text(encoding="utf-8")).text
@@ -213,7 +213,7 @@ def test_a_part_that_fails_leaves_a_sentence(
 
 def test_an_interrupted_part_takes_nothing_away(made: tuple[Outcome, Store], tmp_path: Path) -> None:
     """What was written before an interrupt is still there, whole, and says what is missing."""
-    whole, part = begun([made[0]], made[1], COMMAND), Broken(KeyboardInterrupt())
+    whole, part = begun([made[0]], COMMAND), Broken(KeyboardInterrupt())
     whole.expect([part], tmp_path)
     whole.write(tmp_path)
     with pytest.raises(KeyboardInterrupt):

@@ -107,13 +107,11 @@ def report(
     total = len(keys) + bool(loaded)
     command = _command(studies or [], engine or [], settings or [], budget, out, only)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
-        growing = _Growing(
-            loaded, parts, out, lambda ended, awaited: begun(ended, runner.store, command, awaited, left_out)
-        )
+        growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
         with growing.told_if_stopped():
             stage = _begin(1, total, "comparisons") if loaded else ""
             outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget) if loaded else []
-        made = begun(outcomes, runner.store, command, left_out=left_out)
+        made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import PERIOD, UNCERTAIN, Columns
+from proofroll.core.columns import PERIOD, UNCERTAIN
 from proofroll.core.element_abilities import CountsTurns
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY
@@ -85,7 +85,7 @@ def doubt(
 
 
 def on_turns_of(
-    other: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset | Columns]
+    other: FloatArray | None, values: FloatArray, name: str, datasets: Iterable[xr.Dataset]
 ) -> FloatArray | None:
     """The values of an observable without what is no engine's: an angle on the turns of another run of the same.
 

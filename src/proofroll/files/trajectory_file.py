@@ -11,7 +11,9 @@ import json
 import sys
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,8 +135,25 @@ def read(path: Path) -> xr.Dataset:
     return dataset.assign({name: item.astype(str) for name, item in dataset.variables.items() if item.dtype == object})
 
 
-def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
-    """A stored trajectory, or those of its variables that are named, without xarray.
+@dataclass(frozen=True)
+class StoredTrajectory:
+    """A trajectory in a file, read when it is first asked for and held from then on."""
+
+    file: Path
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """The trajectory; raises as :func:`read` does."""
+        return read(self.file)
+
+    @property
+    def shown(self) -> str:
+        """Path of the file from the folder of a report, in which that of the results lies."""
+        return f"{self.file.parent.name}/{self.file.name}"
+
+
+def read_columns(path: Path) -> Columns:
+    """A stored trajectory, without xarray.
 
     Raises:
         OSError, ValueError: it cannot be read, or is no such file.
@@ -143,11 +162,7 @@ def read_columns(path: Path, names: Collection[str] | None = None) -> Columns:
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             said, attrs = json.loads(file[_ABOUT])
-            variables = {
-                name: Variable(tuple(dims), file[name], own)
-                for name, (dims, own) in said.items()
-                if names is None or name in names
-            }
+            variables = {name: Variable(tuple(dims), file[name], own) for name, (dims, own) in said.items()}
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path} is no stored trajectory") from error
     return Columns(variables, attrs)
@@ -164,8 +179,3 @@ def read_arrays(path: Path) -> dict[str, npt.NDArray[Any]]:
             return dict(file)
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path.name} is no file of numpy's arrays") from error
-
-
-def read_some(path: Path, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """Values of some variables of a stored trajectory, as far as it has them; see :func:`read_columns`."""
-    return {name: column.values for name, column in read_columns(path, names).variables.items()}

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from proofroll.report.page.records import ReportedTruth
     from proofroll.report.pen import Picture
     from proofroll.report.replay.records import ReplayKind
-    from proofroll.running.store import Store
     from proofroll.studies.comparison.outcome import Run
 
 GROUP = "proofroll.report_kinds"
@@ -62,13 +61,12 @@ class ReportKind(Protocol):
         return None
 
     @staticmethod
-    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> Sequence[Any]:  # noqa: ARG004 -- as above
+    def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run]) -> Sequence[Any]:  # noqa: ARG004 -- as above
         """Facts of each run of a comparison besides its verdicts: a record, or None.
 
         Args:
             truths: at each point, with their :meth:`truth_facts`.
             runs: of the comparison.
-            store: where the trajectories are.
         """
         return [None] * len(runs)
 

@@ -12,10 +12,11 @@ import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 from proofroll.core.errors import ProofrollError
 from proofroll.files.atomic import ordinary_content, replacing
-from proofroll.files.trajectory_file import STORED
+from proofroll.files.trajectory_file import STORED, StoredTrajectory
 from proofroll.running.case import LASTING, Case, Result
 
 
@@ -38,6 +39,7 @@ class Store:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self._held: WeakValueDictionary[str, StoredTrajectory] = WeakValueDictionary()
         try:
             folder.mkdir(parents=True, exist_ok=True)
             probe, name = tempfile.mkstemp(dir=folder)
@@ -59,6 +61,10 @@ class Store:
     def trajectory(self, case: Case) -> Path:
         """File of the case's trajectory."""
         return self.folder / f"{case.key}{STORED}"
+
+    def stored(self, case: Case) -> StoredTrajectory:
+        """Trajectory of a case; the same object as long as anything holds it, so that its file is read once."""
+        return self._held.setdefault(case.key, StoredTrajectory(self.trajectory(case)))
 
     @contextlib.contextmanager
     def incoming(self, case: Case) -> Iterator[Path]:
@@ -105,6 +111,7 @@ class Store:
                 for old in (place, self.trajectory(case)):
                     if old.is_dir() and not old.is_symlink():  # under the name of a result it is damage
                         shutil.rmtree(old)
+                self._held.pop(case.key, None)
                 if written and result.trajectory is not None:
                     written.replace(self.trajectory(case))
         return result

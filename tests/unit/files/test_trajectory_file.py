@@ -14,7 +14,7 @@ from scipy.io import netcdf_file
 from proofroll.core.columns import Columns
 from proofroll.core.errors import ProofrollError
 from proofroll.core.events import Event, with_events
-from proofroll.files.trajectory_file import read, read_columns, read_some, write
+from proofroll.files.trajectory_file import read, read_columns, write
 from proofroll.running.simulation import simulate
 
 VALUES = np.array([5e-324, -0.0, 1.7976931348623157e308, np.nan, -np.inf, 0.1, 9.969209968386869e36])
@@ -56,17 +56,6 @@ def test_a_run_comes_back(tmp_path: Path, dataset: xr.Dataset, ending: str) -> N
     for name, item in read(file).variables.items():
         assert item.to_numpy().tobytes() == dataset[name].to_numpy().tobytes(), name
         assert item.dtype == dataset[name].dtype
-
-
-def test_some_variables_are_read_as_all_are(tmp_path: Path) -> None:
-    """A part of a stored file is what the whole has there, texts too; what the file has not is left out."""
-    file = tmp_path / "x.npz"
-    write(RUNS["an event"], file)
-    found = read_some(file, ["number", "event_kind", "absent"])
-    assert found.keys() == {"number", "event_kind"}
-    assert all(values.tobytes() == RUNS["an event"][name].to_numpy().tobytes() for name, values in found.items())
-    write(NO_EVENT, file)
-    assert read_some(file, ["event_kind"])["event_kind"].tolist() == []
 
 
 def test_others_read_the_same_from_the_file(tmp_path: Path) -> None:

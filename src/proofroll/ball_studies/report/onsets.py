@@ -11,21 +11,18 @@ from proofroll.ball_studies.onset import onset_verdict as judged_onset
 from proofroll.core.events import Event, events_of
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import OPTIONAL
-from proofroll.files.trajectory_file import read_some
 from proofroll.report.comparison.plots import Bound, Mark, PointCurves
 from proofroll.studies.comparison.planning import point_name
 from proofroll.truth.ball_on_surface.onset import Onset
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     import xarray as xr
 
     from proofroll.core.scene import Scene
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportedTruth
-    from proofroll.running.store import Store
     from proofroll.studies.comparison.outcome import Run
 
 # The curve on which onsets are marked.
@@ -59,24 +56,21 @@ def truth_facts(scene: Scene, dataset: xr.Dataset) -> TrueSlips | None:
     return TrueSlips(contact.mu_static, contact.mu_kinetic, onset, events_of(dataset))
 
 
-def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run], store: Store) -> list[RunSlips]:
+def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run]) -> list[RunSlips]:
     """The slips of each run.
 
     Args:
         truths: of a comparison, with their :func:`truth_facts`.
         runs: of the comparison.
-        store: where the trajectories are.
     """
     known = {truth.point: truth.own.onset for truth in truths if truth.own is not None}
-    return [_run_facts(known.get(point_name(run.parameters)), run, store) for run in runs]
+    return [_run_facts(known.get(point_name(run.parameters)), run) for run in runs]
 
 
-def _run_facts(truth: Onset | None, run: Run, store: Store) -> RunSlips:
+def _run_facts(truth: Onset | None, run: Run) -> RunSlips:
     if truth is None:
         return RunSlips([])
-    events = []
-    if run.case is not None and run.result.trajectory is not None and store.trajectory(run.case).is_file():
-        events = _events(store.trajectory(run.case))
+    events = [] if run.trajectory is None else events_of(run.trajectory.dataset)
     first = next((event for event in events if event.kind == "slip"), None)
     return RunSlips(events, judged_onset(truth, run.result, first))
 
@@ -118,12 +112,3 @@ def _marked(content: ReportedComparison, curves: PointCurves, truth: TrueSlips) 
 def first_slip(events: Sequence[Event]) -> Event | None:
     """The first slip that has a time."""
     return next((event for event in events if event.kind == "slip" and math.isfinite(event.time)), None)
-
-
-def _events(path: Path) -> list[Event]:
-    """The events of a stored trajectory, without the rest of it."""
-    columns = read_some(path, [f"event_{name}" for name in ("kind", "time", "low", "high")])
-    if not columns:
-        return []
-    kinds, *times = (values.tolist() for values in columns.values())
-    return [Event(*row) for row in zip(kinds, *times, strict=True)]

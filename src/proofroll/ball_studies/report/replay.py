@@ -13,9 +13,8 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.files.json_data import plain
-from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay.records import PackedNumbers, Replayed
+from proofroll.report.replay.records import PackedNumbers, Replayed, some
 from proofroll.report.replay.replay import frame_times, in_sight
 
 # What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
@@ -39,12 +38,10 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     """Drawing of a ball in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
     body = rolling_ball(replayed.scene)
     coordinates = body.surface.coordinates
-    sampled = replayed.true_values([*NEEDED, *coordinates])
+    sampled = some(replayed.true, [*NEEDED, *coordinates])
     times = frame_times(float(sampled["time"][-1]), float(np.linalg.norm(sampled["w_WB"], axis=1).max()))
     true = poses(body, sampled, times)
-    ghosts = [
-        _reachable(poses(body, read_some(ghost.file, list(NEEDED)), times), true, body) for ghost in replayed.ghosts
-    ]
+    ghosts = [_reachable(poses(body, some(ghost.motion, NEEDED), times), true, body) for ghost in replayed.ghosts]
     u = np.stack([np.interp(times, sampled["time"], sampled[name]) for name in coordinates], axis=1)
     built = wall(body, u)
     numbers = PackedNumbers()

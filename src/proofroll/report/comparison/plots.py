@@ -10,11 +10,9 @@ import numpy as np
 import numpy.typing
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.columns import Columns
 from proofroll.core.observable import Observable, Role
 from proofroll.core.turns import on_turns_of
 from proofroll.files.json_data import OPTIONAL
-from proofroll.files.trajectory_file import read_columns
 from proofroll.report.comparison.summary import runs_at
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
@@ -22,8 +20,6 @@ from proofroll.studies.comparison.outcome import Outcome, Run
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from proofroll.running.store import Store
 
 # More points than this are not seen in a figure 500 pixels wide.
 MOST_POINTS = 400
@@ -96,7 +92,7 @@ class PointCurves:
     observables: list[ObservableCurves]
 
 
-def point_curves(outcome: Outcome, store: Store) -> list[PointCurves]:
+def point_curves(outcome: Outcome) -> list[PointCurves]:
     """The curves of a comparison, one entry for each point of the parameters."""
     entries = []
     for name, point in outcome.points.items():
@@ -107,7 +103,7 @@ def point_curves(outcome: Outcome, store: Store) -> list[PointCurves]:
         further = {item.name: item for item in kind.curves(scene, truth)} if kind is not None else {}
         known = scene.observables | further
         drawn = {key: item for key, item in known.items() if item.role in _DRAWN and _curve(truth, key)}
-        engines = [(row, run, read_columns(file, list(drawn))) for row, run, file in runs_at(outcome, name, store)]
+        engines = [(row, run, motion.dataset) for row, run, motion in runs_at(outcome, name)]
         entries.append(
             PointCurves(
                 name,
@@ -147,7 +143,7 @@ def _curve(truth: xr.Dataset, name: str) -> bool:
 
 
 def _observable(
-    item: Observable, name: str, truth: xr.Dataset, engines: list[tuple[int, Run, Columns]], scale: float
+    item: Observable, name: str, truth: xr.Dataset, engines: list[tuple[int, Run, xr.Dataset]], scale: float
 ) -> ObservableCurves:
     first = 1 if item.role == Role.REACTION else 0
     true = truth[name].to_numpy()
@@ -155,12 +151,12 @@ def _observable(
     for row, run, motion in engines:
         if name not in motion:
             continue
-        ended = min(true.size, motion[name].values.size)  # a run that ended early has fewer samples
-        compared = on_turns_of(true[:ended], motion[name].values[:ended], name, (motion, truth))
+        given = motion[name].to_numpy()[: true.size]  # a run that ended early has fewer samples
+        compared = on_turns_of(true[: given.size], given, name, (motion, truth))
         if compared is None:
             continue
         values = np.full(true.shape, np.nan)
-        values[first:ended] = compared[first:]
+        values[first : given.size] = compared[first:]
         with np.errstate(invalid="ignore", over="ignore"):
             difference = values - true
         at = kept([values, np.abs(difference)])

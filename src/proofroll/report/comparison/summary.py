@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 from typing import Any
 
 from proofroll.core.plugins import parse_engine
 from proofroll.core.verdict import Judgement, Verdict
+from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.records import (
     CauseAt,
     Claims,
@@ -24,7 +24,6 @@ from proofroll.report.kinds import group_of, kind_name
 from proofroll.report.labels import precision_words
 from proofroll.running.case import EngineFacts, Status, hosts
 from proofroll.running.environments import shown_name
-from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import SEVERITY, Outcome, Run
 from proofroll.studies.comparison.planning import at_point, point_name
 
@@ -70,14 +69,13 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
     )
 
 
-def runs_at(outcome: Outcome, point: str, store: Store) -> list[tuple[int, Run, Path]]:
+def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajectory]]:
     """Number of the row, run and trajectory of every run at a point that has one."""
     return [
-        (number, run, path)
+        (number, run, run.trajectory)
         for number, runs in enumerate(by_row(outcome).values())
         for run in runs
-        if point_name(run.parameters) == point and run.case is not None and run.result.trajectory is not None
-        if (path := store.trajectory(run.case)).is_file()
+        if point_name(run.parameters) == point and run.trajectory is not None
     ]
 
 

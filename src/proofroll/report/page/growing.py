@@ -19,7 +19,7 @@ from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.parts import Part, PartEntry, absent, attempt
 from proofroll.report.replay.records import Replay
 from proofroll.report.replay.replay import joined, replay_content
-from proofroll.running.store import Store, write_text
+from proofroll.running.store import write_text
 from proofroll.studies.comparison.outcome import Outcome
 
 
@@ -107,41 +107,38 @@ class Report:
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
 
-def begun(
-    outcomes: list[Outcome], store: Store, command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()
-) -> Report:
+def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()) -> Report:
     """A report of comparisons, to which further studies can be added.
 
     Args:
         outcomes: what was compared.
-        store: where the trajectories are: a folder in that of the report.
         command: that makes the report again.
         awaited: titles of comparisons that are still being run.
         left_out: names of comparisons that are not in it.
     """
-    replay = _replay(outcomes, store)
+    replay = _replay(outcomes)
     described = [case.described for case in replay.cases] if replay else []
-    content = report_content(outcomes, store, command)
+    content = report_content(outcomes, command)
     content = replace(content, replay=described, awaited=list(awaited), left_out=list(left_out))
-    return Report(content, [point_curves(outcome, store) for outcome in outcomes], replay)
+    return Report(content, [point_curves(outcome) for outcome in outcomes], replay)
 
 
-def write_report(outcomes: list[Outcome], store: Store, out: Path, command: str) -> ReportContent:
+def write_report(outcomes: list[Outcome], out: Path, command: str) -> ReportContent:
     """Writes the files of a report of comparisons alone into a folder, and returns their content.
 
     The rest is as for :func:`begun`. Raises ProofrollError if the folder cannot be written.
     """
-    report = begun(outcomes, store, command)
+    report = begun(outcomes, command)
     report.write(out)
     return report.content
 
 
-def _replay(outcomes: list[Outcome], store: Store) -> Replay | None:
+def _replay(outcomes: list[Outcome]) -> Replay | None:
     """The replay of the comparisons, one kind of scenes after the other."""
     kinds = {id(item): kind_of(item.scene) for item in outcomes}
     found = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
     return joined(
-        [replay_content([item for item in outcomes if kinds[id(item)] is kind], store, kind.replay()) for kind in found]
+        [replay_content([item for item in outcomes if kinds[id(item)] is kind], kind.replay()) for kind in found]
     )
 
 

@@ -25,7 +25,6 @@ from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
 from proofroll.report.page.summary import three_sentences
 from proofroll.report.parts import PartEntry, part_kinds
-from proofroll.running.store import Store
 from proofroll.running.timing import machine
 from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.findings import load_findings
@@ -163,10 +162,10 @@ class ReportContent:
         return {section: item for section, item in found.items() if item is not None}
 
 
-def report_content(outcomes: list[Outcome], store: Store, command: str) -> ReportContent:
+def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
     """Content of a report of comparisons; paths of files are relative to its folder."""
     lines = [lines_of(outcome) for outcome in outcomes]
-    comparisons = [_comparison(outcome, own, store) for outcome, own in zip(outcomes, lines, strict=True)]
+    comparisons = [_comparison(outcome, own) for outcome, own in zip(outcomes, lines, strict=True)]
     facts = machine()
     versions = {"proofroll": proofroll.__version__, "python": platform.python_version()}
     for run in (run for outcome in outcomes for run in outcome.runs):
@@ -186,14 +185,14 @@ def report_content(outcomes: list[Outcome], store: Store, command: str) -> Repor
     return content.summarised
 
 
-def _comparison(outcome: Outcome, lines: Sequence[TableLine], store: Store) -> ReportedComparison:
+def _comparison(outcome: Outcome, lines: Sequence[TableLine]) -> ReportedComparison:
     """A comparison's content with its truths, what its kind of scene tells of each run, claims, costs and findings."""
-    content, truths = outcome_content(outcome), _truths(outcome, store)
+    content, truths = outcome_content(outcome), _truths(outcome)
     kind = kind_of(outcome.scene)
-    facts = kind.run_facts(truths, outcome.runs, store) if kind is not None else [None] * len(outcome.runs)
+    facts = kind.run_facts(truths, outcome.runs) if kind is not None else [None] * len(outcome.runs)
     runs = [
-        dataclasses.replace(run, trajectory=run.trajectory and f"{store.folder.name}/{run.trajectory}", own=own)
-        for run, own in zip(content.runs, facts, strict=True)
+        dataclasses.replace(run, trajectory=made.trajectory.shown if made.trajectory else None, own=own)
+        for run, made, own in zip(content.runs, outcome.runs, facts, strict=True)
     ]
     content = dataclasses.replace(content, runs=runs)
     points = outcome.points.values()
@@ -203,12 +202,11 @@ def _comparison(outcome: Outcome, lines: Sequence[TableLine], store: Store) -> R
     return dataclasses.replace(content, evidence=evidence)
 
 
-def _truths(outcome: Outcome, store: Store) -> list[ReportedTruth]:
+def _truths(outcome: Outcome) -> list[ReportedTruth]:
     """Routes and error bars of the truth at each point."""
     found = []
     for name, point in outcome.points.items():
-        trajectory = f"{store.folder.name}/{point.file.name}"
-        entry = ReportedTruth(name, point.case.parameters, trajectory, point.result.wall_seconds)
+        entry = ReportedTruth(name, point.case.parameters, point.trajectory.shown, point.result.wall_seconds)
         if point.reference is not None:
             dataset, scene = point.reference.dataset, point.scene
             observables, kind = scene.observables, kind_of(scene)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy.typing as npt
@@ -31,7 +30,8 @@ class Ghost:
         settings: of the engine, complete.
         name, colour: as in the figures of its comparison.
         distance: of its bodies from the true ones, at most [m].
-        file: its trajectory.
+        motion: its trajectory.
+        file: in which that is stored, as the page calls it; empty: in none.
         message: why it ended early; empty if it did not.
     """
 
@@ -41,7 +41,8 @@ class Ghost:
     name: str
     colour: int
     distance: float
-    file: Path
+    motion: xr.Dataset
+    file: str
     message: str = ""
 
     @property
@@ -61,7 +62,7 @@ class Replayed:
     Attributes:
         scene: with the parameters of the case.
         true: the true motion.
-        file: in which it is stored.
+        file: in which it is stored, as the page calls it; empty: in none.
         ghosts: what stands beside it.
         group: of cases to which it belongs.
         label: what it is called in its group.
@@ -69,14 +70,15 @@ class Replayed:
 
     scene: Scene
     true: xr.Dataset
-    file: Path
+    file: str
     ghosts: list[Ghost]
     group: str
     label: str
 
-    def true_values(self, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-        """Variables of the true motion, those that there are."""
-        return {name: self.true[name].to_numpy() for name in names if name in self.true.variables}
+
+def some(motion: xr.Dataset, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
+    """Values of some variables, as far as there are any."""
+    return {name: motion[name].to_numpy() for name in names if name in motion.variables}
 
 
 @dataclass

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
-from proofroll.files.trajectory_file import read_some
+from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.report.comparison.summary import reported_rows, runs_at
 from proofroll.report.labels import names
 from proofroll.report.pages import packed
@@ -18,7 +16,6 @@ from proofroll.report.replay.library import three
 from proofroll.report.replay.records import Ghost, Replay, ReplayCase, Replayed, ReplayedRun, ReplayKind
 from proofroll.report.styles import styles
 from proofroll.running.case import Status
-from proofroll.running.store import Store
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
@@ -30,7 +27,7 @@ LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
 SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 
 
-def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> Replay:
+def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     """Replay of comparisons, all of scenes of one kind.
 
     There is one case for each truth of the comparisons. Its ghosts are the engines' runs with ``default``
@@ -46,18 +43,16 @@ def replay_content(outcomes: list[Outcome], store: Store, kind: ReplayKind) -> R
     cases, numbers = [], []
     for point, shared in found.values():
         assert point.reference is not None  # or it would not be among them
-        true = point.reference.dataset
+        true = point.reference.dataset["p_WB"].to_numpy()
         ghosts = [
-            ghost
-            for outcome, name in shared
-            for ghost in _ghosts(runs_at(outcome, name, store), looks[id(outcome)], true["p_WB"].to_numpy())
+            ghost for outcome, name in shared for ghost in _ghosts(runs_at(outcome, name), looks[id(outcome)], true)
         ]
         ghosts = _chosen(ghosts, kind.seen(point.scene))
         # The comparison that has most to show at this point names the case.
-        title = max(shared, key=lambda pair: len(runs_at(pair[0], pair[1], store)))[0].comparison.title
+        title = max(shared, key=lambda pair: len(runs_at(*pair)))[0].comparison.title
         label = point_name(point.case.parameters) or point.scene.title
-        replayed = Replayed(point.scene, true, point.file, ghosts, title, label)
-        content, packed_numbers = case_content(replayed, kind, lambda file: f"{store.folder.name}/{file.name}")
+        replayed = Replayed(point.scene, point.reference.dataset, point.trajectory.shown, ghosts, title, label)
+        content, packed_numbers = case_content(replayed, kind)
         cases.append(content)
         numbers.append(packed_numbers)
     own = {outcome.scene.digest for outcome in outcomes}
@@ -86,16 +81,13 @@ def frame_times(until: float, fastest: float) -> FloatArray:
     return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
 
 
-def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], str]) -> tuple[ReplayCase, str]:
-    """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed.
-
-    ``named`` gives what the page calls a file.
-    """
+def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]:
+    """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed."""
     own, frames, drawn = kind.draw(replayed)
     first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
     until, whole = own["until"], own["frames"]
     runs = [
-        ReplayedRun("truth", -1, True, whole, "", named(replayed.file)),
+        ReplayedRun("truth", -1, True, whole, "", replayed.file),
         *(
             ReplayedRun(
                 name=ghost.name,
@@ -103,7 +95,7 @@ def case_content(replayed: Replayed, kind: ReplayKind, named: Callable[[Path], s
                 shown=first[ghost.engine] is ghost,
                 frames=count,
                 message=ghost.ending(until * (count - 1) / max(1, whole - 1)) if count < whole else "",
-                trajectory=named(ghost.file),
+                trajectory=ghost.file,
                 settings=ghost.settings,
             )
             for ghost, count in zip(replayed.ghosts, frames, strict=True)
@@ -130,13 +122,19 @@ def _looks(outcome: Outcome) -> list[tuple[str, int]]:
     return [(name, style.colour) for name, style in zip(names(rows), styles(rows), strict=True)]
 
 
-def _ghosts(runs: list[tuple[int, Run, Path]], looks: list[tuple[str, int]], true: FloatArray) -> list[Ghost]:
+def _ghosts(
+    runs: list[tuple[int, Run, StoredTrajectory]], looks: list[tuple[str, int]], true: FloatArray
+) -> list[Ghost]:
     ghosts = []
-    for number, run, file in runs:
+    for number, run, motion in runs:
         assert run.case is not None  # it has a trajectory
-        engine, away = run.case.engine, distance(read_some(file, ["p_WB"])["p_WB"], true)
+        engine, away = run.case.engine, distance(motion.dataset["p_WB"].to_numpy(), true)
         message = "" if run.result.status == Status.DONE else run.result.message
-        ghosts.append(Ghost(run.case.key, engine.name, engine.settings, *looks[number], away, file, message))
+        ghosts.append(
+            Ghost(
+                run.case.key, engine.name, engine.settings, *looks[number], away, motion.dataset, motion.shown, message
+            )
+        )
     return ghosts
 
 

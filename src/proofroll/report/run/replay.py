@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +15,6 @@ from proofroll.core.multi_element import each_alone
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import is_scene, load_scene, read_scene_file
-from proofroll.files.trajectory_file import STORED, write
 from proofroll.report.kinds import kind_of, report_kinds
 from proofroll.report.labels import settings_text
 from proofroll.report.replay.library import three
@@ -57,16 +55,13 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
     cases: list[ReplayCase] = []
     packed: list[str] = []
     group = scene.title if len(parts) == 1 or not label else f"{scene.title}, {label}"
-    with tempfile.TemporaryDirectory() as folder:
-        own = Path(folder) / f"run{STORED}"
-        for (element, alone), drawer in zip(parts, drawers, strict=True):
-            true_part, run_part = (part(scene, element, whole) for whole in (true, run))
-            write(run_part, own)
-            shown = element.name if len(parts) > 1 else label or scene.title
-            replayed = Replayed(alone, true_part, own, _ghosts(own, run_part, true_part), group, shown)
-            case, numbers = case_content(replayed, drawer, lambda _: "")
-            cases.append(case)
-            packed.append(numbers)
+    for (element, alone), drawer in zip(parts, drawers, strict=True):
+        true_part, run_part = (part(scene, element, whole) for whole in (true, run))
+        shown = element.name if len(parts) > 1 else label or scene.title
+        replayed = Replayed(alone, true_part, "", _ghosts(run_part, true_part), group, shown)
+        case, numbers = case_content(replayed, drawer)
+        cases.append(case)
+        packed.append(numbers)
     return rendered(
         templates(),
         "run_replay.html",
@@ -125,7 +120,7 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
     return scene.fully_asked
 
 
-def _ghosts(path: Path, run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
+def _ghosts(run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
     """The run as a ghost; none if it is the truth itself."""
     engine = str(run.attrs["engine"])
     if engine == "truth":
@@ -133,4 +128,4 @@ def _ghosts(path: Path, run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
     settings = json.loads(run.attrs["settings"])
     message = "" if run.attrs["status"] == "done" else str(run.attrs["message"])
     away = distance(run["p_WB"].to_numpy(), true["p_WB"].to_numpy())
-    return [Ghost("", engine, settings, engine, 0, away, path, message)]
+    return [Ghost("", engine, settings, engine, 0, away, run, "", message)]

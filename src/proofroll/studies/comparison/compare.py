@@ -16,8 +16,7 @@ from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict, judge_curve
-from proofroll.files.scene_file import load_scene, read_scene_file
-from proofroll.files.trajectory_file import read
+from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
 from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
@@ -35,10 +34,9 @@ if TYPE_CHECKING:
 def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outcome:
     """Judges the results of a plan's cases."""
     comparison = planned.comparison
+    held = {case.key: runner.store.stored(case) for case in planned.cases}
     points = {
-        name: ComparedPoint(
-            load_scene(comparison.scene, **case.parameters), case, results[case.key], runner.store.trajectory(case)
-        )
+        name: ComparedPoint(planned.scenes[name], case, results[case.key], held[case.key])
         for name, case in planned.truths.items()
     }
     judged: list[Run] = []
@@ -60,7 +58,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             judged.append(_of_another_scene(run, result, other))
             continue
         trajectories = {
-            factor: read(runner.store.trajectory(case))
+            factor: held[case.key].dataset
             for factor, case in run.ladder.items()
             if results[case.key].status == Status.DONE
         }
@@ -86,8 +84,8 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         replace(found, contradictions=[]) if unfinished & run.keys(planned.truths) else found
         for run, found in zip(planned.runs, judged, strict=True)
     ]
-    scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
-    return Outcome(comparison, scene, file, judged, points, _beyond_budget(planned, results))
+    judged = [run if run.result.trajectory is None else _with_trajectory(run, held) for run in judged]
+    return Outcome(comparison, planned.scene, planned.file, judged, points, _beyond_budget(planned, results))
 
 
 def left_out(results: Mapping[str, Result]) -> set[str]:
@@ -134,6 +132,12 @@ def _run(planned: Planned, result: Result, **found: Any) -> Run:
     """A run of a plan with its result and what was found of it."""
     facts = planned.facts if isinstance(planned.facts, EngineFacts) else None
     return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **found)
+
+
+def _with_trajectory(run: Run, held: Mapping[str, StoredTrajectory]) -> Run:
+    """The run with its trajectory, unless its file is not kept, as where a run was ended."""
+    trajectory = held[run.case.key] if run.case else None
+    return replace(run, trajectory=trajectory if trajectory and trajectory.file.is_file() else None)
 
 
 def _absent(run: Planned) -> Run:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.diagnosis.of_scene import Diagnosis
@@ -13,6 +12,7 @@ from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.scene_file import SceneFile
+from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.html_table import html_table
 from proofroll.studies.judging.reference import Reference
@@ -46,18 +46,18 @@ class ComparedPoint:
         scene: with its numbers.
         case: of the truth.
         result: how the truth's run ended.
-        file: the truth's trajectory, if it has one.
+        trajectory: of the truth.
     """
 
     scene: Scene
     case: Case
     result: Result
-    file: Path
+    trajectory: StoredTrajectory
 
     @cached_property
     def reference(self) -> Reference | None:
         """The truth, read when it is first asked for; None: there is none."""
-        return Reference.read(self.scene, self.file) if self.file.is_file() else None
+        return Reference.of(self.scene, self.trajectory.dataset) if self.trajectory.file.is_file() else None
 
 
 @dataclass(frozen=True)
@@ -91,6 +91,7 @@ class Run:
         shared: which route of the truth rests on the same equations, as a clause; empty if none does.
         diagnosis: causes of a difference that are proven.
         rungs: the other runs of its ladder.
+        trajectory: what it gave, read when it is first asked for; None: nothing.
     """
 
     row: Row
@@ -104,6 +105,7 @@ class Run:
     shared: str = ""
     diagnosis: list[Diagnosis] = field(default_factory=list)
     rungs: list[LadderRun] = field(default_factory=list)
+    trajectory: StoredTrajectory | None = None
 
     @property
     def verdict(self) -> Verdict:

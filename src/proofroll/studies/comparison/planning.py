@@ -15,7 +15,7 @@ from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grid, time_grid
 from proofroll.core.truth import edge_between
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.process import processor_seconds
@@ -53,9 +53,21 @@ class Planned:
 
 @dataclass(frozen=True)
 class Plan:
-    """The cases of a comparison: to be run together with those of others, then judged."""
+    """The cases of a comparison: to be run together with those of others, then judged.
+
+    Attributes:
+        comparison: with its edges found.
+        scene: with its own parameters.
+        file: the scene's.
+        scenes: at each point, by :func:`point_name`.
+        truths: their cases.
+        runs: of all rows at all points.
+    """
 
     comparison: Comparison
+    scene: Scene
+    file: SceneFile
+    scenes: dict[str, Scene]
     truths: dict[str, Case]
     runs: list[Planned]
 
@@ -87,7 +99,12 @@ class Plan:
         """The part at the combinations of ``comparison``, which has some of this plan's."""
         names = {point_name(point) for point in comparison.combinations()}
         truths = {name: case for name, case in self.truths.items() if name in names}
-        return Plan(comparison, truths, [run for run in self.runs if point_name(run.parameters) in names])
+        return replace(
+            self,
+            comparison=comparison,
+            truths=truths,
+            runs=[run for run in self.runs if point_name(run.parameters) in names],
+        )
 
 
 def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers | None = None) -> Plan:
@@ -114,6 +131,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     steps = [facts.step if isinstance(facts, EngineFacts) else None for facts in resolved]
     rows = [fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
     rungs = _rungs(rows, resolved, workers)
+    scenes: dict[str, Scene] = {}
     truths: dict[str, Case] = {}
     runs: list[Planned] = []
     of_engines = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
@@ -121,9 +139,12 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     between = tuple(sorted({t for step in of_engines for t in off_grid(times, step).tolist()}))
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):
-            scene = scene_at(comparison, point)
-            true = replace(_case(comparison, scene.fully_asked, point, truth_facts), between=between)
-            truths.setdefault(point_name(point), true)
+            name = point_name(point)
+            if name not in scenes:
+                scenes[name] = scene_at(comparison, point)
+                case = _case(comparison, scenes[name].fully_asked, point, truth_facts)
+                truths[name] = replace(case, between=between)
+            scene = scenes[name]
             if not isinstance(facts, EngineFacts):
                 runs.append(Planned(row, point, facts))
                 continue
@@ -133,7 +154,8 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
             }
             runs.append(Planned(row, point, facts.on(scene.requires), ladder))
     spent = comparison.spent + processor_seconds() - before
-    return Plan(replace(comparison, spent=spent), truths, runs)
+    scene, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    return Plan(replace(comparison, spent=spent), scene, file, scenes, truths, runs)
 
 
 def scene_at(comparison: Comparison, point: Mapping[str, float]) -> Scene:

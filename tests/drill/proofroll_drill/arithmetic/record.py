@@ -61,7 +61,7 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
     for name, point in outcome.points.items():
         if point.reference is not None:
             said = {"ill_posed": point.reference.ill_posed, "events": _events(point.scene, point.reference.dataset)}
-            truths[points[name]] = {"decisions": said, "file": point.file.name}
+            truths[points[name]] = {"decisions": said, "file": point.trajectory.file.name}
     return {"decisions": decisions, "limits": limits, "truths": truths}
 
 

@@ -21,7 +21,7 @@ from proofroll.core.time_grid import time_grid
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, LimitResult, Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
-from proofroll.files.scene_file import load_scene
+from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.summary import outcome_content
 from proofroll.running.case import Case, EngineFacts, Result, Status
@@ -65,7 +65,7 @@ def judged(
     the grid [s] that are sampled, too.
     """
     store, results = Store(folder), dict[str, Result]()
-    runs, truths = list[Planned](), dict[str, Case]()
+    runs, truths, scenes = list[Planned](), dict[str, Case](), dict[str, Scene]()
 
     def put(case: Case, given: xr.Dataset | Result) -> Case:
         if isinstance(given, xr.Dataset):
@@ -77,7 +77,7 @@ def judged(
 
     for row in comparison.rows:
         for point in comparison.variations(row):
-            scene = load_scene(comparison.scene, **point)
+            scene = scenes[point_name(point)] = load_scene(comparison.scene, **point)
             dataset = truth(scene.fully_asked, time_grid(comparison.until, comparison.every), between=np.array(between))
             if BallCapability.BOUNDED_FRICTION in scene.requires:
                 dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
@@ -91,7 +91,8 @@ def judged(
                 scaled = dataclasses.replace(facts, settings={"dt": 1e-3 * factor})
                 ladder[factor] = put(Case(*given, scaled, comparison.until, comparison.every), how(scene, dataset))
             runs.append(Planned(row, point, facts, ladder))
-    return evaluate(Plan(comparison, truths, runs), results, Runner(store, jobs=1))
+    usual, file = load_scene(comparison.scene), read_scene_file(comparison.scene)
+    return evaluate(Plan(comparison, usual, file, scenes, truths, runs), results, Runner(store, jobs=1))
 
 
 def the_truth(_: Scene, dataset: xr.Dataset) -> xr.Dataset:

@@ -20,9 +20,8 @@ from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.report.drawing import direction
 from proofroll.files.json_data import plain
-from proofroll.files.trajectory_file import read_some
 from proofroll.report.labels import symbol, unit
-from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed
+from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed, some
 from proofroll.report.replay.replay import frame_times, in_sight
 
 # Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
@@ -58,13 +57,12 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     signs = np.repeat([1.0] * (len(joints) - len(touching)) + [sign for *_, sign in touching], 3)
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
-    true = replayed.true_values([*_MOTION, *names, *(name for name, _ in readings)])
+    true = some(replayed.true, [*_MOTION, *names, *(name for name, _ in readings)])
     fastest = float(np.linalg.norm(true["w_WB"], axis=-1).max())
     times = frame_times(float(true["time"][-1]), fastest)
     placed = _placed(element, true, times)
     ghosts = [
-        _reachable(_placed(element, read_some(ghost.file, list(_MOTION)), times), placed, length)
-        for ghost in replayed.ghosts
+        _reachable(_placed(element, some(ghost.motion, _MOTION), times), placed, length) for ghost in replayed.ghosts
     ]
     least = 2.0 ** math.floor(math.log2(length * _ROUNDED))
     numbers = PackedNumbers()
