@@ -1,4 +1,8 @@
-"""Writes docs/gallery.md: every scene with picture, claim, truth and verdicts, from real runs: ``make gallery``."""
+"""Writes docs/gallery.md: every scene with picture, claim, truth and verdicts, from real runs: ``make gallery``.
+
+Sections of the scenes that are named are made; without names those that are lacking, and those whose comparison, scene,
+settings or pinned libraries have changed.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,7 @@ import re
 import sys
 from pathlib import Path
 
+from made_from import facts, stamp
 from markdown_tables import caveat_list, choice_table, remark_list, verdict_table
 
 from proofroll.core.comparison import Comparison
@@ -49,16 +54,20 @@ all points of the parameters; what the words mean: [read a verdict](read_a_verdi
 """
 # Part of the path that the matrix asks for.
 TOLERANCE = 1e-4
+# Line of a section with the hash of all that decides it.
+MADE = "<!-- made from {} -->\n"
 # Line of a section that the matrix is made from: what each formulation is at that tolerance, by group of scenes.
 KEPT = re.compile(r"^<!-- at 1e-4: (.*) -->$", flags=re.MULTILINE)
 
 
-def comparisons() -> dict[str, Comparison]:
-    """The first comparison of each scene that has one, in the order of a report; nothing is timed here."""
-    files = [path for path in sorted(data_folder("comparisons").rglob("*.toml")) if study_of(path) is None]
-    found: dict[str, Comparison] = {}
-    for comparison in sorted((load_comparison(str(path)) for path in files), key=lambda item: item.order):
-        found.setdefault(comparison.scene, dataclasses.replace(comparison.briefly(), timed=False))
+def comparisons() -> dict[str, tuple[str, Comparison]]:
+    """The first comparison of each scene that has one, with its path's name; nothing is timed here."""
+    folder = data_folder("comparisons")
+    files = [path for path in sorted(folder.rglob("*.toml")) if study_of(path) is None]
+    named = [(str(path.relative_to(folder).with_suffix("")), load_comparison(str(path))) for path in files]
+    found: dict[str, tuple[str, Comparison]] = {}
+    for name, comparison in sorted(named, key=lambda item: item[1].order):
+        found.setdefault(comparison.scene, (name, dataclasses.replace(comparison.briefly(), timed=False)))
     return found
 
 
@@ -146,16 +155,18 @@ def section(scene: str, comparison: Comparison | None, runner: Runner) -> str:
 
 
 def main(names: list[str]) -> None:
-    """Writes all sections; those of the scenes that are named, or all, are made anew."""
+    """Writes all sections; those that are asked for, or out of date, are made anew."""
     PICTURES.mkdir(exist_ok=True)
     runner = Runner(Store(DOCS.parent / "out" / "cases"))
     target, known = DOCS / "gallery.md", comparisons()
     before = target.read_text(encoding="utf-8") if target.exists() else ""
     kept = {part.partition("\n")[0]: f"## {part}".rstrip() + "\n" for part in before.split("\n## ")[1:]}
     for scene in scene_names():
-        if names and scene not in names:
+        name, comparison = known.get(scene, ("", None))
+        made = MADE.format(stamp(name, facts(name, runner.workers))) if comparison else ""
+        if scene not in names if names else scene in kept and made in kept[scene]:
             continue
-        kept[scene] = section(scene, known.get(scene), runner)
+        kept[scene] = section(scene, comparison, runner) + made
         text = "\n".join([HEAD, *(kept[name] for name in scene_names() if name in kept)])
         target.write_text(text, encoding="utf-8")
         write_matrix(text)

@@ -14,6 +14,7 @@ from proofroll.files.comparison_file import load_comparison
 from proofroll.files.data_folders import data_folder
 from proofroll.running.asking import resolve
 from proofroll.running.case import EngineFacts
+from proofroll.running.worker_pool import Workers
 
 ROOT = Path(__file__).resolve().parents[1]
 # Extras without which nothing is simulated otherwise.
@@ -22,14 +23,14 @@ _NO_NUMBERS = {"report", "robots", "all", "dev", "cluster", "docs"}
 _WORDS = ("title", "question", "order", "brief")
 
 
-def facts(name: str) -> list[EngineFacts]:
-    """Complete settings of every row of a comparison, in its order.
+def facts(name: str, workers: Workers | None = None) -> list[EngineFacts]:
+    """Complete settings of every row of a comparison, in its order; engines are asked in one of ``workers``, if given.
 
     Raises:
         ProofrollError: an engine cannot be asked.
     """
     specs = [parse_engine(row.engine) for row in load_comparison(name).rows]
-    found = resolve([(spec.name, spec.options) for spec in specs])
+    found = resolve([(spec.name, spec.options) for spec in specs], workers)
     for item in found:
         if not isinstance(item, EngineFacts):
             raise item

@@ -120,6 +120,34 @@ def test_the_workflow_runs_the_two_commands() -> None:
         subprocess.run(["make", "--dry-run", *line.split()[1:]], cwd=ROOT, check=True, capture_output=True)
 
 
+def test_the_gallery_makes_what_is_lacking_or_changed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Without names a scene is made again only when what decides its section has changed; with names that one."""
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    gallery = importlib.import_module("gallery")
+    made, stamps = [], {"a": "1", "b": "1"}
+    monkeypatch.setattr(gallery, "DOCS", tmp_path / "docs")
+    monkeypatch.setattr(gallery, "PICTURES", tmp_path / "docs" / "gallery")
+    monkeypatch.setattr(gallery, "scene_names", lambda: ["a", "b", "of_nothing"])
+    monkeypatch.setattr(gallery, "comparisons", lambda: {name: (name, name) for name in stamps})
+    monkeypatch.setattr(gallery, "facts", lambda *_: [])
+    monkeypatch.setattr(gallery, "stamp", lambda name, _: stamps[name])
+
+    def section(scene: str, *_: object) -> str:
+        made.append(scene)
+        return f"## {scene}\n\nIts text.\n"
+
+    monkeypatch.setattr(gallery, "section", section)
+    (tmp_path / "docs").mkdir()
+    for names, expected in (([], ["a", "b", "of_nothing"]), ([], []), (["b"], ["b"])):
+        made.clear()
+        gallery.main(names)
+        assert made == expected
+    stamps["a"] = "2"
+    made.clear()
+    gallery.main([])
+    assert made == ["a"]
+
+
 def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Both pages include the matrix, which is that of the records in the gallery's own sections."""
     monkeypatch.syspath_prepend(str(ROOT / "docs"))

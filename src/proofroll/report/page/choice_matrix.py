@@ -131,6 +131,12 @@ class ChoiceMatrix:
         cells = [(row.name, self.cell(row, column, tolerance, forces)) for row in self.models]
         return min(cells, key=lambda item: item[1].cost, default=("", ChoiceCell(NOT_RUN, "", "")))
 
+    def best(self, tolerance: float, forces: bool) -> list[int | None]:
+        """Row of each column's cheapest formulation; None where none holds the tolerance."""
+        rows = {row.name: place for place, row in enumerate(self.rows) if not row.setting}
+        found = [self.cheapest(column, tolerance, forces) for column in self.columns]
+        return [rows[name] if math.isfinite(cell.cost) else None for name, cell in found]
+
     def answer(self, tolerance: float, forces: bool) -> str:
         """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
         asked = f"{NEEDS[forces]} to {number(tolerance)}"
@@ -138,13 +144,14 @@ class ChoiceMatrix:
         for column in (item for item in self.columns if item.whole):
             name, cell = self.cheapest(column, tolerance, forces)
             if math.isfinite(cell.cost):
-                said.append(f"{column.group}: {name} ({cell.text} s/s)")
+                unit = "" if said else " s of computing per second of motion"
+                said.append(f"{name} for {column.group} ({cell.text}{unit})")
             elif not (forces and self.without_forces.issuperset(column.studies)):
                 without.append(column.group)
         nothing = f"nothing that was run and timed holds it for {', '.join(without)}" if without else ""
         if not said:
-            return f"For {asked}: {nothing or 'nothing was run'}."
-        return f"For {asked} the cheapest are {'; '.join(said)}{f'; {nothing}' if nothing else ''}."
+            return f"To hold {asked}: {nothing or 'nothing was run'}."
+        return f"The cheapest to hold {asked}: {', '.join(said)}{f'; {nothing}' if nothing else ''}."
 
     @cached_property
     def data(self) -> str:
@@ -157,8 +164,8 @@ class ChoiceMatrix:
             ]
             for row in self.rows
         ]
-        answers = [self.answer(at, need) for need, at in ASKED]
-        return json.dumps({"cells": list(pool), "grid": grid, "answers": answers}, separators=(",", ":"))
+        best, answers = ([told(at, need) for need, at in ASKED] for told in (self.best, self.answer))
+        return json.dumps({"cells": list(pool), "grid": grid, "best": best, "answers": answers}, separators=(",", ":"))
 
     @property
     def packed(self) -> str:

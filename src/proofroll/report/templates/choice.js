@@ -13,8 +13,8 @@
   form.hidden = false;
 
   // Texts are put in as text: what an engine says is no markup.
-  function fill(cell, [state, text, title, href]) {
-    cell.className = `cell ${state}`;
+  function fill(cell, [state, text, title, href], best) {
+    cell.className = `cell ${state}${best ? " best" : ""}`;
     cell.replaceChildren();
     const hidden = (word) => Object.assign(document.createElement("span"), { className: "vh", textContent: word });
     if (state === "none") return cell.append(hidden("not run"));
@@ -22,15 +22,15 @@
     if (href) link.href = `#${href}`;
     const sign = Object.assign(document.createElement("span"), { textContent: symbols[state] });
     sign.setAttribute("aria-hidden", "true");
-    link.append(sign, hidden(state), ` ${text}`);
+    link.append(sign, hidden(best ? "cheapest that agrees" : state), ` ${text}`);
     cell.append(link);
   }
   async function show() {
     const place = (forces.checked ? count : 0) + Number(slider.value) - first;
     told.textContent = `1e-${slider.value}`;
     slider.setAttribute("aria-valuetext", told.textContent);
-    const { cells, grid, answers } = JSON.parse(await unpack("choices"));
-    rows.forEach((row, i) => grid[i].forEach((numbers, j) => fill(row.cells[j + 1], cells[numbers[place]])));
+    const { cells, grid, best, answers } = JSON.parse(await unpack("choices"));
+    rows.forEach((row, i) => grid[i].forEach((numbers, j) => fill(row.cells[j + 1], cells[numbers[place]], best[place][j] === i)));
     answer.textContent = answers[place];
     const words = JSON.parse(await unpack("all-words"))[place];
     document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });

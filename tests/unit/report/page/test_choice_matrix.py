@@ -120,11 +120,21 @@ def test_the_answer_names_the_cheapest_engine_of_each_group() -> None:
     ball = line(study="ball", group="ball rolling", error=0.1)
     found = choice_matrix([*ARM, beta, own, ball], STUDIES)
     assert found.answer(1e-3, False) == (
-        "For motion to 1e-3 the cheapest are trees: alpha joints (0.01 s/s); "
+        "The cheapest to hold motion to 1e-3: alpha joints for trees (0.01 s of computing per second of motion); "
         "nothing that was run and timed holds it for ball rolling."
     )
-    assert "trees: beta joints (0.5 s/s)" in found.answer(1e-8, False)
+    assert "beta joints for trees (0.5 s" in found.answer(1e-8, False)
     assert "motion and forces" in found.answer(1e-3, True)
+
+
+def test_the_cheapest_of_each_column_is_framed() -> None:
+    """The row of its formulation, with all settings; no row where nothing holds the tolerance."""
+    beta = line(engine="beta", row=3, error=1e-9, cost=0.5)
+    own = line(engine="gamma", row=4, error=1e-12, cost=1e-6, own_equations=True)
+    found = choice_matrix([*ARM, beta, own, line(study="ball", group="ball rolling", error=0.1)], STUDIES)
+    names = [[None if at is None else found.rows[at].name for at in found.best(at, False)] for at in (1e-3, 1e-8)]
+    assert names == [["alpha joints", None], ["beta joints", None]]
+    assert not any(found.rows[at].setting for at in found.best(1e-3, False) if at is not None)
 
 
 def test_the_data_hold_every_cell(whole: ChoiceMatrix) -> None:
@@ -132,6 +142,7 @@ def test_the_data_hold_every_cell(whole: ChoiceMatrix) -> None:
     data = json.loads(whole.data)
     for index, (forces, decade) in enumerate(product((False, True), DECADES)):
         assert data["answers"][index] == whole.answer(10.0**-decade, forces)
+        assert data["best"][index] == whole.best(10.0**-decade, forces)
         for row, numbers in zip(whole.rows, data["grid"], strict=True):
             for column, own in zip(whole.columns, numbers, strict=True):
                 assert tuple(data["cells"][own[index]]) == whole.cell(row, column, 10.0**-decade, forces)[:4]
