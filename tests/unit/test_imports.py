@@ -155,6 +155,18 @@ def test_engines_know_no_scene_and_no_surface_by_name() -> None:
     assert not wrong, "\n".join(wrong)
 
 
+def test_no_engine_shares_equations_of_mechanisms_with_the_truth() -> None:
+    """What moves joints and decides their modes in the truth is imported by no engine: agreement is evidence."""
+    of_truth = {"joint_coordinates", "complementarity"}
+    wrong = [
+        f"{file.relative_to(ROOT)} imports {name}"
+        for file in (ROOT / "engines").rglob("*.py")
+        for _, name in _imported(file)
+        if name.rpartition(".")[2] in of_truth
+    ]
+    assert wrong == []
+
+
 def test_each_class_has_a_name_of_its_own() -> None:
     """No two public classes are called the same: a name says what it is wherever one reads it."""
     homes: dict[str, list[str]] = {}

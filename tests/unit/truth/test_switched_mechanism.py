@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import InputError, Refused
+from proofroll.elements.mechanism.complementarity import complementary
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
-from proofroll.elements.mechanism.switches import complementary
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
 

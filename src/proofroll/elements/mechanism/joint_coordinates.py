@@ -18,22 +18,14 @@ import numpy as np
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.analysis import BRANCHES, RANK, RowSign, analysed, reactions
+from proofroll.elements.mechanism.complementarity import decided, load_of, refuse_switching, struck
 from proofroll.elements.mechanism.kinematics import BodyMotion, Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
-from proofroll.elements.mechanism.switches import (
-    STOPPED,
-    Mode,
-    decided,
-    held_by,
-    load_of,
-    refuse_switching,
-    struck,
-    switched_joints,
-)
+from proofroll.elements.mechanism.switches import STOPPED, Mode, held_by, switched_joints
 
 _NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
 _EQUAL_STEP = 2e-3  # s
@@ -165,12 +157,12 @@ class JointCoordinates:
         ]
 
     def decided(self, q: Array, v: Array, time: float = 0.0) -> tuple[Mode, float]:
-        """See :func:`proofroll.elements.mechanism.switches.decided`; modes of efforts follow from their own sizes."""
+        """Modes of joints by complementarity, of efforts by their own sizes; how far they are from others, relative."""
         mode, apart = decided(self.switched, q, v, partial(self._responses, time, q, v))
         return mode + tuple(item.mode(time, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self.limited), apart
 
     def struck(self, q: Array, v: Array, hit: int) -> tuple[Array, float]:
-        """See :func:`proofroll.elements.mechanism.switches.struck`."""
+        """See :func:`proofroll.elements.mechanism.complementarity.struck`."""
         return struck(self.switched, q, v, hit, partial(self._responses, 0.0, q, v))
 
     def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Laws that switch in a mechanism: what holds, what pushes, and which of it follows from the forces.
+"""Laws that switch in a mechanism, as its scene states them: which forces hold, which push, and what events are called.
 
 A switched joint has one coordinate. Its mode is ``free``; ``forward`` or ``backward`` where it moves against dry
 friction; ``stick`` where friction holds it; ``low`` or ``high`` where a stop does, with its friction. An effort with a
@@ -8,20 +8,14 @@ limit is ``least``, ``linear`` or ``greatest``.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.model import Mechanism
-from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.signal import breaks
 
 # Of the switched joints, then of the actuators whose effort has a limit.
 Mode = tuple[str, ...]
-_MOST_PIVOTS = 1000  # of the complementarity problem; a few joints take as many as they are
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
 
@@ -86,58 +80,6 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
     return tuple(found)
 
 
-def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArray[np.int_], Array, Array]:
-    """Forces that hold where they can: a = free + G f is zero where f lies between its bounds.
-
-    At the lower bound a ≥ 0, at the upper one a ≤ 0. G is positive definite; pivots by least index (Murty, 1974).
-
-    Returns:
-        Of each force -1, 0, 1: at its lower bound, between, at its upper bound; the forces; the accelerations.
-
-    Raises:
-        Refused: G is singular, so that forces which hold are not determinate.
-    """
-    state = np.zeros(len(free), dtype=int)
-    for _ in range(_MOST_PIVOTS):
-        held = state == 0
-        f = np.where(state > 0, high, np.where(state < 0, low, 0.0))
-        try:
-            f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
-        except np.linalg.LinAlgError:
-            raise Refused("several joints hold one degree of freedom: their forces are not determinate") from None
-        a = free + G @ f
-        wrong = np.flatnonzero((held & ((f > high) | (f < low))) | ((state > 0) & (a > 0)) | ((state < 0) & (a < 0)))
-        if not len(wrong):
-            return state, f, a
-        k = int(wrong[0])
-        state[k] = 0 if state[k] else (1 if f[k] > high[k] else -1)
-    raise Refused("which joints hold is not found: the complementarity problem has no solution by pivots")
-
-
-def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:
-    """Least distance of a solution of :func:`complementary` from a change of mode, relative to the forces in play.
-
-    A force between its bounds is as far from a change as from the nearer bound. A force at a bound is as far from it as
-    the further force that would stop the motion.
-    """
-    least = math.inf
-    for k in range(len(free)):
-        inertia = 1.0 / G[k, k]
-        size = abs(f[k]) + abs(free[k]) * inertia + sum(abs(x) for x in (low[k], high[k]) if math.isfinite(x))
-        apart = max(abs(a[k]) * inertia, min(high[k] - f[k], f[k] - low[k]))
-        if size > 0:
-            least = min(least, apart / size)
-    return least
-
-
-def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
-    """Kinetic friction along the velocities of the tree, (nv); further modes are those of efforts."""
-    load = np.zeros(nv)
-    for joint, own in zip(joints, mode, strict=False):
-        load[joint.velocity] += joint.push(own)
-    return load
-
-
 def left_by(mode: str) -> str:
     """The event of a joint that leaves what held it."""
     return "slip" if mode == "stick" else "lift_off"
@@ -159,75 +101,3 @@ def changes(joints: Sequence[SwitchedJoint], before: Mode, after: Mode) -> tuple
 def held_by(mode: Mode) -> list[int]:
     """Numbers, among the switched joints, of those that are held."""
     return [number for number, own in enumerate(mode) if own in HOLDING]
-
-
-# Accelerations (nv) of the velocities in a mode, and what unit forces along some of them add, (nv, forces).
-Responses = Callable[[Mode, Sequence[int]], tuple[Array, Array]]
-
-
-def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> tuple[Mode, float]:
-    """Mode of the switched joints that follows from the forces, and how far from another one it is, relative.
-
-    A joint at rest is held where the force that this needs lies between its bounds; all at once, for they feel each
-    other.
-    """
-    mode = [
-        joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
-        for joint in joints
-    ]
-    still = held_by(tuple(mode))
-    if not still:
-        return tuple(mode), np.inf
-    at = [joints[number].velocity for number in still]
-    free, response = responses(tuple("free" if number in still else own for number, own in enumerate(mode)), at)
-    low, high = np.array([joints[number].bounds(mode[number]) for number in still]).T
-    state, force, acceleration = complementary(free[at], response[at], low, high)
-    for number, side in zip(still, state, strict=True):
-        if side:
-            mode[number] = joints[number].moving(-side)
-    return tuple(mode), margin(free[at], response[at], low, high, force, acceleration)
-
-
-def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, responses: Responses) -> tuple[Array, float]:
-    """Velocities after an impact of one switched joint on its stop, by Newton's law of impact.
-
-    Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
-
-    Returns:
-        The velocities, and how far from another outcome it is, relative.
-
-    Raises:
-        Refused: several stops share the impact and one of them returns speed, so that its order decides.
-    """
-    resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}]
-    at_stop = sorted({hit, *resting})
-    at = [joints[number].velocity for number in at_stop]
-    _, response = responses(tuple("free" for _ in joints), at)
-    returned = np.array([1 + joints[number].restitution for number in at_stop]) * v[at]
-    below = np.array([q[joints[k].coordinate] <= joints[k].low for k in at_stop])
-    low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
-    _, impulse, left = complementary(returned, response[at], low, high)
-    if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
-        raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
-    v = v + response @ impulse
-    for number, rest in zip(at_stop, left, strict=True):
-        joint = joints[number]
-        if not rest and not joint.restitution:
-            v[joint.velocity] = 0.0
-    return v, margin(returned, response[at], low, high, impulse, left)
-
-
-def refuse_switching(mechanism: Mechanism) -> None:
-    """Refuses laws that switch where nothing follows it.
-
-    Raises:
-        Refused: a joint has dry friction, an effort a limit, or a drive or a target is a table.
-    """
-    for joint in mechanism.joints:
-        if joint.friction:
-            raise Refused(f"dry friction in joint {joint.name} switches, which one smooth integration does not follow")
-    for actuator in mechanism.actuators:
-        if actuator.limit is not None:
-            raise Refused(f"the limit of {actuator.name} switches, which one smooth integration does not follow")
-    if breaks(mechanism.signals):
-        raise Refused("a table of a drive or a target has breaks, which one smooth integration does not follow")

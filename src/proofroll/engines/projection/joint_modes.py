@@ -18,7 +18,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, load_of, switched_joints
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, switched_joints
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.stepping import Stepper
 
@@ -93,7 +93,11 @@ class SwitchedMotion:
         return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=False))
 
     def _load(self, mode: Mode) -> Array:
-        return load_of(self._joints, mode, self._equations.nv)
+        """Kinetic friction along the velocities ν."""
+        load = np.zeros(self._equations.nv)
+        for joint, own in zip(self._joints, mode, strict=False):
+            load[joint.velocity] = joint.push(own)
+        return load
 
     def advance(self, t: float) -> None:
         """Moves to time t [s].

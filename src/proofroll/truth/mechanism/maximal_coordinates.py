@@ -17,11 +17,11 @@ from scipy.linalg import qr
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import Missing
+from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import refuse_switching
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import (
