@@ -47,15 +47,16 @@ format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# The pictures of README.md and the tables of docs/sphere_in_cylinder.md, from real runs; some minutes, on a machine that does nothing else.
+# The pictures of README.md and the tables of docs/sphere_in_cylinder.md, from real runs, on a machine that does
+# nothing else; of one part: make readme PARTS=costs (or verdicts, regimes).
 readme: install
-	$(BIN)/python docs/update_readme.py
+	$(BIN)/python docs/update_readme.py $(PARTS)
 
 # The documentation, from docs/ and the docstrings; a warning is an error.
 docs: install
 	$(BIN)/python -m sphinx --quiet --fail-on-warning --keep-going --builder html docs $(OUT)/docs
 
-# The pictures and verdicts of docs/gallery.md, from real runs; some minutes.
+# The pictures and verdicts of docs/gallery.md, from real runs: of scenes that are lacking there, or have changed.
 gallery: install
 	$(BIN)/python docs/gallery.py
 
