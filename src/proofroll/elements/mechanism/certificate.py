@@ -193,7 +193,7 @@ def _turning(element: MechanismElement, soft: bool) -> float:
     """Scale of angular accelerations [rad/s²]; of a soft model the natural one, as for accelerations."""
     found = element.first_motion
     least = (1.0 if soft else _LEAST) * found.scale / element.length
-    return max(float(np.max(np.abs(found.angular_acceleration))), least)
+    return max(float(np.nanmax(np.abs(found.angular_acceleration), initial=0.0)), least)
 
 
 def _axis(element: MechanismElement, joint: Joint) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +14,7 @@ from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
+from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
@@ -119,13 +121,20 @@ class MechanismElement:
 
     @cached_property
     def _pressed(self) -> ContactSolution | None:
-        """Accelerations and forces of contact at the start; None: nothing may touch."""
+        """Accelerations and forces of contact at the start; None: nothing may touch, or they are not unique."""
         if not self.mechanism.contacts:
             return None
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
-        dynamics = ContactDynamics(self.mechanism)
-        return dynamics.solve(*self.mechanism.start(), dynamics.begin()[0])
+        with contextlib.suppress(Refused):
+            dynamics = ContactDynamics(self.mechanism)
+            return dynamics.solve(*self.mechanism.start(), dynamics.begin()[0])
+        return None
+
+    @property
+    def _undecided(self) -> bool:
+        """True if no law says what contacts do at the start."""
+        return bool(self.mechanism.contacts) and self._pressed is None
 
     @cached_property
     def noise(self) -> float:
@@ -272,6 +281,9 @@ class MechanismElement:
         rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
         acceleration = (motion.J @ rates + motion.bias)[:-1]
         scale = max(float(np.max(np.abs(acceleration[:, :3]))), self.speed**2 / self.length)
+        if self._undecided:
+            unknown = np.full((len(acceleration), 3), np.nan)
+            return FirstMotion(unknown, unknown, scale, _PART * self.natural_time, lasts=0.0)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
 
     @cached_property
@@ -284,7 +296,8 @@ class MechanismElement:
     def first_press(self) -> FloatArray:
         """Forces of contacts on their first bodies at the start [N], (contacts, 3); NaN where not determinate."""
         found = self._pressed
-        return np.zeros((0, 3)) if found is None else np.where(found.determinate, found.force, np.nan)
+        unknown = np.full((len(self.mechanism.contacts), 3), np.nan)
+        return unknown if found is None else np.where(found.determinate, found.force, np.nan)
 
     @cached_property
     def first_named(self) -> FloatArray:
@@ -295,8 +308,9 @@ class MechanismElement:
     @cached_property
     def _first(self) -> dict[str, Any]:
         start = self.mechanism.start()
-        if not self.mechanism.contacts:
-            return self._equations.sample(*start)
+        if not self.mechanism.contacts or self._undecided:
+            found = self._equations.sample(*start)
+            return found | {"wrench": np.full_like(found["wrench"], np.nan)} if self._undecided else found
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
         dynamics = ContactDynamics(self.mechanism)

@@ -18,6 +18,7 @@ from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.contacts.acting import OPEN
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
@@ -76,7 +77,10 @@ class Spheres(Redundant):
         for contact in mechanism.contacts:
             _check(contact)
         dynamics = ContactDynamics(mechanism)
-        start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
+        try:
+            start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
+        except Refused:  # no law says what presses
+            start = dynamics.solve(*mechanism.start(), (OPEN,) * len(mechanism.contacts))
         lacking = 0.0
         for number, contact in enumerate(mechanism.contacts):
             each = start.state.touching[number]

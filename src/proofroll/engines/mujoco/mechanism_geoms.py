@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.engines.mujoco import mechanism
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.mechanism_contacts import Contacts, check_contacts
@@ -109,7 +109,7 @@ class MujocoGeoms(MujocoMechanism):
             size = float(np.abs(wanted).max()) or np.finfo(float).tiny
             rest = load / float(np.abs(hard["acceleration"]).max() or np.finfo(float).tiny)
             difference = float(np.abs(wanted - getattr(found, name)).max()) / size
-            softened[name] = Regularised(_MARGIN * difference + rest, _SOFT)
+            softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
             if softened[name].tolerance > CAPS["acceleration"].tolerance:
                 unsaid[name] = None  # the first step of a hop tells nothing of the model
         return replace(found, **told, **unsaid, regularised=softened)

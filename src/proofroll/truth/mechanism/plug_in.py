@@ -9,11 +9,14 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
+from proofroll.core.errors import Refused
 from proofroll.core.events import with_events
+from proofroll.core.observable import Role
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES
 from proofroll.elements.mechanism.dataset import columns
 from proofroll.elements.mechanism.element import MechanismElement
-from proofroll.elements.mechanism.named_forces import FIELDS
+from proofroll.elements.mechanism.named_forces import FIELDS, named_forces
+from proofroll.elements.mechanism.placed import Placed
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +29,7 @@ _BARS = {
     "contact_forces": "pressed", "penetration": "p_WB", "contact_pull": "pressed", "cone_excess": "pressed",
     "hop_speed": "v_WB", "energy_gain": "energy",
 }  # fmt: skip
+_POSES = ("p_WB", "v_WB", "w_WB", "q_WB")
 _PREFIXES = {"q.": "q", "v.": "v", "force.": "wrench", "torque.": "wrench"}
 _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
@@ -40,13 +44,18 @@ class MechanismTruth:
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`."""
+        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`; of contacts without one, their laws alone."""
         # a third of a second, which no ball needs
         from proofroll.truth.mechanism.singular_poses import branching
         from proofroll.truth.mechanism.switched_truth import truth_of
 
         assert isinstance(element, MechanismElement)  # it covers it
-        found = truth_of(element.mechanism, times)
+        try:
+            found = truth_of(element.mechanism, times)
+        except Refused as error:
+            if not element.mechanism.contacts:
+                raise
+            return _laws_alone(element, times, str(error))
         record = found.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
         pressed = np.zeros((len(times), 0, 3)) if found.pressed is None else found.pressed
@@ -86,6 +95,21 @@ class MechanismTruth:
         if any(said):
             dataset.attrs["ill_posed"] = "; ".join(filter(None, said))
         return with_events(dataset, found.events) if found.events or element.mechanism.contacts else dataset
+
+
+def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:
+    """Truth of a motion that is not unique: zero for what breaks no law, and nothing else is known."""
+    mechanism, count = element.mechanism, len(times)
+    resting = Placed(mechanism, times, *(np.repeat(getattr(element.start, name), count, axis=0) for name in _POSES))
+    wrench, pressed = np.zeros((count, 2, len(mechanism.connections), 3)), np.zeros((count, len(mechanism.contacts), 3))
+    dataset = columns(element, resting, wrench, pressed, np.zeros((count, len(named_forces(mechanism))))).dataset()
+    laws = {item.name for item in element.observables if item.role is Role.RESIDUAL and not item.hangs_on_events}
+    for name, variable in list(dataset.data_vars.items()):
+        if np.issubdtype(variable.dtype, np.floating):
+            dataset[name] = variable.copy(data=np.full(variable.shape, 0.0 if name in laws else np.nan))
+            dataset[name].attrs["error_bar"] = 0.0
+    dataset.attrs |= {"route": "laws of contact alone", "second_route": "", "ill_posed": reason}
+    return with_events(dataset, ())
 
 
 def _bar_of_a_law(name: str, element: MechanismElement, bars: Mapping[str, FloatArray]) -> float | None:

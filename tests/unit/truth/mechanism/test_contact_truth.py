@@ -13,6 +13,7 @@ import pytest
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.observable import Role
+from proofroll.core.plugins import load_engine
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
@@ -287,6 +288,24 @@ def test_a_rod_that_leans_against_its_slip_has_no_truth() -> None:
     with pytest.raises(Refused, match="not unique or not possible \\(Painlevé\\)"):
         truth_of(mechanism_of("painleve_rod"), np.array([0.0, 0.01]))
     motion("painleve_rod", [0.0, 0.01], friction=0.5)
+
+
+def test_what_has_no_truth_is_held_to_the_laws_of_contact_alone() -> None:
+    """Where no law says what follows, nothing is known of the motion, and what breaks a law of contact is an error."""
+    scene = load_scene("painleve_rod")
+    found = truth(scene, np.array([0.0, 0.01]))
+    assert "Painlevé" in found.attrs["ill_posed"]
+    (element,) = scene.elements
+    laws = {"penetration", "cone_excess", "energy_gain", "natural_map"}
+    judged = element.observe(found)
+    assert laws <= set(judged)
+    assert not {"positions", "v_WB", "normal_forces", "gaps"} & set(judged)
+    assert all(np.all(values == 0.0) for name, values in judged.items() if name in laws)
+    for engine, formulation in (("mujoco", "geoms"), ("pinocchio", "impulses")):
+        plugin = load_engine(engine)
+        run = plugin.build(scene, plugin.presets[formulation]["matched"])
+        lines = element.certify(run.built(), run.sample())  # what contacts do first is asked of none
+        assert [str(line) for line in lines if not line.holds] == []
 
 
 def test_residuals_of_the_truth_are_within_their_bars() -> None:
