@@ -15,7 +15,6 @@ import numpy as np
 
 from proofroll.core.arrays import cross
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
 from proofroll.core.integrators import Accept
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
@@ -24,15 +23,13 @@ from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.engines.projection.alternating import SETTLED, AlternatingMotion, Excess
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
-from proofroll.engines.projection.joint_modes import SETTLED
 from proofroll.engines.projection.stepping import Stepper
 
-_WITHOUT_PROGRESS = 20  # switches in a row at one time, which are an endless loop
 _RANK = 1e-10  # of the largest singular value: rows of contacts that depend on each other
-_ULPS = 4  # of the time, to which switches are located
 _STILL = 1e-9  # m/s: digits of a file, by which what touches may slide at the start
 _REST = 1e-2  # of what gravity makes in a fixed step: slips as slow as this end with another that ends
 
@@ -53,14 +50,10 @@ class ContactsThere(NamedTuple):
     rate: Array
 
 
-class ContactMotion:
-    """Motion of a tree whose bodies touch.
+class ContactMotion(AlternatingMotion[ContactMode]):
+    """Motion of a tree whose bodies touch; a state ends with the time."""
 
-    Attributes:
-        t, x: present time [s] and state; in what follows a state ends with the time.
-        mode: of each contact.
-        events: so far.
-    """
+    alternates = "contacts"
 
     def __init__(
         self,
@@ -71,33 +64,19 @@ class ContactMotion:
         step: float,
     ) -> None:
         """Takes the size of a fixed ``step`` [s]; 0: it adapts."""
-        self._equations, self._stepper = equations, stepper
-        self._accept: Accept = lambda t, y: np.append(accept(t, y[:-1]), y[-1])
+        super().__init__(equations, stepper, accept)
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._faint = max(_STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
-        self._fastest: dict[int, float] = {}
-        self._idle, self.events = 0, list[Event]()
         start = np.append(equations.start, 0.0)
         now = self.at(start)
         closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= _STILL for each in now.touching]
         still = [bool(np.linalg.norm(each.slide) <= _STILL) for each in now.touching]
         self._enter(0.0, start, self._decided(now, closed, still))
 
-    @property
-    def t(self) -> float:
-        """Present time [s]."""
-        return self._stepper.t
-
-    @property
-    def x(self) -> Array:
-        """State now, without the time."""
-        return self._stepper.y[:-1]
-
     def at(self, y: Array) -> ContactsThere:
         """Contacts at a state, with what forces do to them."""
-        equations, spaces, x = self._equations, list[Space](), y[:-1]
-        equations.applied.now = float(y[-1])
+        equations, spaces, x = self._equations, list[Space](), self._at(y)
 
         def closing(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
             spaces.append(space)
@@ -208,26 +187,7 @@ class ContactMotion:
     def _rates(self, y: Array) -> Array:
         now = self.at(y)
         load = np.einsum("kin,ki->n", now.J, self.forces(now, self.mode))
-        return np.append(self._equations.rates(y[:-1], load), 1.0)
-
-    def advance(self, t: float) -> None:
-        """Moves to time t [s].
-
-        Raises:
-            Diverged: modes alternate without end, or the integration gave up.
-        """
-        stepper = self._stepper
-        stepper.aim(t)
-        while stepper.t < t:
-            stepper.step(t, np.inf)
-            ends = [
-                self._crossing(k, kind) for k, kind, excess, moves in self._excess(stepper.y) if excess > 0 and moves
-            ]
-            if ends:
-                self._switch(*min(ends))
-            else:
-                self._idle = 0
-                self._look(stepper.y)
+        return self._equations.rates(y[:-1], load)
 
     def _look(self, y: Array) -> None:
         """Keeps the directions of slips, to know when one has turned."""
@@ -240,40 +200,26 @@ class ContactMotion:
         x, self.mode = self._settled(x, mode), mode
         self._toward = [np.array(own.heading or (0.0, 0.0, 0.0)) for own in mode]
         self._look(x)
-        self._stepper.begin(t, x, self._rates, self._accept, np.ones(len(x)))
+        super()._enter(t, x, mode)
 
-    def _excess(self, x: Array) -> list[tuple[int, str, float, bool]]:
-        """Excess of each mode over each of its ends, and whether it moves towards it."""
+    def _excess(self, x: Array) -> list[Excess]:
         now = self.at(x)
-        force, found = self.forces(now, self.mode), list[tuple[int, str, float, bool]]()
+        force, found = self.forces(now, self.mode), list[Excess]()
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
-                found.append((k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
+                found.append(Excess(k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
                 continue
             N = float(each.normal @ force[k])
-            found.append((k, "lift_off", -N, True))
+            found.append(Excess(k, "lift_off", -N, True))
             if own.kind == "slip" and self.friction[k]:
-                found.append((k, "still", -float(across(each) @ self._toward[k]), True))
+                found.append(Excess(k, "still", -float(across(each) @ self._toward[k]), True))
             elif own.kind == "stick":
                 T = float(np.linalg.norm(force[k] - N * each.normal))
-                found.append((k, "slip", T - self.friction[k] * N, True))
+                found.append(Excess(k, "slip", T - self.friction[k] * N, True))
         return found
 
-    def _crossing(self, k: int, kind: str) -> tuple[float, int, str]:
-        """Time just after a mode ended within the last step, with its contact and end."""
-
-        def margin(x: Array) -> float:
-            return -next(excess for contact, end, excess, _ in self._excess(x) if (contact, end) == (k, kind))
-
-        now = self._stepper.t
-        return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1], k, kind
-
-    def _switch(self, t: float, k: int, kind: str) -> None:
-        stepper = self._stepper
-        self._idle = self._idle + 1 if t <= stepper.t_before else 0
-        if self._idle > _WITHOUT_PROGRESS:
-            raise Diverged(f"contacts alternate without end at t = {t:.6g} s")
-        x, was, happened = stepper.inside(t), self.mode, list[tuple[str, str]]()
+    def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
+        was, happened = self.mode, list[tuple[str, str]]()
         now, closed = self.at(x), [own.kind != "open" for own in was]
         still = [own.kind == "stick" for own in was]
         if kind == "impact":
@@ -288,9 +234,7 @@ class ContactMotion:
         for own, before, contact in zip(mode, was, self.contacts, strict=True):
             if own.kind != before.kind and (contact.name not in {name for _, name in happened} or own.kind == "stick"):
                 happened.append(("lift_off" if own.kind == "open" else own.kind, contact.name))
-        low = max(stepper.t_before, t - _ULPS * float(np.spacing(t)))
-        self.events += [Event(each, t, *stepper.bracket(low, t), name) for each, name in happened]
-        self._enter(t, x, mode)
+        return x, mode, happened
 
     def _leaving(self, now: ContactsThere, k: int) -> ContactMode:
         """The mode with a contact that slips from now on, against the friction that held it."""

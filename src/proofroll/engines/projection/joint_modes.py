@@ -1,8 +1,7 @@
 """Dry friction, stops and limits of efforts: which law holds, when that ends, and what comes next.
 
-A joint that is held is locked: a row more of the constraints, whose multiplier is the force that holds it. Between two
-switches the equations are smooth; a switch is located within a step by shorter steps of the same method, so that it is
-as accurate as these. Of joints at rest, those that hold follow from a quadratic program with bounds.
+A joint that is held is locked: a row more of the constraints, whose multiplier is the force that holds it. Of joints at
+rest, those that hold follow from a quadratic program with bounds.
 """
 
 from __future__ import annotations
@@ -12,31 +11,27 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.errors import Diverged, Refused
-from proofroll.core.events import Event
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, switched_joints
+from proofroll.engines.projection.alternating import SETTLED, AlternatingMotion, Excess
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.stepping import Stepper
 
-# Speed of an impact, over that of the first one of this joint, below which what is left of the rebounds is left out.
-SETTLED = 1e-6
-# A mode that ends where it started is possible; as many in a row as this are an endless loop.
-_WITHOUT_PROGRESS = 20
-_ULPS = 4  # of the time, to which switches are located
 _DEPENDENT = 1e-12  # of the largest response: directions that respond less hold one degree of freedom together
 
 
-class SwitchedMotion:
+class SwitchedMotion(AlternatingMotion[Mode]):
     """Motion of a mechanism with joints that rub or have stops, efforts that have limits, or drives with breaks.
 
     Attributes:
         mode: of each switched joint, then of each effort with a limit.
-        events: of impacts, sticking, slipping and limits, so far.
     """
+
+    alternates = "friction, stops and limits of efforts"
 
     def __init__(
         self,
@@ -45,28 +40,15 @@ class SwitchedMotion:
         stepper: Stepper,
         accept: Callable[[float, Array, Sequence[int]], Array],
     ) -> None:
-        self._equations, self._stepper, self._accept = equations, stepper, accept
-        self._joints, self._breaks = switched_joints(mechanism), breaks(mechanism.signals)
+        super().__init__(equations, stepper, lambda t, x: accept(t, x, self._held), breaks(mechanism.signals))
+        self._joints = switched_joints(mechanism)
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
-        self._fastest: dict[int, float] = {}
-        self._idle = 0
-        self.events: list[Event] = []
         self.mode: Mode = ("free",) * len(self._joints)
         start = np.append(equations.start, 0.0)
         q, v = self._joint_state(start)
         for k, joint in enumerate(self._joints):  # a start at a stop is known to digits of a file
             q[k] = np.clip(q[k], joint.low, joint.high)
         self._enter(0.0, start, self._decided(start, q, v))
-
-    @property
-    def t(self) -> float:
-        """Present time [s]."""
-        return self._stepper.t
-
-    @property
-    def x(self) -> Array:
-        """State now."""
-        return self._stepper.y[:-1]
 
     def solve(self, y: Array | None = None) -> SolvedState:
         """Equations of motion in the present mode, now or at a state with its time."""
@@ -83,11 +65,6 @@ class SwitchedMotion:
             found["friction"][joint.number], found["stop"][joint.number] = on
         return found
 
-    def _at(self, y: Array) -> Array:
-        """The state without its time, to which drives are set."""
-        self._equations.applied.now = float(y[-1])
-        return y[:-1]
-
     def _holding(self, solved: SolvedState) -> dict[int, float]:
         """Forces that hold joints, by their numbers among the switched ones."""
         return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=False))
@@ -99,42 +76,14 @@ class SwitchedMotion:
             load[joint.velocity] = joint.push(own)
         return load
 
-    def advance(self, t: float) -> None:
-        """Moves to time t [s].
-
-        Raises:
-            Diverged: modes alternate without end, or the integration gave up.
-        """
-        stepper = self._stepper
-        stepper.aim(t)
-        while stepper.t < t:
-            until = min([t, *(at for at in self._breaks if at > stepper.t)])
-            stepper.step(until, np.inf)
-            ends = [
-                self._crossing(k, kind)
-                for k, kind, excess, closing in self._excess(stepper.y)
-                if excess > 0 and closing
-            ]
-            if ends:
-                self._switch(*min(ends))
-                continue
-            self._idle = 0
-            if stepper.t in self._breaks:
-                self._enter(stepper.t, stepper.y, self.mode)
-
     def _enter(self, t: float, y: Array, mode: Mode) -> None:
-        self.mode, equations, load = mode, self._equations, self._load(mode)
-        self._held = held = [self._joints[number].velocity for number in held_by(mode)]
-        equations.applied.modes = dict(zip(self._motors, mode[len(self._joints) :], strict=True))
+        self._held = [self._joints[number].velocity for number in held_by(mode)]
+        self._push = self._load(mode)
+        self._equations.applied.modes = dict(zip(self._motors, mode[len(self._joints) :], strict=True))
+        super()._enter(t, y, mode)
 
-        def accept(at: float, y: Array) -> Array:
-            x = self._at(y)
-            accepted = self._accept(at, x, held)
-            return y if accepted is x else np.append(accepted, y[-1])
-
-        self._stepper.begin(
-            t, y, lambda y: np.append(equations.rates(self._at(y), load, held), 1.0), accept, np.ones(len(y))
-        )
+    def _rates(self, y: Array) -> Array:
+        return self._equations.rates(self._at(y), self._push, self._held)
 
     def _joint_state(self, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities of the switched joints, where held exactly."""
@@ -192,8 +141,8 @@ class SwitchedMotion:
                 v[k] = 0.0
         return change
 
-    def _excess(self, y: Array) -> list[tuple[int, str, float, bool]]:
-        """Excess of each mode over each of its ends, and whether it moves towards it.
+    def _excess(self, y: Array) -> list[Excess]:
+        """Excess of each mode over each of its ends.
 
         ``up``, ``down``: the force that holds is beyond its bound, and the joint moves so; ``still``: a joint that
         moves against friction has turned; ``low``, ``high``: it is beyond a stop; ``least``, ``linear``, ``greatest``:
@@ -201,40 +150,27 @@ class SwitchedMotion:
         """
         q, v = self._joint_state(y)
         forces = self._holding(self.solve(y)) if self._held else {}
-        found = []
+        found = list[Excess]()
         for k, joint in enumerate(self._joints):
             own, place, rate = self.mode[k], float(q[k]), float(v[k])
             if k in forces:
                 low, high = joint.bounds(own)
-                found += [(k, "up", low - forces[k], True), (k, "down", forces[k] - high, True)]
+                found += [Excess(k, "up", low - forces[k], True), Excess(k, "down", forces[k] - high, True)]
                 continue
             if own != "free":
-                found.append((k, "still", -rate if own == "forward" else rate, True))
-            found += [(k, "low", joint.low - place, rate < 0), (k, "high", place - joint.high, rate > 0)]
+                found.append(Excess(k, "still", -rate if own == "forward" else rate, True))
+            found += [Excess(k, "low", joint.low - place, rate < 0), Excess(k, "high", place - joint.high, rate > 0)]
         efforts = zip(self._motors.values(), self._equations.wanted(self._at(y)), strict=True)
         for k, (motor, wanted) in enumerate(efforts, len(self._joints)):
             over, under = wanted - motor.bound, -motor.bound - wanted
             if self.mode[k] == "linear":
-                found += [(k, "least", under, True), (k, "greatest", over, True)]
+                found += [Excess(k, "least", under, True), Excess(k, "greatest", over, True)]
             else:
-                found.append((k, "linear", -over if self.mode[k] == "greatest" else -under, True))
+                found.append(Excess(k, "linear", -over if self.mode[k] == "greatest" else -under, True))
         return found
 
-    def _crossing(self, k: int, kind: str) -> tuple[float, int, str]:
-        """Time just after a mode ended within the last step, with that mode's number and end."""
-
-        def margin(y: Array) -> float:
-            return -next(excess for number, end, excess, _ in self._excess(y) if (number, end) == (k, kind))
-
-        now = self._stepper.t
-        return self._stepper.crossing(margin, now, _ULPS * float(np.spacing(now)))[1], k, kind
-
-    def _switch(self, t: float, k: int, kind: str) -> None:
-        stepper = self._stepper
-        self._idle = self._idle + 1 if t <= stepper.t_before else 0
-        if self._idle > _WITHOUT_PROGRESS:
-            raise Diverged(f"friction, stops and limits of efforts alternate without end at t = {t:.6g} s")
-        y, was, happened = stepper.inside(t), self.mode, list[tuple[str, str]]()
+    def _next(self, y: Array, k: int, kind: str) -> tuple[Array, Mode, list[tuple[str, str]]]:
+        was, happened = self.mode, list[tuple[str, str]]()
         if k >= len(self._joints):
             motor = list(self._motors.values())[k - len(self._joints)]
             happened = [("release" if kind == "linear" else "saturate", motor.name)]
@@ -247,11 +183,7 @@ class SwitchedMotion:
         # a joint that stays where it hit has come to rest by its impact
         named = {name for _, name in happened}
         happened += [item for item in changes(self._joints, was, mode) if item[1] not in named]
-        self.events += [
-            Event(each, t, *stepper.bracket(max(stepper.t_before, t - _ULPS * float(np.spacing(t))), t), name)
-            for each, name in happened
-        ]
-        self._enter(t, y, mode)
+        return y, mode, happened
 
     def _stopped(self, y: Array, k: int, kind: str) -> tuple[Array, Mode]:
         """State and mode after a joint has turned (``still``) or hit a stop."""

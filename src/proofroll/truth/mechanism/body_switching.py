@@ -13,13 +13,7 @@ from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint, changes, left_by
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_switching import (
-    SETTLED,
-    effort_event,
-    guard_values,
-    guards_of,
-    noise_of,
-)
+from proofroll.truth.mechanism.joint_switching import SETTLED, effort_event, guard_values, guards_of, noise_of
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.mechanism.stretches import Stretches, StretchLaw

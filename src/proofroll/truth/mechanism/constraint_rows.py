@@ -9,20 +9,7 @@ from typing import Any
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars, GeneralBody, Planar
 from proofroll.truth.mechanism.rolling_rows import RollingContact
-from proofroll.truth.scalars import (
-    Scalar,
-    add,
-    cross,
-    dot,
-    is_zero,
-    minus,
-    mul,
-    plus,
-    product,
-    scaled,
-    sub,
-    turned,
-)
+from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
 _NONE = (0.0, 0.0, 0.0)
 _Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]

@@ -8,24 +8,13 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from proofroll.core.errors import Refused
-from proofroll.elements.mechanism.contacts.acting import (
-    OPEN,
-    Acting,
-    ContactMode,
-    Direction,
-    across,
-    acting,
-)
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, across, acting
 from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
-from proofroll.truth.mechanism.contact_guards import (
-    AT_REST,
-    STOPPED,
-    striking,
-)
+from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, held
 from proofroll.truth.mechanism.joint_switching import SETTLED
 from proofroll.truth.mechanism.maximal_coordinates import RANK

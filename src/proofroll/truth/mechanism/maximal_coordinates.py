@@ -24,11 +24,7 @@ from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
-from proofroll.truth.mechanism.maximal_equations import (
-    ConstrainedEquations,
-    MaximalEquations,
-    Switched,
-)
+from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations, Switched
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 from proofroll.truth.mechanism.rolling_rows import RollingContact
 

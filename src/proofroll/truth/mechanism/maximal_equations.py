@@ -23,20 +23,7 @@ from proofroll.elements.mechanism.signal import value_at
 from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.mechanism.rolling_rows import RollingContact
-from proofroll.truth.scalars import (
-    Scalar,
-    add,
-    cross,
-    dot,
-    is_zero,
-    minus,
-    mul,
-    plus,
-    product,
-    scaled,
-    sub,
-    turned,
-)
+from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for name in SMOOTH}
 _NONE = (0.0, 0.0, 0.0)

@@ -1,0 +1,61 @@
+"""Motions of the projection method that go from mode to mode: where a mode ends, and what ends the run."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Diverged
+from proofroll.engines.projection.alternating import AlternatingMotion, Excess
+from proofroll.engines.projection.contact_modes import ContactMotion
+from proofroll.engines.projection.joint_modes import SwitchedMotion
+from proofroll.engines.projection.stepping import STEPPERS
+
+
+class Bouncing(AlternatingMotion[str]):
+    """A point that falls from 1 m and leaves the ground with half its speed, or with none."""
+
+    alternates = "bounces"
+
+    def __init__(self, stepper: Any, part: float) -> None:
+        equations: Any = SimpleNamespace(applied=SimpleNamespace(now=0.0))
+        super().__init__(equations, stepper, lambda _, x: x)
+        self._part = part
+        self._enter(0.0, np.array([1.0, 0.0, 0.0]), "flies")
+
+    def _rates(self, y: Any) -> Any:
+        return np.array([y[1], -9.81])
+
+    def _excess(self, y: Any) -> list[Excess]:
+        return [Excess(0, "impact", -float(y[0]), float(y[1]) < 0)]
+
+    def _next(self, y: Any, which: int, kind: str) -> tuple[Any, str, list[tuple[str, str]]]:
+        assert (which, kind) == (0, "impact")
+        after = [0.0 if self._part else -1e-12, -self._part * y[1], y[2]]
+        return np.array(after), "flies", [("impact", "ground")]
+
+
+@pytest.mark.parametrize(("name", "resolution"), [("rk4", 1e-2), ("dop853", 1e-10)])
+def test_a_mode_ends_where_its_margin_does(name: str, resolution: float) -> None:
+    """Impacts are located far below the step, and each has its time in its bracket."""
+    motion = Bouncing(STEPPERS[name](resolution), 0.5)
+    motion.advance(1.0)
+    fall = np.sqrt(2 / 9.81)
+    assert [event.time for event in motion.events] == pytest.approx([fall, 2 * fall], rel=1e-10)
+    assert all(event.time_low <= event.time <= event.time_high for event in motion.events)
+    assert {event.name for event in motion.events} == {"ground"}
+
+
+def test_modes_that_end_at_once_end_the_run() -> None:
+    """Twenty changes without any progress are an endless loop."""
+    with pytest.raises(Diverged, match="bounces alternate without end"):
+        Bouncing(STEPPERS["dop853"](1e-10), 0.0).advance(1.0)
+
+
+def test_joints_and_contacts_go_from_mode_to_mode_alike() -> None:
+    """Steps, search and events stand once for switched joints and for contacts."""
+    for name in ("advance", "_crossing", "_switch"):
+        assert getattr(SwitchedMotion, name) is getattr(ContactMotion, name) is getattr(AlternatingMotion, name)
