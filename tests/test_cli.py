@@ -351,7 +351,27 @@ def test_an_engine_of_which_there_is_no_row(proofroll: Proofroll, tmp_path: Path
     code, out, err = proofroll(command, str(tmp_path / "claim.toml"), *engines, "--out", str(tmp_path))
     assert code == 0
     assert "oracle" in out
-    assert err.count("proofroll: mujoco is left out of claim: no row is of it\n") == 1
+    assert (
+        err.count(
+            "proofroll: mujoco is left out of claim: no row is of it; proofroll new comparison writes a file with one\n"
+        )
+        == 1
+    )
+
+
+def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_path: Path) -> None:
+    """It means the comparison, and a line names engines without a row; with a budget or parameters, the scene."""
+    given = ["compare", "heavy_top", "--out", str(tmp_path)]
+    code, _, err = proofroll(*given, "--engine", "oracle")
+    assert code == 2
+    assert "heavy_top is the comparison of that name, which has no row of " in err
+    assert "the scene alone, with every engine: proofroll compare heavy_top --budget 60" in err
+    assert "proofroll new comparison writes a file with others" in err
+    for scene in (["--budget", "1"], ["--set", "mass=2"]):
+        code, _, err = proofroll(*given, "--engine", "oracle", *scene)
+        assert code == 2
+        assert "heavy_top compares " in err
+        assert "is the comparison" not in err
 
 
 # The paper's case, and one that slips early, in an engine that locates its events.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -204,6 +205,23 @@ def test_curves_of_another_version_are_not_answered_from(
     assert code == 2
     assert "mujoco 1.0 then" in err
     assert "--measure" in err
+
+
+def test_json_needs_no_library_of_pages(
+    proofroll: Proofroll, measured: TradeoffStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """JSON of a trade-off is there without matplotlib, and nothing is drawn; beside tables there is a diagram."""
+    monkeypatch.setattr(
+        sys.modules["proofroll.cli.tradeoff"], "measure", lambda *_: (measured, tmp_path / "study.json")
+    )
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "matplotlib" else name)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    given = ("tradeoff", "sphere_in_cylinder", "--until", "0.5", "--out", str(tmp_path))
+    code, out, err = proofroll(*given, "--json")
+    assert (code, err) == (0, "")
+    assert json.loads(out)["points"]
+    assert not list(tmp_path.glob("*.svg"))
+    assert proofroll(*given)[0] == 3
 
 
 def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:

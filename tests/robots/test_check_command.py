@@ -167,6 +167,11 @@ def test_what_is_no_number(proofroll: Proofroll, tmp_path: Path) -> None:
     code, out, err = proofroll("check", str(path), "--engine", "mujoco", "--states", "1")
     assert (code, out) == (2, "")
     assert "robot.xml: armature of k1 = 'nan': numbers must be finite" in err
+    joints = '<equality><joint joint1="k1" joint2="k2" polycoef="0 nan 0 0 0"/></equality></mujoco>'
+    path.write_text(mjcf().replace("</mujoco>", joints))
+    code, out, err = proofroll("check", str(path), "--engine", "mujoco", "--states", "1")
+    assert (code, out) == (2, "")
+    assert "robot.xml: multiplier of k1 = 'nan': numbers must be finite" in err
 
 
 def test_nothing_moves(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -70,10 +70,11 @@ def asked(
         InputError: there is neither, or something was given for a scene and this is a comparison, which has its own.
     """
     from proofroll.core.errors import InputError
+    from proofroll.core.plugins import engine_names, parse_engine
     from proofroll.files.comparison_file import load_comparison
-    from proofroll.files.scene_file import means_scene
+    from proofroll.files.scene_file import is_scene, means_scene
 
-    if means_scene(name):
+    if means_scene(name, alone=bool(budget or parameters)):
         from proofroll.studies.comparison.default_comparison import BUDGET, compared
 
         if budget and scheduler:
@@ -83,7 +84,12 @@ def asked(
         raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
     if parameters:
         raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
-    return load_comparison(name)
+    loaded = load_comparison(name)
+    lacking = sorted(set(engine_names()) - {parse_engine(row.engine).name for row in loaded.rows})
+    if lacking and is_scene(name):
+        rows = f"{name} is the comparison of that name, which has no row of {', '.join(lacking)}"
+        options.complain(f"{rows}; the scene alone, with every engine: proofroll compare {name} --budget 60")
+    return loaded
 
 
 def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
@@ -96,7 +102,8 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
     for name, either in asked_for.items():
         without = [found for found, known in rows.items() if known & wanted and not known & either]
         if without:
-            options.complain(f"{name} is left out of {', '.join(without)}: no row is of it")
+            said = f"{name} is left out of {', '.join(without)}: no row is of it"
+            options.complain(f"{said}; proofroll new comparison writes a file with one")
 
 
 def outcomes_of(

@@ -52,10 +52,12 @@ def tradeoff(
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
-    options.require_pages()
+    if not as_json:
+        options.require_pages()
     study, path = measure(question, engine or [], ranges, claims, options.new_runner(out, fresh, jobs, scheduler), out)
     shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
-    write_text(path.with_suffix(".svg"), svg(study, shown))
+    if not as_json:
+        write_text(path.with_suffix(".svg"), svg(study, shown))
     options.show(study, as_json, lambda: tradeoff_parts(study, shown, path, every_point=every_point))
     raise typer.Exit(options.CONTRADICTED if study.claims.contradictions else options.OK)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.engine import EPSILON
 from proofroll.core.number_format import number
 
 # A ladder is asymptotic if its observed order is the scheme's to this much.
@@ -27,6 +28,9 @@ _ONE_SHAPE = 0.3
 _GROWS = 22**0.5
 # A floor of single precision is below this part of the motion, and shorter steps are so many times worse.
 _LARGE, _WORSE = 0.1, 1.5
+# Runs that differ by more than this many times their round-off show orders as in doubles: seen are 0.6 of it, and 50
+# where each of 40,000 steps rounds the same way.
+_FAR_ABOVE = 100.0
 # Differences that shrink more slowly than this say nothing about a limit.
 _NO_CONVERGENCE = 0.25
 
@@ -44,7 +48,8 @@ class Limit:
         saturated: whether two tolerances gave the same run: something else limits its steps, as samples at which they
             end, and no limit of small ones follows.
         beside: what one step beside its events does to the finest curve (:mod:`proofroll.core.beside_events`).
-        floor: what ends the refinement instead of a limit, as a clause; empty: nothing does.
+        rounded: whether the differences are so near to the round-off of single precision that no order shows.
+        floor: of single precision that ends the refinement, as a clause; empty: none does.
     """
 
     values: FloatArray
@@ -53,11 +58,12 @@ class Limit:
     shown: bool = True
     saturated: bool = False
     beside: float = 0.0
+    rounded: bool = False
     floor: str = ""
 
 
 def richardson(
-    curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None, precision: str = "double"
+    curves: Sequence[FloatArray], steps: Sequence[float], declared: int | None = None, scatter: float = 0.0
 ) -> Limit:
     """Extrapolates three curves computed with three steps, coarse first.
 
@@ -68,14 +74,14 @@ def richardson(
     rounding of that order changes, too. Elsewhere extrapolating would spread the error of the coarse curves; the finest
     curve stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
 
-    In single precision each step rounds the state, so that smaller steps may be worse: there an order is that of an
-    asymptotic ladder of one shape, and any other shows neither an order nor a limit.
+    In single precision each step rounds the state, so that smaller steps may be worse. Unless the differences are far
+    above that scatter, an order is that of an asymptotic ladder of one shape; any other shows neither order nor limit.
 
     Args:
         curves: three arrays of one shape.
         steps: their steps, falling; only the ratios matter.
         declared: order of the scheme; None: the nearest integer to the observed one.
-        precision: of the arithmetic, see :func:`proofroll.core.engine.precision_of`.
+        scatter: of one run, see :func:`scatter_of`.
     """
     coarse, middle, fine = curves
     h = np.asarray(steps, dtype=np.float64) / steps[-1]
@@ -83,8 +89,10 @@ def richardson(
     if last == 0:  # exact, or told in steps that are coarser than what the refinement changed
         return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
-    if precision == "single" and not _one_law(order, declared, (middle - coarse) / first, (fine - middle) / last):
-        return Limit(fine, max(first, last, _walked(middle - coarse, fine - middle)), float("nan"), False)
+    one_law = _one_law(order, declared, (middle - coarse) / first, (fine - middle) / last) if first else False
+    if min(first, last) <= _FAR_ABOVE * scatter and not one_law:
+        bar = max(first, last, _walked(middle - coarse, fine - middle))
+        return Limit(fine, bar, float("nan"), shown=False, rounded=True)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:
         # The finest curve, as uncertain as the largest change seen; from one that vanishes at once no order follows.
         shown = last < first * (h[1] / h[0]) ** _NO_CONVERGENCE
@@ -169,25 +177,36 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
     return Limit(curves[-1], max(last, rest), float("nan"), shown)
 
 
-def floor_text(step: float, error: float, unit: str, worse: bool) -> str:
+def scatter_of(precision: str, size: float, steps: float) -> float:
+    """Round-off that single precision scatters over a run of so many steps, a random walk; zero in doubles.
+
+    ``size`` is that of the curve.
+    """
+    return EPSILON[precision] * size * steps**0.5 if precision == "single" else 0.0
+
+
+def is_floor(best: float, finest: float, scale: float) -> bool:
+    """True if the least error of a refinement is a floor of single precision.
+
+    It is small against the size of the observable, and the shortest step is clearly worse: before the order of a scheme
+    shows, errors may be as large as the motion and rise a little with shorter steps, too.
+    """
+    return best <= _LARGE * scale and finest > _WORSE * best
+
+
+def floor_text(step: float, error: float, unit: str) -> str:
     """Clause about the floor that single precision sets to a refinement.
 
     Args:
         step: with the least error [s].
         error: at that step.
         unit: of the error; 1: none.
-        worse: whether smaller steps than that have been run.
     """
-    if not worse:
-        return "no order shows in single precision"
     return f"best step {number(step)} s, floor {number(error)}{'' if unit == '1' else f' {unit}'}: single precision"
 
 
 def floor_of(errors: Mapping[float, float], scale: float, unit: str) -> str:
-    """Clause about what ends a refinement in single precision; empty where its steps are still too long for any order.
-
-    A floor counts where shorter steps are clearly worse than the best and the best error is small: before the order
-    of a scheme shows, errors may be as large as the motion and rise a little with shorter steps, too.
+    """Clause about the floor of a refinement in single precision; empty if its errors are none.
 
     Args:
         errors: by step [s].
@@ -195,9 +214,7 @@ def floor_of(errors: Mapping[float, float], scale: float, unit: str) -> str:
         unit: of the errors; 1: none.
     """
     best, least = min(errors, key=lambda step: errors[step]), min(errors)
-    if errors[best] > _LARGE * scale:
-        return ""
-    return floor_text(best, errors[best], unit, worse=errors[least] > _WORSE * errors[best])
+    return floor_text(best, errors[best], unit) if is_floor(errors[best], errors[least], scale) else ""
 
 
 def size(values: FloatArray) -> float:

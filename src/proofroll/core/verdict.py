@@ -76,6 +76,7 @@ class Judgement:
         limit: what the ladder says, see :class:`LimitResult`.
         reason: why this verdict, as a clause with numbers.
         remarks: what a reader must know though it does not change the verdict, one clause each.
+        floor: of single precision that ends the refinement, as a clause; empty: none does.
     """
 
     observable: str
@@ -91,6 +92,7 @@ class Judgement:
     limit: LimitResult = LimitResult.NO_LADDER
     reason: str = ""
     remarks: tuple[str, ...] = ()
+    floor: str = ""
 
 
 def judge_curve(
@@ -170,6 +172,7 @@ def judge_curve(
         reason=_reason(verdict, error, tolerance, (truth_error_bar, own_bar), shown_unit, rungs)
         + (f"; at the samples alone {number(on_grid)}{shown_unit}, so the error is between them" if hidden else ""),
         remarks=tuple(remarks),
+        floor=limit.floor if limit else "",
     )
 
 
@@ -215,7 +218,7 @@ def _read(limit: Limit, error: float, tolerance: float, truth_bar: float, round_
         finding = LimitResult.ANOTHER
     shown = limit.shown or limit.error_bar <= _SHOWN_WRONG * round_off
     wrong = shown and finding == LimitResult.WITHIN and error > _SHOWN_WRONG * (bar + round_off) + limit.beside
-    told = "no order" if order is None else f"order {order:.3g}"
+    told = f"no order{' shows in single precision' if limit.rounded else ''}" if order is None else f"order {order:.3g}"
     text = f"off by {number(error)} ± {number(bar, 1)}{unit}, {told}"
     if not np.isfinite(error):
         text = "it has not as many values as the truth"

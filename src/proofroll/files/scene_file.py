@@ -123,9 +123,13 @@ def scene_folder(name: str) -> Path:
     raise InputError("scene", name, f"{missing}; choose one of {', '.join(scene_names())}")
 
 
-def means_scene(name: str) -> bool:
-    """True if a name means a scene; where a comparison has the name too, it means the comparison."""
-    return source_of(name) is not None or (named_file(name) is None and (is_scene(name) or Path(name).is_dir()))
+def means_scene(name: str, *, alone: bool = False) -> bool:
+    """True if a name means a scene; where a comparison has the name too, it means the comparison.
+
+    ``alone``: something was given that is for scenes alone, which decides for the scene.
+    """
+    shared = not alone and named_file(name) is not None
+    return source_of(name) is not None or (not shared and (is_scene(name) or Path(name).is_dir()))
 
 
 def is_scene(name: str) -> bool:

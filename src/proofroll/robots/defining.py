@@ -83,7 +83,8 @@ def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) 
     if "robot" not in told:
         raise InputError("file", file.path, f"it has no meaning: {told['message']}")
     robot = robot_from(told["robot"])
-    for name, part in (*robot.bodies.items(), *((joint.name, joint) for joint in robot.joints)):
+    joints = ((item.name, item) for item in robot.joints)
+    for name, part in (*robot.bodies.items(), *joints, *((item.joint, item) for item in robot.mimics)):
         for key, value in vars(part).items():
             endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
             if endless and key not in {"lower", "upper"}:  # which most joints have not

@@ -156,7 +156,7 @@ def test_changes_of_round_off_are_no_slow_convergence(ratio: float) -> None:
     ("errors", "told"),
     [
         ({4e-3: 0.49, 2e-3: 0.51, 1e-3: 0.513}, ""),  # Euler on a top: as large as the motion in doubles, too
-        ({4e-3: 3e-4, 2e-3: 2e-5, 1e-3: 2.1e-5}, "no order shows in single precision"),
+        ({4e-3: 3e-4, 2e-3: 2e-5, 1e-3: 2.1e-5}, ""),
         ({4e-3: 1e-5, 2e-3: 2e-6, 1e-3: 9e-6}, "best step 2e-3 s, floor 2e-6 m: single precision"),
     ],
 )

@@ -15,7 +15,7 @@ from single_precision import OnePrecision, Single, SingleSettings
 
 from proofroll.conformance import checks
 from proofroll.core.certificate import certify, first_difference
-from proofroll.core.convergence import richardson
+from proofroll.core.convergence import richardson, scatter_of
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.diagnosis.samples import single_precision_run
 from proofroll.core.engine import precision_of
@@ -31,6 +31,8 @@ from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 
 SCENES = ("pendulum", "double_pendulum", "free_body")
 TIMES = np.linspace(0, 1, 21)
+# Round-off that is told of runs with some noise, which is as large as has been seen beside it.
+SCATTER = 16
 
 
 def first_lie(name: str, **changes: Any) -> str | None:
@@ -103,12 +105,26 @@ def rungs(truncation: float, noise: float, order: int = 4) -> list[np.ndarray]:
 
 def test_no_order_is_fitted_through_a_floor() -> None:
     """Where round-off adds to the last difference neither an order nor a limit is shown; above it both are."""
-    mixed = richardson(rungs(1e-5, 3e-7), (1.0, 0.5, 0.25), 4, "single")
+    mixed = richardson(rungs(1e-5, 3e-7), (1.0, 0.5, 0.25), 4, SCATTER * 3e-7)
     assert np.isnan(mixed.order)
     assert not mixed.shown
-    clear = richardson(rungs(1e-2, 1e-7), (1.0, 0.5, 0.25), 4, "single")
+    clear = richardson(rungs(1e-2, 1e-7), (1.0, 0.5, 0.25), 4, SCATTER * 1e-7)
     assert clear.order == pytest.approx(4, abs=0.1)
     assert clear.shown
+
+
+def test_far_above_round_off_all_is_judged_as_in_doubles() -> None:
+    """Curves of no single law and of a strange order have that order and a limit where round-off is far below them."""
+    strange = [np.cos(TIMES) + 0.1 * h**2.5 * np.sin((3 + h) * TIMES) for h in (1.0, 0.5, 0.25)]
+    steps = (1.0, 0.5, 0.25)
+    scatter = scatter_of("single", 1.0, 2000)
+    found, double = richardson(strange, steps, 4, scatter), richardson(strange, steps, 4)
+    assert (found.order, found.error_bar, found.shown) == (double.order, double.error_bar, double.shown)
+    assert found.shown
+    near = richardson(strange, steps, 4, 100 * scatter)
+    assert near.rounded
+    assert not near.shown
+    assert scatter_of("double", 1.0, 2000) == 0.0
 
 
 @pytest.mark.parametrize(("truncation", "noise"), [(0.0, 1e-6), (1e-5, 1e-6), (1e-5, 1e-5), (1e-3, 1e-7), (1e-3, 1e-5)])
@@ -116,7 +132,7 @@ def test_no_order_is_fitted_through_a_floor() -> None:
 def test_nobody_has_another_limit_by_a_floor(truncation: float, noise: float, tolerance: float) -> None:
     """Round-off that grows with the number of steps is no other limit, at any tolerance."""
     curves = rungs(truncation, noise)
-    limit = richardson(curves, (1.0, 0.5, 0.25), 4, "single")
+    limit = richardson(curves, (1.0, 0.5, 0.25), 4, SCATTER * noise)
     found = judge_curve(
         "x", "m", curves[0], np.cos(TIMES), truth_error_bar=1e-15, tolerance=tolerance, scale=1.0, limit=limit,
         ladder=True, precision="single",
@@ -128,7 +144,7 @@ def test_another_motion_is_another_limit_in_single_precision_too() -> None:
     """A model that is off by a hundredth at every step is told as that, with its order and at its floor."""
     for truncation, noise in ((1e-3, 1e-8), (0.0, 1e-6)):
         curves = [1.01 * curve for curve in rungs(truncation, noise)]
-        limit = richardson(curves, (1.0, 0.5, 0.25), 4, "single")
+        limit = richardson(curves, (1.0, 0.5, 0.25), 4, SCATTER * noise)
         found = judge_curve(
             "x", "m", curves[0], np.cos(TIMES), truth_error_bar=1e-15, tolerance=1e-4, scale=1.0, limit=limit,
             ladder=True, precision="single",
@@ -179,6 +195,7 @@ def test_a_comparison_tells_precision_and_floor(
     assert judged["reason"].endswith("single precision")
     code, out, err = command_line("compare", str(file), "--out", str(tmp_path))
     assert "rk4 matched f32" in out
+    assert "single precision" in out, out
     code, out, err = command_line("run", "free_body", "--engine", "single", "--until", "0.01")
     assert "dt=0.001" in out
     assert "f32)" in out
@@ -223,6 +240,11 @@ def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
     assert floor is not None
     assert floor.best.step == steps[4]
     assert found.envelope("x") == [1e-3, 1e-4, 1e-4, 1e-5, 1e-6, 4e-6, 1e-5]
+    for each in points:  # errors as large as the motion, or hardly worse than the best, are no floor
+        each.scales["x"] = 5e-6
+    assert found.floor("x") is None
+    hardly = [*points[:5], point(steps[5], 1.2e-6, 4e-6 * np.ones(5)), point(steps[6], 1.4e-6, 1e-5 * np.ones(5))]
+    assert dataclasses.replace(found, points=hardly).floor("x") is None
     double: Any = SimpleNamespace(precision="double", resolution="dt")
     assert dataclasses.replace(found, facts=double).envelope("x")[4] == 1e-5
 

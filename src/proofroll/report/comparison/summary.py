@@ -139,13 +139,18 @@ def _why(runs: list[Run]) -> tuple[str, str]:
 
 
 def _remarks(runs: list[Run]) -> list[str]:
-    """Remarks on the runs, and on the observable whose wrong limit is the largest part of its tolerance."""
+    """Remarks on the runs, on the observable whose wrong limit is the largest part of its tolerance, and on a floor."""
     found = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
         where = at_point(run.parameters)
         found += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
+    # beyond its tolerance the reason of the verdict has it
+    floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.error <= item.tolerance]
+    if floors:
+        run, item = max(floors, key=lambda pair: pair[1].error / pair[1].tolerance)
+        found.append(f"{item.observable}{at_point(run.parameters)}: {item.floor}")
     return found
 
 

@@ -39,7 +39,7 @@ def compare(
         InputError: something that was given does not exist or makes no sense.
     """
     workers = Workers()
-    if means_scene(name):
+    if means_scene(name, alone=bool(parameters or budget)):
         comparison = compared(name, parameters, workers, budget or BUDGET)
     elif parameters or budget:
         given = next(iter(parameters), "budget")

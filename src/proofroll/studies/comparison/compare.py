@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.beside_events import beside_events
 from proofroll.core.comparison import Band, Comparison
-from proofroll.core.convergence import Limit, floor_of, richardson, tightest
+from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, size, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
@@ -195,7 +195,7 @@ def _judgements(
             continue
         true, bar = reference.true(name, curve)
         scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
-        limit = _with_floor(run, name, _limit(run, name, curves), curves, true, scale, unit)
+        limit = _with_floor(run, name, _limit(run, name, curves, scale), curves, true, scale, unit)
         judgement = judge_curve(
             name,
             unit,
@@ -235,8 +235,8 @@ def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[st
     return found
 
 
-def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) -> Limit | None:
-    """Limit of small steps, if every rung of the ladder gave the observable."""
+def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], scale: float) -> Limit | None:
+    """Limit of small steps of an observable of some size, if every rung of the ladder gave it."""
     assert isinstance(run.facts, EngineFacts)  # there are curves
     stepped = run.facts.resolution == "dt"
     # of tolerances those that the engine takes
@@ -248,7 +248,10 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]]) 
         return None
     if not stepped:
         return tightest(values)
-    return richardson(values, run.row.ladder, run.facts.order, run.facts.precision)
+    finest = run.ladder[factors[-1]]
+    steps = finest.until / (finest.engine.step or finest.until)
+    scatter = scatter_of(run.facts.precision, max(scale, size(values[-1])), steps)
+    return richardson(values, run.row.ladder, run.facts.order, scatter)
 
 
 def _with_floor(
@@ -262,9 +265,7 @@ def _with_floor(
 ) -> Limit | None:
     """The limit, or in single precision without one what ended the refinement."""
     facts = run.facts
-    if limit is None or not isinstance(facts, EngineFacts) or facts.step is None or np.isfinite(limit.order):
-        return limit
-    if facts.precision == "double":
+    if limit is None or not limit.rounded or not isinstance(facts, EngineFacts) or facts.step is None:
         return limit
     errors = {facts.step * factor: largest_difference(found[name], true) for factor, found in curves.items()}
     return replace(limit, floor=floor_of(errors, scale, unit))

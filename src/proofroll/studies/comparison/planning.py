@@ -123,7 +123,11 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     rows = [row for _, row in numbered]
     if not rows:
         known = ", ".join(dict.fromkeys(parse_engine(row.engine).name for row in comparison.rows))
-        raise InputError("engine", ", ".join(chosen), f"{comparison.name} compares {known}")
+        raise InputError(
+            "engine",
+            ", ".join(chosen),
+            f"{comparison.name} compares {known}; proofroll new comparison writes a file with others",
+        )
     asked = scene_at(comparison, next(iter(comparison.variations(rows[0])), {}))
     resolved, truth_facts = row_facts(comparison, numbered, asked.requires, workers)
     comparison = settled(comparison)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.convergence import is_floor
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.files.scene_file import load_scene
@@ -87,6 +88,7 @@ class CurvePoint:
         curves: observables of its trajectory; empty if there is none.
         errors: largest distance of each from the truth; with an adaptive step also over few samples.
         bars: error bars of the truth, by observable.
+        scales: size of each observable on the scene.
         dense: ``errors`` over the many samples alone.
         sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
         timing: of the run, wall seconds per simulated second; None where it is not measured.
@@ -98,6 +100,7 @@ class CurvePoint:
     curves: dict[str, FloatArray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     bars: dict[str, float] = field(default_factory=dict)
+    scales: dict[str, float] = field(default_factory=dict)
     dense: dict[str, float] = field(default_factory=dict)
     sparse: CurvePoint | None = None
     timing: Timing | None = None
@@ -162,7 +165,7 @@ class Curve:
         return envelope(errors[:last]) + errors[last:]
 
     def floor(self, quantity: str) -> Floor | None:
-        """Floor at which smaller steps become worse in single precision; None: double, or none of them is worse."""
+        """Floor at which smaller steps become worse in single precision; None: double, or none is clearly worse."""
         if self.facts.precision == "double" or not self.fixed_step:
             return None
         done = [point for point in self.points if np.isfinite(point.errors.get(quantity, np.inf))]
@@ -175,6 +178,8 @@ class Curve:
         best = done.index(used[least + 1])
         while best and errors[best - 1] <= errors[best]:  # an error that cancels at one step alone is not reached
             best -= 1
+        if not is_floor(errors[best], errors[-1], done[best].scales.get(quantity, np.inf)):
+            return None
         return Floor(done[best], errors[best], changes[least + 1])
 
     def saturated(self, quantity: str) -> bool:
@@ -211,8 +216,9 @@ def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurveP
     if point.result.status != Status.DONE:
         return point
     curves = held_against.observed(reference, read(runner.store.trajectory(point.case)))
-    errors, bars = {}, {}
+    errors, bars, scales = {}, {}, {}
     for name, curve in curves.items():
         true, bar = reference.true(name, curve)
         errors[name], bars[name] = largest_difference(curve, true), bar
-    return replace(point, curves=curves, errors=errors, bars=bars)
+        scales[name] = reference.scale(name) or np.inf
+    return replace(point, curves=curves, errors=errors, bars=bars, scales=scales)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, size, tightest
+from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, scatter_of, size, tightest
 from proofroll.core.number_format import number
 from proofroll.core.verdict import round_off_of
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint
@@ -84,7 +84,8 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
-        limit = richardson(values[-3:], steps[-3:], curve.facts.order, curve.facts.precision)
+        scatter = scatter_of(curve.facts.precision, size(true), used[-1].case.until / steps[-1])
+        limit = richardson(values[-3:], steps[-3:], curve.facts.order, scatter)
         stalled = not observed_order(differences[-2], differences[-1], steps[-3:]) > _STALLED
         seen = differences
         if single:
@@ -221,7 +222,7 @@ def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
         seen = max(found.model_form_bar, found.truth)
         said += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
     if found.floor is not None and found.best_step is not None:
-        said += f"; {floor_text(found.best_step, found.floor, unit, worse=True)}, smaller steps are worse"
+        said += f"; {floor_text(found.best_step, found.floor, unit)}, smaller steps are worse"
     elif found.floor is not None:
         said += f"; refining ends at a scatter of {number(found.floor, 1)} {unit}"
     return said + "."

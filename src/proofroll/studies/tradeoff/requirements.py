@@ -112,7 +112,7 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
     if budget is None or budget.model_form is None:
         return "too few finer runs reached the end to say whether a finer step would do"
     if budget.floor is not None and budget.best_step is not None and budget.floor > absolute:
-        floor = floor_text(budget.best_step, budget.floor, study.quantities[quantity].unit, worse=True)
+        floor = floor_text(budget.best_step, budget.floor, study.quantities[quantity].unit)
         return f"no step would do: {floor}"
     if budget.best_step is not None and (point.step or 0.0) < budget.best_step:
         return f"the step is too small for single precision, the best one is {number(budget.best_step)} s"

@@ -198,7 +198,7 @@ def _conclusions(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
     for item in budgets:
         if item.quantity == quantity and item.best_step is not None and item.floor is not None:
-            told = floor_text(item.best_step, item.floor, unit, worse=True)
+            told = floor_text(item.best_step, item.floor, unit)
             said.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
     whole = [
         c for c in found.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale

@@ -24,4 +24,4 @@ def test_what_is_for_a_scene_is_not_for_a_file() -> None:
     """A comparison file has its own points and no budget: either is refused by its name."""
     for given, advice in (({"speed": 2.0}, "speed = 2.0"), ({"budget": 9.0}, "budget = 9.0")):
         with pytest.raises(proofroll.InputError, match=f"{advice}: a comparison file has its own"):
-            proofroll.compare("bricard", **given)
+            proofroll.compare("paper", **given)
