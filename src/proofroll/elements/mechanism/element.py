@@ -40,7 +40,8 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
     from proofroll.core.scene import Scene
-    from proofroll.elements.mechanism.contacts.dynamics import ContactSolution
+    from proofroll.elements.mechanism.contacts.acting import ContactMode
+    from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
 
 # Least size of an observable over its natural one, as for balls: less is stillness to the eye.
 _LEAST = 1e-2
@@ -122,19 +123,17 @@ class MechanismElement:
     @cached_property
     def _pressed(self) -> ContactSolution | None:
         """Accelerations and forces of contact at the start; None: nothing may touch, or they are not unique."""
-        if not self.mechanism.contacts:
-            return None
+        return None if self._touching is None else self._touching[0].solve(*self.mechanism.start(), self._touching[1])
+
+    @cached_property
+    def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
+        """Equations of contacts, and what these do at the start; None: none, or no law says."""
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
         with contextlib.suppress(Refused):
-            dynamics = ContactDynamics(self.mechanism)
-            return dynamics.solve(*self.mechanism.start(), dynamics.begin()[0])
+            dynamics = ContactDynamics(self.mechanism) if self.mechanism.contacts else None
+            return dynamics and (dynamics, dynamics.begin()[0])
         return None
-
-    @property
-    def _undecided(self) -> bool:
-        """True if no law says what contacts do at the start."""
-        return bool(self.mechanism.contacts) and self._pressed is None
 
     @cached_property
     def noise(self) -> float:
@@ -281,7 +280,7 @@ class MechanismElement:
         rates = self._solution.acceleration if self._pressed is None else self._pressed.acceleration
         acceleration = (motion.J @ rates + motion.bias)[:-1]
         scale = max(float(np.max(np.abs(acceleration[:, :3]))), self.speed**2 / self.length)
-        if self._undecided:
+        if self.mechanism.contacts and self._pressed is None:
             unknown = np.full((len(acceleration), 3), np.nan)
             return FirstMotion(unknown, unknown, scale, _PART * self.natural_time, lasts=0.0)
         return FirstMotion(acceleration[:, :3], acceleration[:, 3:], scale, _PART * self.natural_time)
@@ -308,13 +307,10 @@ class MechanismElement:
     @cached_property
     def _first(self) -> dict[str, Any]:
         start = self.mechanism.start()
-        if not self.mechanism.contacts or self._undecided:
-            found = self._equations.sample(*start)
-            return found | {"wrench": np.full_like(found["wrench"], np.nan)} if self._undecided else found
-        from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-
-        dynamics = ContactDynamics(self.mechanism)
-        return dynamics.sample(*start, dynamics.begin()[0])[0]
+        if self._touching is not None:
+            return self._touching[0].sample(*start, self._touching[1])[0]
+        found = self._equations.sample(*start)
+        return found | {"wrench": np.full_like(found["wrench"], np.nan)} if self.mechanism.contacts else found
 
     def variables(self, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
         """See the protocol; the variables are those of :mod:`proofroll.elements.mechanism.dataset`."""
