@@ -210,7 +210,9 @@ def test_findings_and_scores_leave_ill_posed_points_out(content: ReportContent) 
         "In 1 of 2 cases the first slip is ill-posed (speed=4, rolling_resistance=0.0005, mu_static=0.391459)" in said
     )
     assert "than the truth's: beta (1 of 1 cases) and gamma (1 of 1 cases)." in said
-    assert [score.motion for score in scores(comparison)] == [pytest.approx(1e-6, rel=1e-5)] * 3 + [None]
+    assert [score.motion for score in scores(comparison, content.choice)] == [pytest.approx(1e-6, rel=1e-5)] * 3 + [
+        None
+    ]
 
 
 def test_events_without_numbers_do_not_break_the_page(content: ReportContent, slipping: Any) -> None:

@@ -10,9 +10,10 @@ from typing import Any
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
-from proofroll.report.comparison.scores import Score, closest, furthest_off, scores
+from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
+from proofroll.report.page.candidates import Candidate
 from proofroll.report.page.choice_matrix import EVERYDAY, NEEDS, ChoiceMatrix
 
 
@@ -28,12 +29,11 @@ def conclusions(
     content: ReportedComparison, choice: ChoiceMatrix, truths: Sequence[Any], kind: type[ReportKind] | None
 ) -> Conclusions:
     """Conclusions of a comparison and of its matrix; its kind of scene adds a sentence about its truths."""
-    found = scores(content)
     return Conclusions(
         _answer(content, choice),
         [
-            _closest(content),
-            _obvious(content, found),
+            _closest(content, choice),
+            _obvious(content, scores(content, choice)),
             *_order(content),
             *(kind.sentences(truths) if kind is not None else ()),
             _surprises(content),
@@ -79,12 +79,12 @@ def _joined(parts: list[str]) -> str:
     return parts[0] if len(parts) == 1 else ", ".join(parts[:-1]) + " and " + parts[-1]
 
 
-def _closest(content: ReportedComparison) -> str:
+def _closest(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     """Sentence on the setting that agrees best."""
-    best = closest(content)
+    best = closest(content, choice)
     if best is None:
         return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
-    cost = "" if best.seconds is None else f", for {number(best.seconds)} s of computing per simulated second"
+    cost = "" if best.cost is None else f", for {number(best.cost)} s of computing per simulated second"
     return (
         f"Closest to the truth is {best.name}: its motion stays within {number(best.motion)} of each coordinate's "
         f"range and its forces within {number(best.forces)} of the largest normal force{cost}; the truth's "
@@ -92,17 +92,17 @@ def _closest(content: ReportedComparison) -> str:
     )
 
 
-def _obvious(content: ReportedComparison, found: list[Score]) -> str:
+def _obvious(content: ReportedComparison, found: list[Candidate]) -> str:
     """Price of the obvious model: the default preset against the best of the same engine."""
     rows = content.rows
-    worst: tuple[float, Score, Score] | None = None
+    worst: tuple[float, Candidate, Candidate] | None = None
     lost: list[str] = []
     for score in found:
-        row = rows[score.index]
+        row = rows[score.row]
         others = [
             other
             for other in found
-            if rows[other.index].name == row.name and rows[other.index].preset != "default" and other.motion is not None
+            if rows[other.row].name == row.name and rows[other.row].preset != "default" and other.motion is not None
         ]
         if row.preset != "default" or not others:
             continue
@@ -116,8 +116,8 @@ def _obvious(content: ReportedComparison, found: list[Score]) -> str:
     if worst is None:
         return "What the obvious model costs cannot be said: no default setting stands beside another one." + failed
     factor, score, best = worst
-    blamed = with_caveat(score.name, rows[score.index].caveat)
-    off = furthest_off(content, content.runs_of(score.index))
+    blamed = with_caveat(score.name, rows[score.row].caveat)
+    off = furthest_off(content, content.runs_of(score.row))
     assert off is not None  # its motion was scored
     return (
         f"The obvious model costs most with {blamed}: {off_by(off)}, which relative to the range is "

@@ -18,6 +18,7 @@ class Candidate:
     """One setting with one step in one study, over all its places.
 
     Attributes:
+        row: number of its row in the study.
         name: engine, formulation, setting and step, for a person.
         motion, forces: largest error of a coordinate, and of a reaction, in parts of its size; None: not reported.
         cost: wall seconds per simulated second at the slowest place; None: not measured.
@@ -28,6 +29,7 @@ class Candidate:
         message: why a place has no result.
     """
 
+    row: int
     name: str
     motion: float | None
     forces: float | None
@@ -92,7 +94,7 @@ def _candidate(
         furthest = max(errors, key=lambda place: max(errors[place][0] or 0.0, errors[place][1] or 0.0))
         href = anchors.get(furthest, href)
     motion, forces = (_worst([pair[which] for pair in errors.values()]) for which in (0, 1))
-    return Candidate(name, motion, forces, cost, clean, blame, *limits, href, message)
+    return Candidate(first.row, name, motion, forces, cost, clean, blame, *limits, href, message)
 
 
 def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:

@@ -25,10 +25,10 @@ def three_sentences(
         choice: the matrix of the report.
     """
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
-    return [_agrees(comparisons), _silent(comparisons, maps), choice.answer(EVERYDAY, forces=True)]
+    return [_agrees(comparisons, choice), _silent(comparisons, maps), choice.answer(EVERYDAY, forces=True)]
 
 
-def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
+def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
     rows = [row for comparison in comparisons for row in comparison.rows]
@@ -46,7 +46,7 @@ def _agrees(comparisons: Sequence[ReportedComparison]) -> str:
         said += f", {' and '.join(parts)}"
     if counts["refused"]:
         said += f"; {counts['refused']} {'refuses' if counts['refused'] == 1 else 'refuse'} the scene or a case of it"
-    best = closest(comparisons[0])
+    best = closest(comparisons[0], choice)
     if best is None:
         return f"{said}; none gave motion and forces in every case of the first comparison."
     first = " in the first" if len(comparisons) > 1 else ""
