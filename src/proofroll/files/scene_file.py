@@ -179,11 +179,36 @@ def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, 
         if name not in known:
             raise no_such_key(f"{where}: {name}", tables[name], [*sorted(_OWN), *known])
     elements: list[Element] = []
-    for kind in kinds:
-        own = {name: tables[name] for name in kind.tables if name in tables}
+    for kind, own in zip(kinds, _of_each([kind.tables for kind in kinds], tables, where), strict=True):
         if own:
             elements += kind.read(own, gravity, numbers, where)
     return tuple(elements)
+
+
+def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: str) -> list[dict[str, Any]]:
+    """Tables of each kind of element; of a table that several read, each row goes where the names are that it says.
+
+    Raises:
+        InputError: a row says no name that one of these kinds alone has.
+    """
+    shared = {name for name in tables if sum(name in own for own in known) > 1}
+    found = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]
+    named = [{str(row["name"]) for rows in own.values() for row in _rows(rows) if "name" in row} for own in found]
+    for table in shared:
+        for index, row in enumerate(_rows(tables[table])):
+            said = [text for value in row.values() for text in (value if isinstance(value, list) else [value])]
+            homes = [
+                k for k, names in enumerate(named) if table in known[k] and any(str(text) in names for text in said)
+            ]
+            if len(homes) != 1:
+                advice = "several kinds of elements have such rows; name a thing of one of them, which another has not"
+                raise InputError(f"{where}: {table}.{index}", row, advice)
+            found[homes[0]].setdefault(table, []).append(row)
+    return found
+
+
+def _rows(table: Any) -> list[Mapping[str, Any]]:
+    return [row for row in table if isinstance(row, Mapping)] if isinstance(table, list) else []
 
 
 def _names(asks: object) -> list[str]:

@@ -5,13 +5,18 @@ import math
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, ClassVar, cast
 
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.core.gravity import Gravity
+from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
+from proofroll.elements.ball_on_surface.kind import BallOnSurfaceKind
+from proofroll.files import scene_file
 from proofroll.files.data_folders import data_folder
 from proofroll.files.scene_file import load_scene, read_scene_file, scene_names
 from proofroll.files.toml import read_toml
@@ -294,3 +299,36 @@ def test_an_unknown_key_is_told_the_known_ones(tmp_path: Path, old: str, new: st
     (folder / "scene.toml").write_text(text.replace(f"\n{old}", f"\n{new}", 1), encoding="utf-8")
     with pytest.raises(InputError, match=f"there is no such key here; the keys are {keys}"):
         load_scene(str(folder))
+
+
+class BlockKind:
+    """Blocks on floors, a kind of element that has [[contacts]] as balls have them."""
+
+    name: ClassVar[str] = "block"
+    tables: ClassVar[tuple[str, ...]] = ("blocks", "contacts")
+    units: ClassVar[dict[str, str]] = {}
+
+    @staticmethod
+    def read(tables: Any, *_: object) -> list[Any]:
+        """What it was given."""
+        return [SimpleNamespace(kind="block", tables=tables)]
+
+
+def test_two_kinds_have_rows_of_one_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each row of [[contacts]] goes to the kind of the thing that it names, and one that names none is refused."""
+    monkeypatch.setattr(scene_file, "load_element_kinds", lambda: [BallOnSurfaceKind, BlockKind])
+    ball, block = {"body": "ball", "surface": "wall"}, {"of": ["crate", "floor"], "friction": 0.5}
+    tables: dict[str, Any] = {
+        "blocks": [{"name": "crate"}],
+        "balls": [{"name": "ball", "radius": 0.025, "mass": 0.5}],
+        "surfaces": [{"kind": "plane", "name": "wall", "tilt": 0.35}],
+        "initial": [{"body": "ball", "velocity": [0.5, 0.2]}],
+        "contacts": [block, ball],
+    }
+    given = tables, Gravity(9.81, (0.0, 0.0, -1.0)), Parameters({}, {}), "scene.toml"
+    rolling, other = cast(Any, scene_file._elements(*given))
+    assert rolling.contact.surface == "wall"
+    assert other.tables == {"blocks": [{"name": "crate"}], "contacts": [block]}
+    tables["contacts"].append({"of": ["another"]})
+    with pytest.raises(InputError, match=r"scene.toml: contacts.2 = .*name a thing of one of them"):
+        scene_file._elements(*given)
