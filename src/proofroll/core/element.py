@@ -196,8 +196,8 @@ class ElementKind(Protocol):
 
     Attributes:
         name: of the entry point.
-        tables: names of the tables of a scene file that it reads; of one that another kind reads, too, the rows that name
-            a thing of its own tables.
+        tables: names of the tables of a scene file that it reads; of one that another kind reads, too, the rows that
+            name a thing of its own tables.
         units: unit of each number in them, by its key.
     """
 
