@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
+from typing import Any, TypeGuard
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error, number
@@ -17,10 +18,8 @@ from proofroll.report.long_table import COLUMNS, TableLine
 # Round-off of another build may change an error by this part of the quantity's size, and by this part of itself.
 _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
 # Intervals of costs that do not meet are news where the costs differ by this factor, too: hundreds are compared, and a
-# machine is slower at one time than at another.
-_COST = 1.5
-
-
+# machine is slower at one time than at another. It is more where all costs scatter: so many times their usual scatter.
+_COST, _SCATTERS = 1.5, 6.0
 # So many costs tell how much slower the machine was.
 _ENOUGH = 5
 
@@ -52,6 +51,7 @@ class Against:
         versions: what ran in another version: name -> both versions.
         costs: costs were compared, for both reports are of one machine.
         drift: median ratio of all costs, by which old ones are multiplied first: the machine's, not the engines'.
+        factor: by which a cost must differ then: more where most costs scatter, on a machine that was busy.
         compared: how many runs are in both.
         changes: the runs that changed.
     """
@@ -61,6 +61,7 @@ class Against:
     versions: dict[str, tuple[str, str]]
     costs: bool
     drift: float
+    factor: float
     compared: int
     changes: list[RunChange]
 
@@ -86,6 +87,8 @@ class Against:
             costs = "; costs are of another machine and not compared"
         elif 1 / _COST < self.drift < _COST:
             costs = ""
+        if self.costs and self.factor > _COST:
+            costs += f"; costs scatter, so that only those count that differ by a factor of {number(self.factor)}"
         return f"Of {counted(self.compared, 'runs')} in both reports, changed: {said or 'nothing'}{costs}."
 
 
@@ -127,7 +130,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
     before, after = runs_of(old.lines), runs_of(lines)
     shared = {study for study, *_ in before} & {study for study, *_ in after}
     costs = old.machine == machine
-    drift = _drift((_first(before[key]), _first(run)) for key, run in after.items() if key in before)
+    drift, factor = _noise((_first(before[key]), _first(run)) for key, run in after.items() if key in before)
     changes = []
     for key in dict.fromkeys([*after, *before]):
         study, place, run, *_ = key
@@ -136,7 +139,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         if key not in after or key not in before:
             changes.append(RunChange(study, run, place, "gone" if key not in after else "new", []))
             continue
-        found = list(_changes(before[key], after[key], drift=drift if costs else None))
+        found = list(_changes(before[key], after[key], (drift, factor) if costs else None))
         if found:
             kinds = [kind for kind, _ in found]
             first = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
@@ -147,7 +150,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         if name in versions and versions[name] != version
     }
     both = sum(key in before for key in after)
-    return Against(str(old.path), old.date, others, costs, drift, both, changes)
+    return Against(str(old.path), old.date, others, costs, drift, factor, both, changes)
 
 
 def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
@@ -161,7 +164,7 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
 
 
 def _changes(
-    before: dict[str, TableLine], after: dict[str, TableLine], *, drift: float | None
+    before: dict[str, TableLine], after: dict[str, TableLine], noise: tuple[float, float] | None
 ) -> Iterator[tuple[str, str]]:
     """Kind and clause of each change of a run."""
     one, other = _first(before), _first(after)
@@ -183,18 +186,23 @@ def _changes(
         yield "value", f"{max(values)[1]}{more}"
     for name in before.keys() - after.keys():
         yield "verdict", f"{name} is gone"
-    if drift is not None and (text := _cost(one, other, drift)):
+    if noise is not None and (text := _cost(one, other, *noise)):
         yield "cost", text
 
 
 def _beyond(old: TableLine, new: TableLine) -> float:
     """Change of an error beyond both bars and round-off, in parts of the quantity's size; 0: there is none."""
-    if old.error is None or new.error is None:
-        return float((old.error is None) != (new.error is None))
+    if not (_finite(old.error) and _finite(new.error)):
+        return float(_finite(old.error) != _finite(new.error))
     scale = new.scale or max(old.error, new.error) or 1.0
     bar = (old.truth_error_bar or 0.0) + (new.truth_error_bar or 0.0)
     allowed = bar + _OF_SCALE * scale + _OF_ERROR * max(old.error, new.error)
     return max(0.0, abs(new.error - old.error) - allowed) / scale
+
+
+def _finite(value: float | None) -> TypeGuard[float]:
+    """True for a number; a file has none for an error that is not finite."""
+    return value is not None and math.isfinite(value)
 
 
 def _first(run: dict[str, TableLine]) -> TableLine:
@@ -209,20 +217,24 @@ def _interval(line: TableLine) -> tuple[float, float, float] | None:
     return line.cost_low, line.cost, line.cost_high
 
 
-def _drift(pairs: Iterable[tuple[TableLine, TableLine]]) -> float:
-    """Median ratio of new costs to old ones; 1 where there are too few to tell."""
+def _noise(pairs: Iterable[tuple[TableLine, TableLine]]) -> tuple[float, float]:
+    """Median ratio of new costs to old ones, and the factor beyond it that is news; 1 and the least where few tell."""
     both = [(_interval(old), _interval(new)) for old, new in pairs]
-    ratios = [new[1] / old[1] for old, new in both if old and new and old[1]]
-    return median(ratios) if len(ratios) >= _ENOUGH else 1.0
+    ratios = [math.log(new[1] / old[1]) for old, new in both if old and new and old[1] > 0 and new[1] > 0]
+    if len(ratios) < _ENOUGH:
+        return 1.0, _COST
+    drift = median(ratios)
+    scatter = median(abs(ratio - drift) for ratio in ratios)
+    return math.exp(drift), max(_COST, math.exp(_SCATTERS * scatter))
 
 
-def _cost(old: TableLine, new: TableLine, drift: float) -> str:
+def _cost(old: TableLine, new: TableLine, drift: float, factor: float) -> str:
     """A cost beyond both intervals, as a clause; empty: it is not, or an interval is not known."""
     one, other = _interval(old), _interval(new)
     if one is None or other is None:
         return ""
     low, high = sorted(([drift * value for value in one], list(other)), key=lambda item: item[1])
-    if high[0] <= low[2] or high[1] < _COST * low[1]:
+    if high[0] <= low[2] or high[1] < factor * low[1]:
         return ""
     between = [f"{number(line.cost)} ({number(line.cost_low)} to {number(line.cost_high)})" for line in (old, new)]
     return f"cost {between[0]} → {between[1]} s/s"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ LINE = TableLine(
     error=5e-4, truth_error_bar=1e-12, tolerance=1e-2, scale=1.0, order=2.0, cost=0.01, cost_low=9e-3, cost_high=0.011,
     clean=True,
 )  # fmt: skip
+COST = {"cost": 0.01, "cost_low": 9.8e-3, "cost_high": 0.0102}
 SLOW = {"cost": 0.02, "cost_low": 0.019, "cost_high": 0.021}
 LINES = [LINE, replace(LINE, quantity="z", error=1e-13), replace(LINE, row=1, engine="beta", error=2e-9)]
 
@@ -46,6 +48,8 @@ def test_the_same_numbers_have_not_changed() -> None:
     assert held(changed(1, error=3e-13)).changes == []
     assert held(changed(2, error=2.5e-9)).changes == [], "round-off of another processor"
     assert held(changed(0, truth_error_bar=1e-3, error=6e-4)).changes == [], "within the truth's bar"
+    endless = [replace(LINE, error=math.inf)]
+    assert held(endless, old=[replace(LINE, error=None)]).changes == [], "a file has none for what is not finite"
 
 
 @pytest.mark.parametrize(
@@ -82,6 +86,21 @@ def test_a_machine_that_is_slower_throughout_accuses_no_engine() -> None:
     assert "costs are 2 of the old ones throughout" in found.sentence
     slow[3] = replace(slow[3], cost=0.05, cost_low=0.048, cost_high=0.052)
     assert [(item.run.split()[0], item.kind) for item in held(slow, old=old).changes] == [("e3", "cost")]
+
+
+def test_costs_of_a_busy_machine_accuse_no_engine() -> None:
+    """Where costs scatter by factors the report says so, and names only what is far beyond that."""
+    old = [replace(LINE, row=number, engine=f"e{number}") for number in range(9)]
+    ratios = (1.0, 1.2, 1.7, 0.8, 1.0, 0.7, 1.3, 2.2, 1.1)
+    new = [
+        replace(line, **{name: value * ratio for name, value in COST.items()})
+        for line, ratio in zip(old, ratios, strict=True)
+    ]
+    found = held(new, old=old)
+    assert found.changes == []
+    assert "costs scatter, so that only those count that differ by a factor of" in found.sentence
+    new[4] = replace(new[4], cost=0.2, cost_low=0.19, cost_high=0.21)
+    assert [(item.run.split()[0], item.kind) for item in held(new, old=old).changes] == [("e4", "cost")]
 
 
 def test_runs_that_are_gone_count_and_new_ones_do_not() -> None:

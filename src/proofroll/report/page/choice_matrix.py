@@ -140,7 +140,8 @@ class ChoiceMatrix:
     def answer(self, tolerance: float, forces: bool) -> str:
         """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
         asked = f"{NEEDS[forces]} to {number(tolerance)}"
-        said, without = [], []
+        said: list[str] = []
+        without: list[str] = []
         for column in (item for item in self.columns if item.whole):
             name, cell = self.cheapest(column, tolerance, forces)
             if math.isfinite(cell.cost):
@@ -174,7 +175,7 @@ class ChoiceMatrix:
 
 
 def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]) -> ChoiceMatrix:
-    """The matrix of the lines of some studies, in the order of the studies."""
+    """The matrix of the lines of some studies, in their order; what is cheapest for any scenes comes first."""
     order = {name: number for number, name in enumerate(studies)}
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
@@ -195,7 +196,11 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
         columns += members if len(members) > 1 else []
     orders = [list(dict.fromkeys(key[:end] for key in rows)) for end in (1, 2, 3)]
     keys = sorted(rows, key=lambda key: [known.index(key[: end + 1]) for end, known in enumerate(orders)])
-    return ChoiceMatrix(columns, [rows[key] for key in keys], {name: item.title for name, item in studies.items()})
+    titles = {name: item.title for name, item in studies.items()}
+    matrix = ChoiceMatrix(columns, [rows[key] for key in keys], titles)
+    best = {at for forces in (False, True) for at in matrix.best(10.0**-FIRST, forces) if at is not None}
+    first = {matrix.rows[at].name for at in best}
+    return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: row.name not in first), titles)
 
 
 def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
