@@ -102,8 +102,8 @@ def between(text: str, name: str, table: str) -> str:
 def verdicts(runner: Runner, folder: Path) -> dict[str, str]:
     """Tables of the founding comparison; its picture and that of its report."""
     outcome = compare(load_comparison("paper"), runner)
-    draw(outcome, runner.store, ROOT / "docs" / "picture.svg")
-    write_report([outcome], runner.store, folder, "proofroll report paper")
+    draw(outcome, ROOT / "docs" / "picture.svg")
+    write_report([outcome], folder, "proofroll report paper")
     screenshot(folder / "report.html", ROOT / "docs" / "report.png")
     content = outcome_content(outcome)
     return {"verdicts": verdict_table(content), "caveats": caveat_list(content), "remarks": remark_list(content)}

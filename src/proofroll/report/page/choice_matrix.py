@@ -199,8 +199,8 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
     titles = {name: item.title for name, item in studies.items()}
     matrix = ChoiceMatrix(columns, [rows[key] for key in keys], titles)
     best = {at for forces in (False, True) for at in matrix.best(10.0**-FIRST, forces) if at is not None}
-    first = {matrix.rows[at].name for at in best}
-    return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: row.name not in first), titles)
+    useful = {matrix.rows[at].name for at in best}
+    return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: row.name not in useful), titles)
 
 
 def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
