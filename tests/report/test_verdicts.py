@@ -243,7 +243,7 @@ def test_the_cheapest_is_the_same_in_each_sentence_and_in_the_matrix(
     (column,) = content.choice.columns
     name, cell = content.choice.cheapest(column, EVERYDAY, forces=True)
     assert "4e-3 s" in cell.name if coarse < 0.2 else cell.cost == 0.2
-    assert f"{column.group}: {name} ({cell.text} s/s)" in content.findings.sentences[2]
+    assert f"{name} for {column.group} ({cell.text} s" in content.findings.sentences[2]
     assert content.comparisons[0].evidence
     assert f"the cheapest is {cell.name}: {cell.text} s" in content.comparisons[0].evidence.findings.answer
 

@@ -45,14 +45,14 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     options.show(sound, False, lambda: [head, *(f"  {line}" for line in sound.start), *drawn])
 
 
-def _draw(found: SoundFile, plot: Path) -> None:
+def _draw(file: SoundFile, plot: Path) -> None:
     """Draws a scene at its start to a page.
 
     Raises:
         InputError: it is a study, or the file is no page or cannot be written.
     """
-    if found.kind != "scene":
-        raise InputError("--plot", plot, f"{found.name} is no scene; name one")
+    if file.kind != "scene":
+        raise InputError("--plot", plot, f"{file.name} is no scene; name one")
     if plot.suffix.lower() != ".html":
         raise InputError("--plot", plot, "a drawn scene is a page: end the name of the file in .html")
     options.require_pages()
@@ -60,7 +60,7 @@ def _draw(found: SoundFile, plot: Path) -> None:
     from proofroll.report.page.scene_page import scene_page
     from proofroll.running.store import write_text
 
-    write_text(plot, scene_page(found.path, found.start))
+    write_text(plot, scene_page(file.path, file.start))
 
 
 @dataclasses.dataclass(frozen=True)

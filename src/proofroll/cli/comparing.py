@@ -100,7 +100,7 @@ def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> 
     asked_for = {name: {name, plain_name(name)} for name in engines}
     wanted = set(chain(*asked_for.values()))  # a comparison that has none of them is refused elsewhere
     for name, either in asked_for.items():
-        without = [found for found, known in rows.items() if known & wanted and not known & either]
+        without = [comparison for comparison, known in rows.items() if known & wanted and not known & either]
         if without:
             said = f"{name} is left out of {', '.join(without)}: no row is of it"
             options.complain(f"{said}; proofroll new comparison writes a file with one")

@@ -28,9 +28,9 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
 
     others = {f"{item.name}@{item.label}": f"in Python {item.interpreter} of its own" for item in remembered()}
     with options.spinner("engines"), ThreadPoolExecutor() as pool:
-        found = list(pool.map(_described, [*engine_names(), *others]))
+        described = list(pool.map(_described, [*engine_names(), *others]))
     if as_json:
-        options.write_json(found)
+        options.write_json(described)
         return
     from rich.table import Table
 
@@ -40,7 +40,7 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
     for table, columns in ((installed, ("engine", "version", "formulations (presets)")), (provided, ("", "provides"))):
         for column in columns:
             table.add_column(column)
-    for item in found:
+    for item in described:
         name = item["name"]
         if item["status"] != "installed":
             installed.add_row(name, item["status"], item["message"].removeprefix(f"{name}: "))

@@ -110,11 +110,11 @@ def _from_report(
     lines = [line for line in lines if not engines or line.engine in engines]
     studies: dict[str, ChoiceStudy] = {}
     for name in names:
-        found = [line for line in lines if name in {line.study, line.scene, line.group, *line.group.split()}]
-        if not found:
+        own = [line for line in lines if name in {line.study, line.scene, line.group, *line.group.split()}]
+        if not own:
             known = ", ".join(dict.fromkeys(line.group for line in lines))
             raise InputError("scenes", name, f"{path} has none; proofroll report {name} runs it; groups there: {known}")
-        studies |= {line.study: ChoiceStudy(line.study, "") for line in found}
+        studies |= {line.study: ChoiceStudy(line.study, "") for line in own}
     part = _tolerance(tolerance, "1").absolute(1.0)
     matrix = choice_matrix(lines, studies)
     advised = advice(matrix, part, forces)

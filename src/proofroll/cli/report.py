@@ -129,10 +129,10 @@ def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
     """Writes the history of the reports in a folder, and says what changed when."""
     from proofroll.report.history import read_history, write_history
 
-    found = read_history(folder)
-    write_history(found, out)
+    history = read_history(folder)
+    write_history(history, out)
     where = f"The history is in {out / 'history.html'}, the same content in {out / 'history.json'}."
-    options.show(found, as_json, lambda: [*found.lines(), where])
+    options.show(history, as_json, lambda: [*history.lines(), where])
 
 
 class _Growing:

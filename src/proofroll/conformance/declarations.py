@@ -19,8 +19,8 @@ def name_is_the_entry_point(engine: Any) -> None:
     """An installed package announces the engine under its own name."""
     points = [point for point in announced(GROUP) if point.name == engine.name]
     require(points, f"no installed package has the entry point {GROUP}: {engine.name}; add it and install the package")
-    found = points[0].load()
-    require(found is engine, f"the entry point {engine.name} leads to {found!r} instead of {engine!r}")
+    kind = points[0].load()
+    require(kind is engine, f"the entry point {engine.name} leads to {kind!r} instead of {engine!r}")
 
 
 def version_is_told(engine: Any) -> None:

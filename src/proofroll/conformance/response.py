@@ -95,16 +95,16 @@ def _moved(subject: Subject, times: FloatArray, true: xr.Dataset) -> dict[str, F
 
 def _sizes(scene: Scene, length: float, true: xr.Dataset) -> dict[str, float]:
     """Size of each compared variable: its change by gravity and similar loads over a time [s]."""
-    found: dict[str, float] = {}
+    responses: dict[str, float] = {}
     for element in scene.elements:
         start = element.first_motion
         pull = (start.pull or start.scale) if start else element.length / element.natural_time**2
         fall = pull * length
         own = {"p_WB": fall * length / 2, "v_WB": fall, "w_WB": fall / element.length}
-        found |= {scene.label(element, name): size for name, size in own.items()}
+        responses |= {scene.label(element, name): size for name, size in own.items()}
     wanted = [name for name, item in scene.observables.items() if item.role == Role.REACTION and item.headline]
     sizes = scales(scene, true)
-    return {name: size for name, size in (found | {name: sizes[name] for name in wanted}).items() if name in true}
+    return {name: size for name, size in (responses | {name: sizes[name] for name in wanted}).items() if name in true}
 
 
 def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, float]:
@@ -112,7 +112,7 @@ def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, flo
 
     The place is off by the jump's way; the jump itself by how far a step turns what meets.
     """
-    found: dict[str, float] = {}
+    distances: dict[str, float] = {}
     for element in scene.elements:
         at = [event.time for event in events_of(part(scene, element, true)) if event.time > _MOMENT]
         if not at or not step:
@@ -123,8 +123,8 @@ def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, flo
         jumps = {name: float(np.max(change)) for name, change in changes.items()}
         turn = step * float(np.max(np.abs(own["v_WB"].to_numpy()))) / element.length
         errors = {"p_WB": step * jumps["v_WB"], **{name: turn * jump for name, jump in jumps.items()}}
-        found |= {scene.label(element, name): error for name, error in errors.items()}
-    return found
+        distances |= {scene.label(element, name): error for name, error in errors.items()}
+    return distances
 
 
 @cache

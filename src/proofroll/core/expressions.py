@@ -64,8 +64,8 @@ def evaluated(
     called = {name: _of_ratio(name, function) for name, function in (functions or {}).items()}
     try:
         source = text.replace("^", "**").strip()
-        found = evaluator(known, called, _power).eval(source, ast.parse(source, mode="eval").body)
-        quantity = Quantity(0.0) + found
+        value = evaluator(known, called, _power).eval(source, ast.parse(source, mode="eval").body)
+        quantity = Quantity(0.0) + value
         number = float(quantity.value)
     except ZeroDivisionError:
         raise InputError(field, text, "divides by zero; change the expression or its parameters") from None

@@ -67,7 +67,7 @@ def off_grid(times: FloatArray, step: float | None) -> FloatArray:
 
     An error that repeats with the grid is zero on it, and seen here. ``step``: the engine's [s]; None: it has none.
     """
-    found: list[float] = []
+    between: list[float] = []
     count = min(_OFF_GRID, (len(times) - 1) // _INTERVALS)
     for index in np.unique(np.linspace(0, len(times) - 2, count + 2)[1:-1].astype(int)).tolist():
         start, length = times[index], times[index + 1] - times[index]
@@ -76,5 +76,5 @@ def off_grid(times: FloatArray, step: float | None) -> FloatArray:
             continue
         parts = next((parts for parts in range(_PARTS, 1, -1) if steps % parts == 0), steps)
         part = min(max(round((index + 1) * _GOLDEN % 1 * parts), 1), parts - 1)
-        found.append(start + length * (part / parts))
-    return np.asarray(found, dtype=np.float64)
+        between.append(start + length * (part / parts))
+    return np.asarray(between, dtype=np.float64)

@@ -139,11 +139,11 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
         if key not in after or key not in before:
             changes.append(RunChange(study, run, place, "gone" if key not in after else "new", []))
             continue
-        found = list(_changes(before[key], after[key], (drift, factor) if costs else None))
-        if found:
-            kinds = [kind for kind, _ in found]
+        differences = list(_changes(before[key], after[key], (drift, factor) if costs else None))
+        if differences:
+            kinds = [kind for kind, _ in differences]
             first = next(kind for kind in ("verdict", "value", "cost") if kind in kinds)
-            changes.append(RunChange(study, run, place, first, [text for _, text in found]))
+            changes.append(RunChange(study, run, place, first, [text for _, text in differences]))
     others = {
         name: (version, versions[name])
         for name, version in old.versions.items()
@@ -160,7 +160,7 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
         size = f"{line.resolution} {number(line.step, 6)}" if line.step is not None else ""
         run = " ".join(filter(None, (line.engine, line.formulation, line.setting, size)))
         rows[line.study, line.place, run].setdefault(line.row, {})[line.quantity] = line
-    return {(*key, place): run for key, found in rows.items() for place, run in enumerate(found.values())}
+    return {(*key, place): run for key, places in rows.items() for place, run in enumerate(places.values())}
 
 
 def _changes(

@@ -73,8 +73,8 @@ def read_history(folder: Path) -> History:
     Raises:
         InputError: fewer than two, or one that is no report.
     """
-    found = sorted([*folder.glob("*.json"), *folder.glob("*/report.json")])
-    reports = sorted((EarlierReport.read(file, "--history") for file in found), key=lambda report: report.date)
+    files = sorted([*folder.glob("*.json"), *folder.glob("*/report.json")])
+    reports = sorted((EarlierReport.read(file, "--history") for file in files), key=lambda report: report.date)
     if len(reports) < 2:
         raise InputError("--history", folder, f"{len(reports)} reports there; keep a report.json of each night in it")
     steps = [against(old, new.lines, new.machine, new.versions) for old, new in pairwise(reports)]

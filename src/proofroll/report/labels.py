@@ -139,13 +139,13 @@ def with_caveat(name: str, caveat: str) -> str:
 
 def caveat_lines(rows: Sequence[Setting]) -> list[str]:
     """Families and caveats of settings: one sentence for each, with the settings that have it."""
-    found: dict[str, list[str]] = {}
+    settings: dict[str, list[str]] = {}
     for told in ([row.family for row in rows], [row.caveat for row in rows]):
         for row, said in zip(rows, told, strict=True):
             if said:
                 where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
-                found.setdefault(f"{said}: {row.name}", []).append(where)
-    return [f"{said[0].upper()}{said[1:]} {', '.join(dict.fromkeys(where))}." for said, where in found.items()]
+                settings.setdefault(f"{said}: {row.name}", []).append(where)
+    return [f"{said[0].upper()}{said[1:]} {', '.join(dict.fromkeys(where))}." for said, where in settings.items()]
 
 
 def settings_text(settings: dict[str, Any]) -> str:
@@ -153,6 +153,6 @@ def settings_text(settings: dict[str, Any]) -> str:
     return ", ".join(f"{key}={value}" for key, value in settings.items() if value is not None)
 
 
-def values(found: list[float | None]) -> str:
+def values(numbers: list[float | None]) -> str:
     """One number, or the components of a vector."""
-    return ", ".join(number(value, 8, none="not finite") for value in found)
+    return ", ".join(number(value, 8, none="not finite") for value in numbers)

@@ -137,7 +137,7 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
     """
     kinds = {kind.kind: kind for kind in part_kinds()}
     comparisons: list[str] = []
-    found: list[Part] = []
+    parts: list[Part] = []
     for name in names:
         path = named_file(name) if source_of(name) is None else None
         study = None if path is None else read_toml(path).get("study")
@@ -145,8 +145,8 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
             comparisons.append(name)
         else:
             require_known(f"{name}: study", str(study), kinds, "a report has comparisons and")
-            found.append(kinds[study].load(path, engines))
-    return comparisons, sorted(found, key=lambda part: part.order)
+            parts.append(kinds[study].load(path, engines))
+    return comparisons, sorted(parts, key=lambda part: part.order)
 
 
 def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
@@ -156,8 +156,8 @@ def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
         engines: to which studies are restricted.
         out: folder of all results; what is made on request is a part where it is kept there.
     """
-    found = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
-    return [part for part in found if not part.on_request or part.keeps(out)]
+    parts = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
+    return [part for part in parts if not part.on_request or part.keeps(out)]
 
 
 def attempt(part: Part, action: Callable[[], bool | None]) -> PartEntry | None:

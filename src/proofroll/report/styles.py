@@ -44,10 +44,10 @@ def styles(rows: Sequence[ReportedRow]) -> list[Style]:
     widths = {"default": 1.1, "tuned": 2.4}
     names = list(OUTLINES)
     seen: dict[str, int] = {}
-    found = []
+    looks = []
     for row in rows:
         place = seen[row.name] = seen.get(row.name, -1) + 1
-        found.append(
+        looks.append(
             Style(
                 colour=engines.index(row.name) % COLOURS,
                 dash=DASHES[formulations[row.name].index(row.formulation) % len(DASHES)],
@@ -56,4 +56,4 @@ def styles(rows: Sequence[ReportedRow]) -> list[Style]:
                 opacity=0.5 if row.verdict in {"differs", "failed"} else 1,  # not to hide those that agree
             )
         )
-    return found
+    return looks

@@ -86,7 +86,7 @@ def robot_table(content: VersionsStudy) -> Table:
     """One line for each layer of a robot's check."""
     made = plain_table(*map(Column, ("layer", content.old.version, content.new.version)))
     for layer in content.robot.layers:
-        shown = ["–" if found is None else found for found in (layer.old, layer.new)]
+        shown = ["–" if layer_text is None else layer_text for layer_text in (layer.old, layer.new)]
         made.add_row(Text(layer.layer, style="red" if layer.changed else ""), *shown)
     return made
 

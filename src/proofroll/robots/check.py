@@ -97,17 +97,17 @@ def check(
             except WorkerDied as error:
                 return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
             try:
-                found = judged(file, truth, bar, spec, answer, lent)
+                importer = judged(file, truth, bar, spec, answer, lent)
             except Exception as error:  # one engine's odd answer must not end the rows of the others
                 said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
                 return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
             # It defines the format, and its meaning here is that of another version of it.
             if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
-                found = dataclasses.replace(found, says=f"{found.says}; held against {by}".removeprefix("; "))
-            return found
+                importer = dataclasses.replace(importer, says=f"{importer.says}; held against {by}".removeprefix("; "))
+            return importer
 
-        def as_written(spec: EngineSpec, options: dict[str, bool], found: ImporterRow) -> str | None:
-            if not file.contained or found.version is None:
+        def as_written(spec: EngineSpec, options: dict[str, bool], importer: ImporterRow) -> str | None:
+            if not file.contained or importer.version is None:
                 return None
             own = dataclasses.replace(request, options=options)
             try:
@@ -115,15 +115,15 @@ def check(
                     given = reading.ask_as_written(worker, spec.name, own, path, Path(place), time_limit)
             except WorkerDied as error:
                 return f"its process ended ({error})"
-            return None if given is None else with_the_copy(given, found)
+            return None if given is None else with_the_copy(given, importer)
 
         def told(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
-            found = row(*item)
-            found = dataclasses.replace(found, accepted=all(cause.id in accepted for cause in found.causes))
-            found = dataclasses.replace(found, as_written=as_written(*item, found))
+            importer = row(*item)
+            importer = dataclasses.replace(importer, accepted=all(cause.id in accepted for cause in importer.causes))
+            importer = dataclasses.replace(importer, as_written=as_written(*item, importer))
             if progress is not None:
-                progress(found.engine)
-            return found
+                progress(importer.engine)
+            return importer
 
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
             rows = list(pool.map(told, asked))

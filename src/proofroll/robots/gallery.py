@@ -107,10 +107,10 @@ def gallery(
     rows = []
     wanted, row = [entry for entry in entries if not names or entry.name in names], partial(_row, tuple(engines))
     with lent_workers(None) as workers:  # each engine is started once for all robots
-        for host, found in cluster.map(row, wanted) if cluster else (("", row(entry, workers)) for entry in wanted):
-            rows.append(dataclasses.replace(found, ran_on=host))
+        for host, entry_row in cluster.map(row, wanted) if cluster else (("", row(entry, workers)) for entry in wanted):
+            rows.append(dataclasses.replace(entry_row, ran_on=host))
             if progress is not None:
-                progress(found.name)
+                progress(entry_row.name)
     return GalleryContent(rows)
 
 

@@ -184,9 +184,9 @@ def differences(truth: RobotTruth, reading: Reading, until: str = "") -> dict[st
     return off
 
 
-def first_failing(found: dict[str, float], tolerances: dict[str, float]) -> str | None:
+def first_failing(differences: dict[str, float], tolerances: dict[str, float]) -> str | None:
     """The first layer that exceeds its tolerance; also where the difference is not a number."""
-    return next((layer for layer, value in found.items() if not value <= tolerances[layer]), None)
+    return next((layer for layer, value in differences.items() if not value <= tolerances[layer]), None)
 
 
 def _between(G: Array, M: Array) -> Array:
@@ -233,8 +233,8 @@ def _apart(com: Array, mass: float, group: RobotBody, whole: float) -> float:
     return float(np.abs(mass * com - group.mass * group.com).max()) / whole
 
 
-def _off(found: Array, true: Array, scale: float) -> float:
-    return _largest([np.abs(found - true).max(initial=0.0) / scale])
+def _off(given: Array, true: Array, scale: float) -> float:
+    return _largest([np.abs(given - true).max(initial=0.0) / scale])
 
 
 def _largest(values: Iterable[float]) -> float:

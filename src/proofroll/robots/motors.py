@@ -17,31 +17,31 @@ _OTHER = {"dyntype": "none", "gaintype": "fixed", "timeconst": "0", "dampratio":
 def motors(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]]:
     """Tables of the actuators that a scene has, and of the others a clause each."""
     single = {joint.name for joint in robot.moving if joint.dofs == 1}
-    found: list[dict[str, Any]] = []
+    actuators: list[dict[str, Any]] = []
     clauses = []
     for number, element in enumerate(item for part in root.findall("actuator") for item in part):
         name = element.get("name") or f"actuator{number}"
         given = _given(root, element)
         table = _table(element.tag, given) if given.get("joint") in single else None
-        other = next((one for one in found if one["joint"] == given.get("joint")), None)
+        other = next((one for one in actuators if one["joint"] == given.get("joint")), None)
         if table is None or (other is not None and (merged := _merged(other, table)) is None):
             clauses.append(f"the actuator {element.tag} {name}")
         elif other is None:
-            found.append({**table, "name": name, "joint": given["joint"]})
+            actuators.append({**table, "name": name, "joint": given["joint"]})
         else:
             other.update(merged or {})
     for item, of_joint in with_classes(root, "joint"):
         ends = _numbers(of_joint.get("actuatorfrcrange", ""))
-        for table in [table for table in found if ends and table["joint"] == item.get("name")]:
+        for table in [table for table in actuators if ends and table["joint"] == item.get("name")]:
             table["limit"] = min(ends[1], table.get("limit", ends[1]))
             if ends[0] != -ends[1]:
                 clauses.append(f"the actuator force range of joint {item.get('name')}")
-    return found, clauses
+    return actuators, clauses
 
 
 def _given(root: Element, element: Element) -> dict[str, str]:
     """Attributes of an actuator; MJCF has one default for all kinds, which each writes in its own words."""
-    found: dict[str, str] = {}
+    attributes: dict[str, str] = {}
     named = {"class": element.get("class", "")} if element.get("class") else {}
     for tag in sorted(_PLAIN, key=lambda tag: tag == element.tag):  # that of its own kind last
         of_class = class_of(root, Element(tag, named))
@@ -51,8 +51,8 @@ def _given(root: Element, element: Element) -> dict[str, str]:
                 of_class |= {"biastype": "affine", "biasprm": f"0 {-float(kp or 0)} {-float(kv or 0)}"}
             if element.tag == "position" and "gainprm" in of_class:
                 of_class["kp"] = of_class["gainprm"].split()[0]
-        found |= of_class
-    return found | element.attrib
+        attributes |= of_class
+    return attributes | element.attrib
 
 
 def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
@@ -65,12 +65,12 @@ def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
     force = _range(given, "force")
     if not gear or kp < 0 or kd < 0 or (force and force[0] != -force[1]) or (force and force[1] <= 0):
         return None
-    found: dict[str, Any] = {"kind": "position" if kp else "velocity" if kd else "torque", "gear": gear}
-    found |= {name: value for name, value in (("kp", kp), ("kd", kd)) if value}
+    actuator: dict[str, Any] = {"kind": "position" if kp else "velocity" if kd else "torque", "gear": gear}
+    actuator |= {name: value for name, value in (("kp", kp), ("kd", kd)) if value}
     target = min(max(0.0, low), high) if (low, high) != (0.0, 0.0) else 0.0
     if target and tag == "general":
         return None  # its gain need not be that of its bias
-    return found | {"target": target} | ({"limit": force[1] * abs(gear)} if force else {})
+    return actuator | {"target": target} | ({"limit": force[1] * abs(gear)} if force else {})
 
 
 def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:

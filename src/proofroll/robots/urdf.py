@@ -186,21 +186,21 @@ def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> 
     for joint in joints:
         below.setdefault(joint.parent, []).append(joint)
     kind = "free" if base == "free" else "fixed"
-    found = [RobotJoint(BASE_JOINT, kind, WORLD, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
+    parents_first = [RobotJoint(BASE_JOINT, kind, WORLD, roots[0], np.zeros(3), np.eye(3), np.array([0.0, 0.0, 1.0]))]
     waiting = list(reversed(below.get(roots[0], [])))
     while waiting:
-        found.append(waiting.pop())
-        waiting += reversed(below.get(found[-1].child, []))
-    if len(found) != len(links):
+        parents_first.append(waiting.pop())
+        waiting += reversed(below.get(parents_first[-1].child, []))
+    if len(parents_first) != len(links):
         raise InputError("<robot>", roots[0], "some links form a loop; a URDF is a tree with one root")
-    return tuple(found)
+    return tuple(parents_first)
 
 
 def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
     """Each follower in terms of a joint that follows none."""
     by_joint = {mimic.joint: mimic for mimic in mimics}
     kinds = {joint.name: joint.kind for joint in robot.moving}
-    found = []
+    resolved = []
     for mimic in mimics:
         factor, offset, other, seen = mimic.multiplier, mimic.offset, mimic.other, {mimic.joint}
         while other in by_joint and other not in seen:
@@ -213,5 +213,5 @@ def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
             raise InputError(f"<joint {mimic.joint} mimic>", other, f"the file has no joint of this name{advice}")
         if other in seen or kinds.get(other) not in {"revolute", "prismatic"}:
             raise InputError(f"<joint {mimic.joint} mimic>", mimic.other, "name another joint that moves")
-        found.append(Mimic(mimic.joint, other, factor, offset))
-    return tuple(found)
+        resolved.append(Mimic(mimic.joint, other, factor, offset))
+    return tuple(resolved)

@@ -209,9 +209,9 @@ def hosts(results: Iterable[Result]) -> dict[str, int]:
     return dict(sorted(Counter(result.host for result in results if result.host).items()))
 
 
-def told_hosts(found: Mapping[str, int]) -> list[str]:
+def told_hosts(counts: Mapping[str, int]) -> list[str]:
     """A sentence about results from other machines, see :func:`hosts`; none where there are none."""
-    if not found:
+    if not counts:
         return []
-    names = ", ".join(f"{count} on {name}" for name, count in found.items())
+    names = ", ".join(f"{count} on {name}" for name, count in counts.items())
     return [f"Made on machines of a cluster: {names}. No speed is measured there."]

@@ -149,14 +149,14 @@ def _workers_of(asked: Asked) -> Workers:
         here = installed()
         other = [name for name in {**asked.installed, **here} if asked.installed.get(name) != here.get(name)]
         if other:
-            raise unfit(*({name: found.get(name, "absent") for name in other} for found in (asked.installed, here)))
+            raise unfit(*({name: workers.get(name, "absent") for name in other} for workers in (asked.installed, here)))
     with _lock:
-        found = _workers.setdefault(asked.command, Workers(asked.memory, _ENGINES))
+        workers = _workers.setdefault(asked.command, Workers(asked.memory, _ENGINES))
         _workers.move_to_end(asked.command)
         surplus = [_workers.popitem(last=False)[1] for _ in range(len(_workers) - _COMMANDS)]
     for old in surplus:
         old.close()
-    return found
+    return workers
 
 
 def _check(asked: Asked, case: Case, workers: Workers) -> None:

@@ -99,7 +99,7 @@ def test_a_first_look_stays_within_its_budget(
 
 def test_a_budget_is_for_scenes(command_line: Callable[..., tuple[int, str, str]]) -> None:
     """A comparison file runs all that it asks for, and a cluster has no budget: both are said."""
-    code, _, err = command_line("compare", "bricard", "--budget", "10")
+    code, _, err = command_line("compare", "paper", "--budget", "10")
     assert code == 2
     assert "a comparison file runs all that it asks for" in err
     code, _, err = command_line("compare", "pendulum", "--budget", "10", "--scheduler", "local:1")

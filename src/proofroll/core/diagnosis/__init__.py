@@ -196,5 +196,5 @@ def apart(one: FloatArray, other: FloatArray) -> float:
     """Largest difference; infinite where something is not finite in one of them alone."""
     difference = np.abs(np.asarray(one) - np.asarray(other))
     known = difference[~(np.isnan(one) & np.isnan(other))] if difference.size else difference
-    found = float(np.max(known, initial=0.0))
-    return found if np.isfinite(found) else float("inf")
+    largest = float(np.max(known, initial=0.0))
+    return largest if np.isfinite(largest) else float("inf")

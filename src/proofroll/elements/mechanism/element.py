@@ -132,7 +132,7 @@ class MechanismElement:
 
         with contextlib.suppress(Refused):
             dynamics = ContactDynamics(self.mechanism) if self.mechanism.contacts else None
-            return dynamics and (dynamics, dynamics.begin()[0])
+            return (dynamics, dynamics.begin()[0]) if dynamics else None
         return None
 
     @cached_property

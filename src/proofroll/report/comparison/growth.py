@@ -80,7 +80,7 @@ def _slope(costs: dict[float, float], values: list[float]) -> tuple[float | None
     used = [value for value in values if value in costs][-max(_FEWEST, (len(values) + 1) // 2) :]
     if len(used) < _FEWEST:
         return None, None
-    found, covariance = np.polyfit(np.log(used), np.log([costs[value] for value in used]), 1, cov="unscaled")
-    rest = np.log([costs[value] for value in used]) - np.polyval(found, np.log(used))
+    line, covariance = np.polyfit(np.log(used), np.log([costs[value] for value in used]), 1, cov="unscaled")
+    rest = np.log([costs[value] for value in used]) - np.polyval(line, np.log(used))
     variance = float(rest @ rest) / max(1, len(used) - 2)
-    return float(found[0]), float(np.sqrt(variance * covariance[0, 0]))
+    return float(line[0]), float(np.sqrt(variance * covariance[0, 0]))

@@ -19,13 +19,13 @@ from proofroll.studies.comparison.planning import point_name
 def lines_of(outcome: Outcome) -> list[TableLine]:
     """A line for each judgement, and for each error of a rung, to which no verdict belongs."""
     numbers = {key: number for number, key in enumerate(by_row(outcome))}
-    found: list[TableLine] = []
+    lines: list[TableLine] = []
     for run in outcome.runs:
         plain = _plain(outcome, run, numbers[id(run.row)])
-        found += [_judged(outcome, run, plain, item) for item in run.judgements] or [plain]
+        lines += [_judged(outcome, run, plain, item) for item in run.judgements] or [plain]
         for rung in run.rungs:
-            found += _of_rung(outcome, run, plain, rung)
-    return found
+            lines += _of_rung(outcome, run, plain, rung)
+    return lines
 
 
 def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:

@@ -92,16 +92,16 @@ def _closest(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     )
 
 
-def _obvious(content: ReportedComparison, found: list[Candidate]) -> str:
+def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
     """Price of the obvious model: the default preset against the best of the same engine."""
     rows = content.rows
     worst: tuple[float, Candidate, Candidate] | None = None
     lost: list[str] = []
-    for score in found:
+    for score in scored:
         row = rows[score.row]
         others = [
             other
-            for other in found
+            for other in scored
             if rows[other.row].name == row.name and rows[other.row].preset != "default" and other.motion is not None
         ]
         if row.preset != "default" or not others:
@@ -149,10 +149,10 @@ def _order(content: ReportedComparison) -> list[str]:
 
 def _surprises(content: ReportedComparison) -> str:
     """Sentence on results that contradict the comparison's expectation."""
-    found = content.contradictions
-    if found:
-        more = f" (and {len(found) - 1} more, listed below)" if len(found) > 1 else ""
-        return f"Not expected: {found[0]}{more}."
+    contradictions = content.contradictions
+    if contradictions:
+        more = f" (and {len(contradictions) - 1} more, listed below)" if len(contradictions) > 1 else ""
+        return f"Not expected: {contradictions[0]}{more}."
     known = [row for row in content.rows if row.verdict != "agrees"]
     if not known:
         return "Nothing contradicts what the comparison expects, and nothing disagrees with the truth."

@@ -140,27 +140,27 @@ def _why(runs: list[Run]) -> tuple[str, str]:
 
 def _remarks(runs: list[Run]) -> list[str]:
     """Remarks on the runs, on the observable whose wrong limit is the largest part of its tolerance, and on a floor."""
-    found = list(dict.fromkeys(run.shared for run in runs if run.shared))
+    remarks = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
         where = at_point(run.parameters)
-        found += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
+        remarks += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
     # beyond its tolerance the reason of the verdict has it
     floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.error <= item.tolerance]
     if floors:
         run, item = max(floors, key=lambda pair: pair[1].error / pair[1].tolerance)
-        found.append(f"{item.observable}{at_point(run.parameters)}: {item.floor}")
-    return found
+        remarks.append(f"{item.observable}{at_point(run.parameters)}: {item.floor}")
+    return remarks
 
 
 def _diagnosis(runs: list[Run]) -> list[CauseAt]:
     """Causes that were proven at some point of the parameters, each once, with the points."""
-    found: dict[str, CauseAt] = {}
+    causes: dict[str, CauseAt] = {}
     for run in runs:
         for item in run.diagnosis:
-            found.setdefault(item.cause.id, CauseAt(item, [])).points.append(point_name(run.parameters))
-    return list(found.values())
+            causes.setdefault(item.cause.id, CauseAt(item, [])).points.append(point_name(run.parameters))
+    return list(causes.values())
 
 
 def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:

@@ -27,10 +27,10 @@ def observables(content: ReportedComparison) -> dict[str, str]:
 
 def seconds_before(content: ReportedComparison) -> dict[int, float]:
     """Row -> longest time before the first step [s]; empty unless an engine takes as long as only compilers do."""
-    found: dict[int, float] = {}
+    longest: dict[int, float] = {}
     for run in content.runs:
-        found[run.row] = max(found.get(run.row, 0.0), run.build_seconds or 0.0)
-    return found if max(found.values(), default=0.0) > _COMPILES else {}
+        longest[run.row] = max(longest.get(run.row, 0.0), run.build_seconds or 0.0)
+    return longest if max(longest.values(), default=0.0) > _COMPILES else {}
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
         for observable, verdicts in row.expected_for.items():
             text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
         groups.setdefault((row.tolerance, text, row.because, tuple(_further(row.claims))), []).append(name)
-    return [Expectation(found, *said) for said, found in groups.items()]
+    return [Expectation(settings, *said) for said, settings in groups.items()]
 
 
 def _further(claims: Claims) -> list[str]:
@@ -66,7 +66,7 @@ def _further(claims: Claims) -> list[str]:
 
 def _where(values: Mapping[str, Sequence[float]]) -> str:
     """Values of parameters: ``speed=2, mu_static=0.35 or 0.4``."""
-    return ", ".join(f"{name}={' or '.join(number(v, 6) for v in found)}" for name, found in values.items())
+    return ", ".join(f"{name}={' or '.join(number(v, 6) for v in numbers)}" for name, numbers in values.items())
 
 
 def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedRun]]:
@@ -96,11 +96,11 @@ def cost_title(cost: Cost | None) -> str:
 
 def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
     """Reasons for quantities of a certificate to differ by more than round-off: reason -> quantities."""
-    found: dict[str, list[str]] = {}
+    quantities: dict[str, list[str]] = {}
     for line in certificate:
         if line["because"]:
-            found.setdefault(line["because"], []).append(line["quantity"])
-    return found
+            quantities.setdefault(line["because"], []).append(line["quantity"])
+    return quantities
 
 
 @dataclass(frozen=True)
@@ -143,8 +143,8 @@ def belief(content: ReportedComparison) -> list[Belief]:
 
 def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
     """Name of each row with a proven cause of its difference, the cause, and what to do."""
-    found = ((name, told.cause) for name, row, _ in content.lines() for told in row.diagnosis)
-    return [(name, cause.sentence, cause.cause.remedy) for name, cause in found]
+    proven = ((name, told.cause) for name, row, _ in content.lines() for told in row.diagnosis)
+    return [(name, cause.sentence, cause.cause.remedy) for name, cause in proven]
 
 
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:

@@ -23,17 +23,17 @@ class Cell:
     @property
     def title(self) -> str:
         """All about it: with error bar, tolerance, and what the ladder of steps says, where there is one."""
-        found = self.judgement
+        judgement = self.judgement
         said = (
-            f"{symbol(found.observable)} {found.verdict}: error {error(found.error)} ± "
-            f"{number(found.truth_error_bar, 1)} {unit(found.unit)}, tolerance {number(found.tolerance)}"
+            f"{symbol(judgement.observable)} {judgement.verdict}: error {error(judgement.error)} ± "
+            f"{number(judgement.truth_error_bar, 1)} {unit(judgement.unit)}, tolerance {number(judgement.tolerance)}"
         )
         if self.point:
             said += f" at {self.point}"
-        if found.limit_error_bar is None:
+        if judgement.limit_error_bar is None:
             return said
-        off = f"{error(found.limit_error)} ± {error(found.limit_error_bar, 1)}"
-        return f"{said}; {found.limit}: off by {off}, order {number(found.order)}"
+        off = f"{error(judgement.limit_error)} ± {error(judgement.limit_error_bar, 1)}"
+        return f"{said}; {judgement.limit}: off by {off}, order {number(judgement.order)}"
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ def counted(content: ReportedComparison) -> str:
     """Counts of settings by verdict, in one line."""
     verdicts = [row.verdict.value for row in content.rows]
     said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
-    found = "nothing is contradicted" if unjudged(content) else "as expected"
-    return f"{told(len(verdicts), 'settings')}: {said}; {found if content.as_expected else 'not as expected'}"
+    surprise = "nothing is contradicted" if unjudged(content) else "as expected"
+    return f"{told(len(verdicts), 'settings')}: {said}; {surprise if content.as_expected else 'not as expected'}"
 
 
 def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:

@@ -231,8 +231,8 @@ def _of_terms(content: LadderContent) -> Iterator[str]:
     """One sentence per term and verdict, over all models."""
     name, unit = content.quantity, content.unit
     groups: dict[tuple[str, Need], list[TermFound]] = {}
-    for found in content.terms:
-        groups.setdefault((found.term, found.verdict), []).append(found)
+    for judged_term in content.terms:
+        groups.setdefault((judged_term.term, judged_term.verdict), []).append(judged_term)
     for (term, verdict), rows in groups.items():
         where = ", ".join(label(row) for row in rows)
         largest = max((row.change for row in rows if row.change is not None), default=None)

@@ -95,14 +95,14 @@ def _engines(
     matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool
 ) -> list[tuple[str, ChoiceCell]]:
     """Best formulation of each engine: the cheapest that holds the tolerance, else the one that comes closest to it."""
-    found: dict[str, tuple[str, ChoiceCell]] = {}
+    best_of: dict[str, tuple[str, ChoiceCell]] = {}
     for row in matrix.models:
         cell = matrix.cell(row, column, tolerance, forces)
         if row.found.keys() & set(column.studies):
-            best = found.setdefault(row.engine, (row.name, cell))
+            best = best_of.setdefault(row.engine, (row.name, cell))
             if _standing(cell) < _standing(best[1]):
-                found[row.engine] = (row.name, cell)
-    return list(found.values())
+                best_of[row.engine] = (row.name, cell)
+    return list(best_of.values())
 
 
 def _standing(cell: ChoiceCell) -> tuple[float, int]:

@@ -64,11 +64,11 @@ def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> 
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
     limits = _limit(lines, "motion"), _limit(lines, "reaction")
-    found = []
+    steps = []
     for value in dict.fromkeys(line.step for line in lines):
         at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
-        found.append(_candidate(lines[0], value, at, limits=limits, anchors=_anchors(href, lines[0].row, places)))
-    return sorted(found, key=lambda item: item.name != _name(lines[0], own))
+        steps.append(_candidate(lines[0], value, at, limits=limits, anchors=_anchors(href, lines[0].row, places)))
+    return sorted(steps, key=lambda item: item.name != _name(lines[0], own))
 
 
 def _candidate(

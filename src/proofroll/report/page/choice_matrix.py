@@ -118,8 +118,8 @@ class ChoiceMatrix:
     @cached_property
     def without_forces(self) -> set[str]:
         """Studies in which no run has forces that are judged, as where they are not unique."""
-        found = [(name, item.forces) for row in self.rows for name, items in row.found.items() for item in items]
-        return {name for name, _ in found} - {name for name, forces in found if forces is not None}
+        sizes = [(name, item.forces) for row in self.rows for name, items in row.found.items() for item in items]
+        return {name for name, _ in sizes} - {name for name, forces in sizes if forces is not None}
 
     @property
     def models(self) -> list[ChoiceRow]:
@@ -134,8 +134,8 @@ class ChoiceMatrix:
     def best(self, tolerance: float, forces: bool) -> list[int | None]:
         """Row of each column's cheapest formulation; None where none holds the tolerance."""
         rows = {row.name: place for place, row in enumerate(self.rows) if not row.setting}
-        found = [self.cheapest(column, tolerance, forces) for column in self.columns]
-        return [rows[name] if math.isfinite(cell.cost) else None for name, cell in found]
+        cheapest = [self.cheapest(column, tolerance, forces) for column in self.columns]
+        return [rows[name] if math.isfinite(cell.cost) else None for name, cell in cheapest]
 
     def answer(self, tolerance: float, forces: bool) -> str:
         """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
@@ -203,9 +203,9 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
     return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: row.name not in useful), titles)
 
 
-def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
+def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
     """The cheapest candidate of one study that holds the tolerance; else the closest one, or why there is none."""
-    whole = [item for item in found if item.blame is None]
+    whole = [item for item in steps if item.blame is None]
     told = [(size, item) for item in whole if (size := item.error(forces)) is not None]
     held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in told if size <= tolerance]
     if held:
@@ -224,7 +224,7 @@ def _cell(found: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
         lacking = "no forces" if whole[0].motion is not None else "no motion"
         title = f"{whole[0].name}: reports {lacking}"
         return ChoiceCell(Verdict.INCOMPLETE, lacking, title, whole[0].href, why=f"reports {lacking}")
-    item = found[0]
+    item = steps[0]
     state = item.blame or Verdict.FAILED
     return ChoiceCell(state, str(state), f"{item.name}: {item.message}".rstrip(": "), item.href, why=str(state))
 

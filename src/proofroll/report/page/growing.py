@@ -56,10 +56,10 @@ class Report:
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
         further = [line for part in self.parts for line in self._lines.get(id(part), ())]
         table = LongTable([*self.compared.table.lines, *further])
-        found = replace(self.compared, entries=entries, environment=environment, table=table).summarised
+        content = replace(self.compared, entries=entries, environment=environment, table=table).summarised
         if self.earlier is None:
-            return found
-        return replace(found, against=against(self.earlier, table.lines, environment.machine, environment.versions))
+            return content
+        return replace(content, against=against(self.earlier, table.lines, environment.machine, environment.versions))
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
         """Lists further studies with what is kept of them in the folder of all results, unless it is made ``fresh``.
@@ -136,9 +136,9 @@ def write_report(outcomes: list[Outcome], out: Path, command: str) -> ReportCont
 def _replay(outcomes: list[Outcome]) -> Replay | None:
     """The replay of the comparisons, one kind of scenes after the other."""
     kinds = {id(item): kind_of(item.scene) for item in outcomes}
-    found = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
+    drawn_by = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
     return joined(
-        [replay_content([item for item in outcomes if kinds[id(item)] is kind], kind.replay()) for kind in found]
+        [replay_content([item for item in outcomes if kinds[id(item)] is kind], kind.replay()) for kind in drawn_by]
     )
 
 

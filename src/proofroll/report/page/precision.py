@@ -63,12 +63,12 @@ def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
     curves: dict[tuple[str, str, str, str], list[TableLine]] = {}
     for line in judged:
         curves.setdefault((line.engine, line.formulation, line.setting, line.resolution), []).append(line)
-    found = [_curve(own, groups, named) for own in curves.values()]
-    found = [curve for curve in found if curve.points]
-    if sum(len(curve.points) for curve in found) < _FEWEST:
+    drawn = [_curve(own, groups, named) for own in curves.values()]
+    drawn = [curve for curve in drawn if curve.points]
+    if sum(len(curve.points) for curve in drawn) < _FEWEST:
         return None
     titles = {"motion": "motion (largest of all coordinates)", "reaction": "forces (largest of all reactions)"}
-    return WorkPrecision([*(titles[role] for role in groups), *map(symbol, named)], found)
+    return WorkPrecision([*(titles[role] for role in groups), *map(symbol, named)], drawn)
 
 
 def _curve(lines: Sequence[TableLine], groups: Sequence[str], named: Sequence[str]) -> PrecisionCurve:

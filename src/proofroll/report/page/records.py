@@ -158,8 +158,8 @@ class ReportContent:
         lines: dict[str, list[TableLine]] = {name: [] for name in sections}
         for line in self.table.lines:
             lines.get(line.study, []).append(line)
-        found = {section: work_precision(lines[name]) for name, section in sections.items()}
-        return {section: item for section, item in found.items() if item is not None}
+        pictures = {section: work_precision(lines[name]) for name, section in sections.items()}
+        return {section: item for section, item in pictures.items() if item is not None}
 
 
 def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
@@ -204,7 +204,7 @@ def _comparison(outcome: Outcome, lines: Sequence[TableLine]) -> ReportedCompari
 
 def _truths(outcome: Outcome) -> list[ReportedTruth]:
     """Routes and error bars of the truth at each point."""
-    found = []
+    truths = []
     for name, point in outcome.points.items():
         entry = ReportedTruth(name, point.case.parameters, point.trajectory.shown, point.result.wall_seconds)
         if point.reference is not None:
@@ -221,5 +221,5 @@ def _truths(outcome: Outcome) -> list[ReportedTruth]:
                 },
                 own=kind.truth_facts(scene, dataset) if kind is not None else None,
             )
-        found.append(entry)
-    return found
+        truths.append(entry)
+    return truths

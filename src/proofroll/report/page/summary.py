@@ -58,28 +58,28 @@ def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> 
 
 def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityStudy]) -> str:
     """Sentence on settings that are silently wrong, and on boundaries of stability passed in silence."""
-    found = [item for comparison in comparisons for item in _wrong(comparison)]
+    wrong = [item for comparison in comparisons for item in _wrong(comparison)]
     silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
-    if not found:
+    if not wrong:
         nothing = "No setting that ran to its end differs from the truth"
         if not comparisons:
             return f"{passed}." if maps else "Nothing that was run could be silently wrong: nothing was compared."
         return f"{nothing}; {passed}." if maps else f"{nothing}."
-    _, name, text = max(found)
-    verbs = ("differ", "run") if len(found) > 1 else ("differs", "runs")
-    said = f"{len(found)} {verbs[0]} from the truth and {verbs[1]} to the end without a word, worst {name}: {text}"
+    _, name, text = max(wrong)
+    verbs = ("differ", "run") if len(wrong) > 1 else ("differs", "runs")
+    said = f"{len(wrong)} {verbs[0]} from the truth and {verbs[1]} to the end without a word, worst {name}: {text}"
     return f"{said}; {passed}." if maps else f"{said}."
 
 
 def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
     """Rows that differ though each of their runs ended as done: relative error, name, and text of the error."""
-    found = []
+    wrong = []
     for name, row, runs in comparison.lines():
         if row.verdict != "differs" or any(run.status != "done" for run in runs):
             continue
         worst = furthest_off(comparison, runs)
         relative = 0.0 if worst is None else worst.error / worst.scale
         text = "a reaction or an event is wrong" if worst is None else off_by(worst)
-        found.append((relative, with_caveat(name, row.caveat), text))
-    return found
+        wrong.append((relative, with_caveat(name, row.caveat), text))
+    return wrong

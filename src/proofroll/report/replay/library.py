@@ -31,11 +31,11 @@ def three() -> dict[str, str] | None:
         makers' notice and the terms.
     """
     try:
-        found = distribution(_PACKAGE)
-        with zipfile.ZipFile(io.BytesIO(_bytes(found, _VIEWER))) as viewer:
+        package = distribution(_PACKAGE)
+        with zipfile.ZipFile(io.BytesIO(_bytes(package, _VIEWER))) as viewer:
             page = viewer.read(viewer.namelist()[0]).decode("utf-8")
-        licence = next(str(file) for file in found.files or [] if file.name.startswith("LICENSE"))
-        terms = _bytes(found, licence).decode("utf-8")
+        licence = next(str(file) for file in package.files or [] if file.name.startswith("LICENSE"))
+        terms = _bytes(package, licence).decode("utf-8")
     except (PackageNotFoundError, OSError, KeyError, StopIteration, zipfile.BadZipFile):
         return None
     script = _SCRIPT.search(page)
@@ -45,13 +45,13 @@ def three() -> dict[str, str] | None:
     revision = _REVISION.search(program)
     return {
         "packed": packed(f"{notice}\n{program}\n".encode()),
-        "version": f"three.js {'r' + revision[1] if revision else ''} from {_PACKAGE} {found.version}",
+        "version": f"three.js {'r' + revision[1] if revision else ''} from {_PACKAGE} {package.version}",
         "licence": f"{notice}\n{terms[terms.index('Permission is') :]}" if "Permission is" in terms else notice,
     }
 
 
-def _bytes(found: Any, name: str) -> bytes:
-    return bytes(found.locate_file(name).read_bytes())
+def _bytes(package: Any, name: str) -> bytes:
+    return bytes(package.locate_file(name).read_bytes())
 
 
 def thinned(values: npt.NDArray[Any], step: float) -> bytes:

@@ -34,14 +34,14 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
     first, of each engine the ``default`` one is shown that is furthest off.
     """
-    found: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
+    shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
         for name, point in outcome.points.items():
             if point.reference is not None:
-                found.setdefault(point.case.key, (point, []))[1].append((outcome, name))
+                shown_in.setdefault(point.case.key, (point, []))[1].append((outcome, name))
     looks = {id(outcome): _looks(outcome) for outcome in outcomes}
     cases, numbers = [], []
-    for point, shared in found.values():
+    for point, shared in shown_in.values():
         assert point.reference is not None  # or it would not be among them
         true = point.reference.dataset["p_WB"].to_numpy()
         ghosts = [
@@ -56,7 +56,7 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
         cases.append(content)
         numbers.append(packed_numbers)
     own = {outcome.scene.digest for outcome in outcomes}
-    start = next((number for number, (point, _) in enumerate(found.values()) if point.scene.digest in own), 0)
+    start = next((number for number, (point, _) in enumerate(shown_in.values()) if point.scene.digest in own), 0)
     return Replay(three(), start, cases, numbers)
 
 

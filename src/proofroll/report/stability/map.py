@@ -48,14 +48,16 @@ def svg(study: StabilityStudy) -> str:
 
 def letters(study: StabilityStudy) -> dict[str, str]:
     """Letter of each kind of failure; further kinds take the first letter of their words that is free."""
-    found = dict(_LETTERS)
+    letter_of = dict(_LETTERS)
     for kind in study.meanings:
-        if kind not in found:
+        if kind not in letter_of:
             left = (
-                letter for letter in kind + string.ascii_letters if letter.isalpha() and letter not in found.values()
+                letter
+                for letter in kind + string.ascii_letters
+                if letter.isalpha() and letter not in letter_of.values()
             )
-            found[kind] = next(left, kind)
-    return found
+            letter_of[kind] = next(left, kind)
+    return letter_of
 
 
 def legend(study: StabilityStudy) -> list[str]:

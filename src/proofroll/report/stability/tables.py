@@ -81,18 +81,18 @@ def boundary_table(study: StabilityStudy) -> Table:
 
 def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]:
     """The points by curve and axis."""
-    found: dict[tuple[str, str], list[BoundaryPoint]] = {}
+    groups: dict[tuple[str, str], list[BoundaryPoint]] = {}
     for point in study.points:
-        found.setdefault((point.curve, point.axis), []).append(point)
-    return found
+        groups.setdefault((point.curve, point.axis), []).append(point)
+    return groups
 
 
 def size(point: BoundaryPoint, side: str) -> float | None:
     """A boundary as the first dimensionless number that the scene has of a step; a tolerance as it is."""
-    found = point.sides[side]
+    limit = point.sides[side]
     if point.resolution != "dt":
-        return found.largest
-    return next(iter(found.numbers.values()), None)
+        return limit.largest
+    return next(iter(limit.numbers.values()), None)
 
 
 def _range(points: Sequence[BoundaryPoint], side: str) -> str:
@@ -108,11 +108,11 @@ def _range(points: Sequence[BoundaryPoint], side: str) -> str:
     return low if low == high else f"{low}…{high}"
 
 
-def _explained(found: ExplainedBoundary | None, symbols: Mapping[str, str]) -> str:
+def _explained(boundary: ExplainedBoundary | None, symbols: Mapping[str, str]) -> str:
     """The number that stays the same while the axis moves the others."""
-    if found is None or not found.explains:
+    if boundary is None or not boundary.explains:
         return ""
-    return f"{symbols[found.number]} {number(found.low)}…{number(found.high)}"
+    return f"{symbols[boundary.number]} {number(boundary.low)}…{number(boundary.high)}"
 
 
 def silent_lines(study: StabilityStudy) -> Iterator[str]:

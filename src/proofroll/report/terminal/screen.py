@@ -115,7 +115,7 @@ def _size(column: Column, console: Console, most: int) -> Measurement:
     rest is left out.
     """
     wide = console.options.update(width=_WIDEST)
-    found = [Measurement.get(console, wide, cell) for cell in (column.header, *column.cells)]
-    natural = min(max(item.maximum for item in found), column.max_width or _WIDEST)
-    least = natural if column.no_wrap else max(*(item.minimum for item in found), min(column.min_width or 0, natural))
+    widths = [Measurement.get(console, wide, cell) for cell in (column.header, *column.cells)]
+    natural = min(max(item.maximum for item in widths), column.max_width or _WIDEST)
+    least = natural if column.no_wrap else max(*(item.minimum for item in widths), min(column.min_width or 0, natural))
     return Measurement(min(least, most), min(max(least, natural), most))

@@ -147,14 +147,14 @@ def part_lines(content: ReportContent) -> list[str]:
     return [f"{entry.name}: {kind.line(entry)}." for kind, entry in pairs]
 
 
-def change_lines(found: Against | None) -> list[str]:
+def change_lines(changes: Against | None) -> list[str]:
     """Changes since an earlier report, a line for each run; none without an earlier one."""
-    if found is None:
+    if changes is None:
         return []
-    head = f"Against {found.old} of {found.date[:10]}. {found.sentence}"
-    versions = [f"{name} {old} → {new}" for name, (old, new) in found.versions.items()]
+    head = f"Against {changes.old} of {changes.date[:10]}. {changes.sentence}"
+    versions = [f"{name} {old} → {new}" for name, (old, new) in changes.versions.items()]
     lines = [f"Other versions: {', '.join(versions)}."] if versions else []
-    for item in found.changes:
+    for item in changes.changes:
         where = f" at {item.place}" if item.place else ""
         lines.append(f"!! {item.study}: {item.run}{where}: {'; '.join(item.says) or item.kind}")
     return [head, *lines]

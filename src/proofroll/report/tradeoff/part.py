@@ -113,7 +113,7 @@ class TradeoffPart(Part):
         scene = self.asked.swept.loaded
         group, place = group_of(scene), point_name(study.parameters)
         limits = {(item.curve, item.quantity): _limit(item) for item in study.budgets}
-        found = []
+        lines = []
         for point in study.points:
             low, high = point.interval or (None, None)
             run: dict[str, Any] = {
@@ -125,7 +125,7 @@ class TradeoffPart(Part):
                 "status": point.status, "message": "" if point.status == Status.DONE else point.message, "verdict": "",
                 "cost": point.seconds_per_second, "cost_low": low, "cost_high": high, "clean": True,
             }  # fmt: skip
-            found += [
+            lines += [
                 TableLine(
                     **run,
                     quantity=name,
@@ -140,7 +140,7 @@ class TradeoffPart(Part):
                 for name, error in point.envelope.items()
                 if name in study.quantities
             ] or [TableLine(**run)]
-        return found
+        return lines
 
 
 def _limit(budget: CurveBudget) -> str:

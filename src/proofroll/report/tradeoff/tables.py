@@ -227,9 +227,9 @@ def _steps(item: CurveBudget) -> str:
     return f"{number(item.order_from)} → {number(item.order_to)}"
 
 
-def answer_lines(found: Recommendation) -> Iterator[str]:
+def answer_lines(advice: Recommendation) -> Iterator[str]:
     """A recommendation, line by line."""
-    answer = found.answer
+    answer = advice.answer
     asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
     if answer.choice is None:
         yield f"Nothing that was measured holds {asked} with margin."
@@ -237,12 +237,12 @@ def answer_lines(found: Recommendation) -> Iterator[str]:
             yield f"Closest: {_line(answer.closest, answer.unit)}"
     else:
         yield f"For {asked}, use {_line(answer.choice, answer.unit)}"
-        if not found.affordable:
-            yield f"That is more than the budget of {number(found.budget)} s per simulated second."
+        if not advice.affordable:
+            yield f"That is more than the budget of {number(advice.budget)} s per simulated second."
     for tie in answer.ties:
         yield f"A tie in cost, as far as the intervals tell: {_line(tie, answer.unit)}"
     for choice, words in (
-        (found.best_within_budget, "Within the budget"),
+        (advice.best_within_budget, "Within the budget"),
         (answer.runner_up, "Runner-up"),
         (answer.first_failure, "Cheaper ones fail; the most accurate of them"),
         (answer.least_model, "If this scene is all you need, its own equations do"),
@@ -250,10 +250,10 @@ def answer_lines(found: Recommendation) -> Iterator[str]:
         if choice:
             yield f"{words}: {_line(choice, answer.unit)}"
     yield "Costs are those of an engine through this adapter; another way to drive it may cost more or less."
-    yield _checked(found)
-    if found.not_measured:
-        yield f"Not among what was measured: {', '.join(found.not_measured)}."
-    yield _measured(found.measured)
+    yield _checked(advice)
+    if advice.not_measured:
+        yield f"Not among what was measured: {', '.join(advice.not_measured)}."
+    yield _measured(advice.measured)
 
 
 def _line(choice: Choice, of: str) -> str:
@@ -263,10 +263,10 @@ def _line(choice: Choice, of: str) -> str:
     return with_caveat(f"{said}; {choice.reason}", point.caveat) + "."
 
 
-def _checked(found: Recommendation) -> str:
-    checked = found.checked
+def _checked(advice: Recommendation) -> str:
+    checked = advice.checked
     over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked.parameters.items()]
-    said = f"Checked over {checked.until:g} s at {listed(found.parameters) or 'the default parameters'}"
+    said = f"Checked over {checked.until:g} s at {listed(advice.parameters) or 'the default parameters'}"
     if over:
         said += f", and at {checked.corners} corners of {', '.join(over)}"
     return said + "; nothing is known beyond."

@@ -65,7 +65,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         band = comparison.bands[run.row.tolerance]
         judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
-        found = _run(
+        judged_run = _run(
             run,
             result,
             judgements=judgements,
@@ -74,15 +74,15 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             shared=reference.shared(run.facts.shares),
             rungs=_rungs(run, results, errors),
         )
-        if found.verdict == Verdict.DIFFERS:
+        if judged_run.verdict == Verdict.DIFFERS:
             true, main = reference.dataset, trajectories[1.0]
             causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
-            found = replace(found, diagnosis=causes)
-        judged.append(found)
+            judged_run = replace(judged_run, diagnosis=causes)
+        judged.append(judged_run)
     unfinished = left_out(results)
     judged = [
-        replace(found, contradictions=[]) if unfinished & run.keys(planned.truths) else found
-        for run, found in zip(planned.runs, judged, strict=True)
+        replace(judged_run, contradictions=[]) if unfinished & run.keys(planned.truths) else judged_run
+        for run, judged_run in zip(planned.runs, judged, strict=True)
     ]
     judged = [run if run.result.trajectory is None else _with_trajectory(run, held) for run in judged]
     return Outcome(comparison, planned.scene, planned.file, judged, points, _beyond_budget(planned, results))
@@ -101,10 +101,10 @@ def run_plan(
     if seconds is None:
         return runner.run(planned.cases, progress)
     budget = TimeBudget(seconds, planned.comparison.spent)
-    found: dict[str, Result] = {}
+    results: dict[str, Result] = {}
     for cases in planned.stages:
-        found |= runner.run(cases, progress, budget)
-    return found
+        results |= runner.run(cases, progress, budget)
+    return results
 
 
 def _beyond_budget(planned: Plan, results: Mapping[str, Result]) -> list[str]:
@@ -128,10 +128,10 @@ def compare(
     return evaluate(planned, run_plan(planned, runner, progress), runner)
 
 
-def _run(planned: Planned, result: Result, **found: Any) -> Run:
+def _run(planned: Planned, result: Result, **judged: Any) -> Run:
     """A run of a plan with its result and what was found of it."""
     facts = planned.facts if isinstance(planned.facts, EngineFacts) else None
-    return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **found)
+    return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **judged)
 
 
 def _with_trajectory(run: Run, held: Mapping[str, StoredTrajectory]) -> Run:
@@ -153,13 +153,13 @@ def _absent(run: Planned) -> Run:
 def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
     """A row that was refused, or failed."""
     causes = diagnosed(point.scene, result.certificate, step=run.ladder[1.0].engine.step)
-    found = _run(run, result, diagnosis=causes)
+    failed = _run(run, result, diagnosis=causes)
     expected = run.row.expected(run.parameters)
-    if found.verdict in expected:
-        return found
+    if failed.verdict in expected:
+        return failed
     where = f"{run.row.engine}{at_point(run.parameters)}"
     said = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"
-    return replace(found, contradictions=[said])
+    return replace(failed, contradictions=[said])
 
 
 def _without_truth(run: Planned, point: ComparedPoint, result: Result) -> Run:
@@ -217,22 +217,22 @@ def _judgements(
         if name not in given and judgement.verdict is not Verdict.DIFFERS:
             continue
         judgements.append(judgement)
-        for factor, found in curves.items():
-            if name in found:
+        for factor, observed in curves.items():
+            if name in observed:
                 between = held_against.between(reference, name, trajectories[factor])
                 off_grid = 0.0 if between is None else largest_difference(*between)
-                errors[factor][name] = max(largest_difference(found[name], true), off_grid)
+                errors[factor][name] = max(largest_difference(observed[name], true), off_grid)
     return judgements, errors
 
 
 def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[str, float]]) -> list[LadderRun]:
     """The ladder without the run itself."""
-    found = []
+    rungs = []
     for factor, case in run.ladder.items():
         facts = case.engine
         if factor != 1 and facts.resolution is not None:
-            found.append(LadderRun(facts.settings[facts.resolution], results[case.key], errors.get(factor, {})))
-    return found
+            rungs.append(LadderRun(facts.settings[facts.resolution], results[case.key], errors.get(factor, {})))
+    return rungs
 
 
 def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], scale: float) -> Limit | None:
@@ -267,7 +267,7 @@ def _with_floor(
     facts = run.facts
     if limit is None or not limit.rounded or not isinstance(facts, EngineFacts) or facts.step is None:
         return limit
-    errors = {facts.step * factor: largest_difference(found[name], true) for factor, found in curves.items()}
+    errors = {facts.step * factor: largest_difference(observed[name], true) for factor, observed in curves.items()}
     return replace(limit, floor=floor_of(errors, scale, unit))
 
 

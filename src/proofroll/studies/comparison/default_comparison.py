@@ -69,12 +69,12 @@ def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) 
     if dt is None:
         return [*engines]
     specs = [parse_engine(engine) for engine in engines]
-    found = resolve([(spec.name, spec.options) for spec in specs], workers)
+    resolved = resolve([(spec.name, spec.options) for spec in specs], workers)
     return [
         str(replace(spec, options={**spec.options, "dt": f"{dt:g}"}))
         if isinstance(facts, EngineFacts) and facts.step is not None and facts.step > dt
         else engine
-        for engine, spec, facts in zip(engines, specs, found, strict=True)
+        for engine, spec, facts in zip(engines, specs, resolved, strict=True)
     ]
 
 
@@ -87,25 +87,25 @@ def bounds(scene: Scene, every: float) -> dict[str, Tolerance]:
     moves = {key: item for key, item in all_of.items() if item.headline}
     moves = moves or {scene.deciding: scene.observable(scene.deciding)}
     moves |= {key: item for key, item in all_of.items() if item.watched or item.asked_as in scene.asks}
-    found = {
+    tolerances = {
         key: Tolerance(0.01, True) if item.floor is not None else Tolerance(1e-3, False, item.unit)
         for key, item in moves.items()
     }
     events = [key for key, item in scene.observables.items() if item.watched and item.role is Role.EVENT]
-    return found | dict.fromkeys(events, Tolerance(every, False, "s"))
+    return tolerances | dict.fromkeys(events, Tolerance(every, False, "s"))
 
 
 def able(scene: Scene, workers: Workers | None = None, *, first: bool = False) -> list[str]:
     """Formulations of installed engines that can represent the scene, as files write them; ``first``: one of each."""
-    found = []
+    formulations = []
     for told in _installed(workers):
         fitting = [
             name
             for name in told.provides
             if represents(scene, name, told.provides) and offered(name, scene.requires, told.made_for)
         ]
-        found += [f"{told.name}[formulation={name}]" for name in fitting[: 1 if first else None]]
-    return found
+        formulations += [f"{told.name}[formulation={name}]" for name in fitting[: 1 if first else None]]
+    return formulations
 
 
 def _installed(workers: Workers | None) -> list[EngineDescription]:
@@ -134,14 +134,14 @@ def axes_of(name: str) -> list[Axis]:
     """Axes of a stability map: each parameter of the scene that is no count and not zero, and the length of the run."""
     file = read_scene_file(name)
     values = load_scene(name).parameters
-    found = []
+    axes = []
     for key, item in file.parameters.items():
         if item.integer or not values[key]:
             continue
         allowed = [part for part in _PARTS if _loads(name, key, part * values[key])]
         if len(allowed) > 1:
-            found.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
-    return [*found, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
+            axes.append(Axis(key, "1", f"{item.meaning}, in parts of the default", allowed, {key: AxisTerm(key)}))
+    return [*axes, Axis("horizon", "swings", "length of the run in natural times", [1.0, 3.0], horizon=True)]
 
 
 def _loads(name: str, key: str, value: float) -> bool:

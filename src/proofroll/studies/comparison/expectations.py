@@ -19,7 +19,7 @@ def contradictions_of(
 ) -> list[str]:
     """Contradictions of the claim, as sentences."""
     where = f"{run.row.engine}{at_point(run.parameters)}"
-    found = []
+    sentences = []
     row, expected = run.row, run.row.expected(run.parameters)
     known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
     overall = worst(known, missing)
@@ -33,26 +33,28 @@ def contradictions_of(
         guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
         said = "; ".join(f"{item.observable} {item.verdict}" for item in guilty)
         said = f"{said}; {guilty[0].observable}: {guilty[0].reason}" if guilty else "nothing is judged"
-        found.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
+        sentences.append(f"{where} {overall}, expected: {' or '.join(expected)} ({said})")
     for judgement in judgements:
         name, verdict = judgement.observable, judgement.verdict
         alone = row.expect_for.get(name)
         if alone is not None and verdict not in {*alone, *NOBODY}:
-            found.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
+            sentences.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
         if name in row.order and not _within(judgement.order, row.order[name]):
             (low, high), order = row.order[name], number(judgement.order, 3, "not known")
-            found.append(f"{where}: order of {name} is {order}, expected {low:g} to {high:g}")
+            sentences.append(f"{where}: order of {name} is {order}, expected {low:g} to {high:g}")
         if name in row.limit:
             allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
                 off = number(judgement.limit_error, 3, "not known")
-                found.append(f"{where}: error of the limit of {name} is {off}, expected at most {number(allowed, 3)}")
+                sentences.append(
+                    f"{where}: error of the limit of {name} is {off}, expected at most {number(allowed, 3)}"
+                )
     claimed = {*row.bound, *row.expect_for, *row.order, *row.limit}
     if Verdict.INCOMPLETE not in expected:
         claimed |= {*missing}
     for name in sorted(claimed - {judgement.observable for judgement in judgements}):
-        found.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
-    return found
+        sentences.append(f"{where}: {name} is not reported, though {comparison.name} makes a claim about it")
+    return sentences
 
 
 def _within(value: float | None, bounds: tuple[float, float]) -> bool:

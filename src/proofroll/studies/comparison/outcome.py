@@ -32,9 +32,9 @@ _UNJUDGED = {
 
 def worst(judgements: Sequence[Judgement], missing: Collection[str] = ()) -> Verdict:
     """The worst verdict of any observable, those that are missing included; failed if there is no judgement."""
-    found = [judgement.verdict for judgement in judgements]
+    verdicts = [judgement.verdict for judgement in judgements]
     return max(
-        [*found, *([Verdict.INCOMPLETE] if found and missing else [])], key=SEVERITY.index, default=Verdict.FAILED
+        [*verdicts, *([Verdict.INCOMPLETE] if verdicts and missing else [])], key=SEVERITY.index, default=Verdict.FAILED
     )
 
 

@@ -244,9 +244,9 @@ def _rungs(
         if facts.resolution is not None
     ]
     ladders = [{1.0: facts} if isinstance(facts, EngineFacts) else {} for facts in resolved]
-    for (index, factor, _), found in zip(wanted, resolve(scaled, workers), strict=True):
-        if isinstance(found, EngineFacts):
-            ladders[index][factor] = found
+    for (index, factor, _), scaled_facts in zip(wanted, resolve(scaled, workers), strict=True):
+        if isinstance(scaled_facts, EngineFacts):
+            ladders[index][factor] = scaled_facts
     return ladders
 
 
@@ -287,9 +287,9 @@ def _edge_found(comparison: Comparison, point: dict[str, float | Edge], name: st
     others = {key: value for key, value in point.items() if isinstance(value, float)}
     scene = load_scene(comparison.scene, **{**others, name: high})
     try:
-        found = edge_between(scene, name, low, high, comparison.until)
+        jump = edge_between(scene, name, low, high, comparison.until)
     except InputError as error:
         raise InputError(where, error.value, error.advice) from None
-    if found is None:
+    if jump is None:
         raise InputError(where, list(edge.edge_between), f"nothing jumps between these values of {name}")
-    return found
+    return jump

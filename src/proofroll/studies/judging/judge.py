@@ -162,8 +162,8 @@ def judge(
     bounds = _bounds(tolerance, reference, observed, sure)
     compared = [_compared(name, bound, reference, observed, dataset) for name, bound in bounds.items()]
     further = {name: bound for name, bound in held_against.always(reference, observed).items() if name not in bounds}
-    found = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
-    compared += [item for item in found if item.judgement.verdict is Verdict.DIFFERS]
+    unasked = [_compared(name, bound, reference, observed, dataset) for name, bound in further.items()]
+    compared += [item for item in unasked if item.judgement.verdict is Verdict.DIFFERS]
     compared.sort(key=lambda item: item.judgement.error / item.judgement.tolerance, reverse=True)
     unjudged = _unjudged(given, reference, bounds) | _unsure(dataset, reference, bounds)
     if tolerance is None:
@@ -230,8 +230,8 @@ def _bounds(
         main = [name for name in observed if _is_main(scene.observables[name])]
         events = [name for name in observed if (item := scene.observables[name]).watched and item.role is Role.EVENT]
         every = Tolerance(2 * reference.sampled_bar, False, "s")
-        found = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
-        return found | dict.fromkeys(events, every)
+        tolerances = dict.fromkeys([*main, *_states(reference, variables)] if main else able, _USUAL)
+        return tolerances | dict.fromkeys(events, every)
     if not isinstance(given, Mapping):
         if len(able) > 1 and scene.deciding not in able:
             raise InputError("tolerance", given, f"say of which variable: {', '.join(able)}")

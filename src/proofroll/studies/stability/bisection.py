@@ -84,12 +84,12 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
     return result
 
 
-def _next(found: SearchResult[V], passes: Callable[[V], bool]) -> int | None:
+def _next(search: SearchResult[V], passes: Callable[[V], bool]) -> int | None:
     """The rung to be looked at next for a boundary, or None if it is found."""
-    holding, failing = found.boundary(passes)
+    holding, failing = search.boundary(passes)
     if holding is None:
         return None
     coarser = -1 if failing is None else failing
     middle = (coarser + holding) // 2
     wanted = middle if middle > coarser else holding + 1
-    return wanted if wanted < found.limit and wanted not in found.seen else None
+    return wanted if wanted < search.limit and wanted not in search.seen else None

@@ -177,9 +177,9 @@ def _load(path: Path) -> StabilityFile:
     return file
 
 
-def _check(where: str, found: StabilityFile) -> None:
-    scene = load_scene(found.scene)
-    for index, axis in enumerate(found.axes):
+def _check(where: str, file: StabilityFile) -> None:
+    scene = load_scene(file.scene)
+    for index, axis in enumerate(file.axes):
         if not axis.values:
             raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
         for value in axis.values:
@@ -188,9 +188,9 @@ def _check(where: str, found: StabilityFile) -> None:
                 what = "a length in natural times that is positive and finite" if axis.horizon else "a number"
                 raise InputError(f"{where}: axes.{index}.values", value, f"give {what}")
         axis.at(scene, axis.values[0])
-    known = [axis.name for axis in found.axes]
+    known = [axis.name for axis in file.axes]
     numbers = [item.name for item in step_numbers(scene)]
-    for index, claim in enumerate(found.claims):
+    for index, claim in enumerate(file.claims):
         at = f"{where}: claims.{index}"
         if not claim.because:
             raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")

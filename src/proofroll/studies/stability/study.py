@@ -58,17 +58,17 @@ def make_stability(
     return study, path
 
 
-def stability_study(found: StabilityMap) -> StabilityStudy:
+def stability_study(stability_map: StabilityMap) -> StabilityStudy:
     """Record of a stability map, with the numbers of its boundaries and of silent ones."""
-    points = [_point(point) for point in found.points]
-    scene = load_scene(found.scene)
+    points = [_point(point) for point in stability_map.points]
+    scene = load_scene(stability_map.scene)
     failing = [point for point in points if point.failure and point.failure not in NOT_RUN]
     return StabilityStudy(
-        scene=found.scene,
-        axes=found.axes,
-        periods=found.effort.periods,
+        scene=stability_map.scene,
+        axes=stability_map.axes,
+        periods=stability_map.effort.periods,
         accurate=ACCURATE,
-        runs=found.runs,
+        runs=stability_map.runs,
         boundaries=len(failing),
         silent=sum(point.silent for point in failing),
         refused=sum(point.failure == REFUSED for point in points),
@@ -79,11 +79,11 @@ def stability_study(found: StabilityMap) -> StabilityStudy:
         step_symbols={item.name: item.symbol for item in step_numbers(scene)},
         points=points,
         explanations=_explanations(points),
-        findings=_scale_conclusions(found, points),
-        places=found.places,
-        absent=found.absent,
-        hosts=hosts(result for point in found.points for result in point.results.values()),
-        effort=found.effort,
+        findings=_scale_conclusions(stability_map, points),
+        places=stability_map.places,
+        absent=stability_map.absent,
+        hosts=hosts(result for point in stability_map.points for result in point.results.values()),
+        effort=stability_map.effort,
         measured=measured(),
     )
 
@@ -158,10 +158,10 @@ def _explanations(points: Sequence[BoundaryPoint]) -> list[ExplainedBoundary]:
     return explained
 
 
-def _scale_conclusions(found: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
+def _scale_conclusions(stability_map: StabilityMap, points: Sequence[BoundaryPoint]) -> list[str]:
     """Sentences on results that depend on an axis along which the dimensionless problem is the same."""
     sentences = []
-    for axis in (axis for axis in found.axes if axis.scale_free):
+    for axis in (axis for axis in stability_map.axes if axis.scale_free):
         for curve in dict.fromkeys(point.curve for point in points):
             along = [point for point in points if point.curve == curve and point.axis == axis.name]
             for name in BOUNDARIES:

@@ -99,22 +99,22 @@ def _claims(path: Path, given: dict[str, Any]) -> TradeoffClaims:
     return claims
 
 
-def _check(where: str, found: TradeoffClaims) -> None:
-    bounded("until", found.until, above=0)
-    unit = found.swept.loaded.observable(found.quantity, f"{where}: quantity").unit
-    if not (found.cheapest or found.holds or found.converges):
+def _check(where: str, file: TradeoffClaims) -> None:
+    bounded("until", file.until, above=0)
+    unit = file.swept.loaded.observable(file.quantity, f"{where}: quantity").unit
+    if not (file.cheapest or file.holds or file.converges):
         advice = "the file claims nothing; add [[cheapest]] with tolerance, engine and because"
         raise InputError(f"{where}: cheapest", "nothing", advice)
     for kind in ("cheapest", "holds", "converges"):
-        for index, claim in enumerate(getattr(found, kind)):
+        for index, claim in enumerate(getattr(file, kind)):
             if not claim.because:
                 raise InputError(f"{where}: {kind}.{index}.because", "nothing", "every claim needs its reason; add it")
             tolerance = getattr(claim, "tolerance", None)
             if tolerance is not None and not tolerance.relative and tolerance.unit != unit:
                 raise InputError(f"{where}: {kind}.{index}.tolerance", tolerance.unit, f"its unit is {unit}")
-    for name, values in found.over.items():
+    for name, values in file.over.items():
         for value in values:
-            load_scene(found.scene, **{**found.parameters, name: value})
+            load_scene(file.scene, **{**file.parameters, name: value})
 
 
 strict(TradeoffClaims, Cheapest, Holds, Converges)

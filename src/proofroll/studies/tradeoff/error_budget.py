@@ -202,37 +202,37 @@ def _dominant(departure: FloatArray, limit: Limit, model_form: float, floor: flo
     return max(parts, key=lambda name: parts[name])
 
 
-def _sentence(found: CurveBudget, unit: str, resolution: str) -> str:
+def _sentence(budget: CurveBudget, unit: str, resolution: str) -> str:
     """Sentence on the dominating part of the error at each end."""
-    assert found.model_form is not None  # there are enough runs
-    assert found.model_form_bar is not None
+    assert budget.model_form is not None  # there are enough runs
+    assert budget.model_form_bar is not None
     step = " s" if resolution == "dt" else ""
-    coarse, fine = found.coarse, found.fine
+    coarse, fine = budget.coarse, budget.fine
     if resolution != "dt":
         coarse, fine = (name.replace(TIME_STEP, "step control") for name in (coarse, fine))
-    said = f"At {resolution} {number(found.coarse_step, 3)}{step} the {coarse} dominates{_order(found)}; "
-    said += f"at {number(found.fine_step, 3)}{step}, with an error of {number(found.fine_error)} {unit}, "
+    said = f"At {resolution} {number(budget.coarse_step, 3)}{step} the {coarse} dominates{_order(budget)}; "
+    said += f"at {number(budget.fine_step, 3)}{step}, with an error of {number(budget.fine_error)} {unit}, "
     said += "still it does" if fine == coarse else f"the {fine}"
-    if found.truth is None:
+    if budget.truth is None:
         said += ". Nothing is known of the model itself: the truth's error bar is not finite"
-    elif found.model_form > found.model_form_bar + found.truth:
-        known = number(found.model_form_bar, 1)
-        said += f". In the limit of small steps {number(found.model_form)} {unit} remain (known to {known})"
+    elif budget.model_form > budget.model_form_bar + budget.truth:
+        known = number(budget.model_form_bar, 1)
+        said += f". In the limit of small steps {number(budget.model_form)} {unit} remain (known to {known})"
     else:
-        seen = max(found.model_form_bar, found.truth)
+        seen = max(budget.model_form_bar, budget.truth)
         said += f". No error of the model itself is seen above {number(seen, 1)} {unit}"
-    if found.floor is not None and found.best_step is not None:
-        said += f"; {floor_text(found.best_step, found.floor, unit)}, smaller steps are worse"
-    elif found.floor is not None:
-        said += f"; refining ends at a scatter of {number(found.floor, 1)} {unit}"
+    if budget.floor is not None and budget.best_step is not None:
+        said += f"; {floor_text(budget.best_step, budget.floor, unit)}, smaller steps are worse"
+    elif budget.floor is not None:
+        said += f"; refining ends at a scatter of {number(budget.floor, 1)} {unit}"
     return said + "."
 
 
-def _order(found: CurveBudget) -> str:
-    if found.order is None:
+def _order(budget: CurveBudget) -> str:
+    if budget.order is None:
         return ""
-    declared = "" if found.declared is None else f", declared {found.declared}"
-    seen = f" from {number(found.order_from, 3)} s to {number(found.order_to, 3)} s{declared}"
-    if found.order_low is None or found.order_high is None:
-        return f" (order {found.order:.2f}{seen})"
-    return f" (order {found.order:.2f} ± {(found.order_high - found.order_low) / 2:.2f}{seen})"
+    declared = "" if budget.declared is None else f", declared {budget.declared}"
+    seen = f" from {number(budget.order_from, 3)} s to {number(budget.order_to, 3)} s{declared}"
+    if budget.order_low is None or budget.order_high is None:
+        return f" (order {budget.order:.2f}{seen})"
+    return f" (order {budget.order:.2f} ± {(budget.order_high - budget.order_low) / 2:.2f}{seen})"

@@ -58,8 +58,8 @@ def make_tradeoff(
         InputError: something that does not exist.
         ProofrollError: there is no truth, or the folder cannot be written.
     """
-    found = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
-    study = tradeoff_study(found)
+    outcome = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
+    study = tradeoff_study(outcome)
     judged = claims if not engines else None
     said = TradeoffJudged(
         claims.name if claims else None,
@@ -71,7 +71,7 @@ def make_tradeoff(
     keep(study, path)
     timings = {
         f"{curve.engine} {point.step or ''}".strip(): point.timing
-        for curve in found.curves
+        for curve in outcome.curves
         for point in curve.points
         if point.timing is not None
     }
@@ -79,11 +79,11 @@ def make_tradeoff(
     return study, path
 
 
-def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
+def tradeoff_study(outcome: Tradeoff) -> TradeoffStudy:
     """Record of a trade-off; numbers that are not finite are None."""
-    question, reference, known = found.question, found.reference, found.reference.scene.observables
-    numbers = {point.case.key: number for number, point in enumerate(found.points)}
-    budgets = _budgets(found)
+    question, reference, known = outcome.question, outcome.reference, outcome.reference.scene.observables
+    numbers = {point.case.key: number for number, point in enumerate(outcome.points)}
+    budgets = _budgets(outcome)
     study = TradeoffStudy(
         scene=question.scene,
         parameters=question.parameters,
@@ -100,42 +100,44 @@ def tradeoff_study(found: Tradeoff) -> TradeoffStudy:
             )
             for name, curve in reference.curves.items()
         },
-        points=[point for curve in found.curves for point in _points(curve, list(reference.curves), numbers)],
+        points=[point for curve in outcome.curves for point in _points(curve, list(reference.curves), numbers)],
         dropped=[
-            DroppedStep(curve.engine, step, reason) for curve in found.curves for step, reason in curve.dropped.items()
+            DroppedStep(curve.engine, step, reason)
+            for curve in outcome.curves
+            for step, reason in curve.dropped.items()
         ],
-        absent=found.absent,
+        absent=outcome.absent,
         budgets=budgets,
-        pareto=_fronts(found, found.curves, numbers),
-        pareto_engines=_fronts(found, [curve for curve in found.curves if not by_hand(curve.level)], numbers),
-        truth=TruthCost(**_cost(found.truth_timing), route=reference.dataset.attrs.get("route", "")),
-        over=found.over,
-        findings=_conclusions(found, budgets),
-        brief=found.brief,
+        pareto=_fronts(outcome, outcome.curves, numbers),
+        pareto_engines=_fronts(outcome, [curve for curve in outcome.curves if not by_hand(curve.level)], numbers),
+        truth=TruthCost(**_cost(outcome.truth_timing), route=reference.dataset.attrs.get("route", "")),
+        over=outcome.over,
+        findings=_conclusions(outcome, budgets),
+        brief=outcome.brief,
         measured=measured(),
     )
     return record(TradeoffStudy, plain(study))
 
 
-def _budgets(found: Tradeoff) -> list[CurveBudget]:
+def _budgets(outcome: Tradeoff) -> list[CurveBudget]:
     """The error budget of every curve for every quantity that it has."""
-    every, made = found.question.every, []
-    for curve in found.curves:
-        for quantity in found.reference.curves:
+    every, made = outcome.question.every, []
+    for curve in outcome.curves:
+        for quantity in outcome.reference.curves:
             shown = [(point, point.curves[quantity]) for point in curve.points if quantity in point.curves]
-            declared = found.reference.scene.observables[quantity]
+            declared = outcome.reference.scene.observables[quantity]
             if not shown or (declared.role == Role.EVENT and not declared.asked_for):
                 continue
-            true = found.reference.true(quantity, shown[-1][1])[0]
+            true = outcome.reference.true(quantity, shown[-1][1])[0]
             if all(values.shape == true.shape for point, values in shown if point.case.every == every):
                 made.append(budget(curve, quantity, every, true, declared.unit))
     return made
 
 
-def _fronts(found: Tradeoff, curves: Sequence[Curve], numbers: Mapping[str, int]) -> dict[str, list[int]]:
+def _fronts(outcome: Tradeoff, curves: Sequence[Curve], numbers: Mapping[str, int]) -> dict[str, list[int]]:
     """Pareto front of every observable, cheapest first."""
     return {
-        name: [numbers[point.case.key] for point in front(pareto_entries(curves, name))] for name in found.quantities
+        name: [numbers[point.case.key] for point in front(pareto_entries(curves, name))] for name in outcome.quantities
     }
 
 
@@ -186,13 +188,13 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
     }
 
 
-def _conclusions(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
+def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     """Conclusions of the study, as sentences."""
-    said = told_hosts(hosts(point.result for point in found.points))
-    quantity = found.question.quantity
-    scale, unit = found.reference.scale(quantity) or 1.0, found.reference.scene.observables[quantity].unit
-    judged = [item for item in budgets if item.quantity in found.quantities and item.contradicts_declaration]
-    for curve in found.curves:
+    said = told_hosts(hosts(point.result for point in outcome.points))
+    quantity = outcome.question.quantity
+    scale, unit = outcome.reference.scale(quantity) or 1.0, outcome.reference.scene.observables[quantity].unit
+    judged = [item for item in budgets if item.quantity in outcome.quantities and item.contradicts_declaration]
+    for curve in outcome.curves:
         if other := [item for item in judged if item.curve == curve.engine]:
             shown = ", ".join(f"{i.quantity} {i.order:.2f} ({i.order_low:.2f} to {i.order_high:.2f})" for i in other)
             said.append(f"{curve.engine} declares order {other[0].declared}, but there show: {shown}.")
@@ -201,19 +203,19 @@ def _conclusions(found: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
             told = floor_text(item.best_step, item.floor, unit)
             said.append(f"{item.curve}, {quantity}: {told}; smaller steps are worse.")
     whole = [
-        c for c in found.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
+        c for c in outcome.curves if c.saturated(quantity) and c.points[0].errors.get(quantity, np.inf) < BROKEN * scale
     ]
     if whole:
         names = ", ".join(curve.engine for curve in whole)
-        said.append(f"No tolerance breaks {names}, sampled every {found.question.sparse:g} s either.")
-    done = [point for point in found.points if point.result.status == Status.DONE]
+        said.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
+    done = [point for point in outcome.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
-    refused = sum(point.result.status == Status.REFUSED for point in found.points)
-    wrong = sum(point.result.status == Status.WRONG_MODEL for point in found.points)
-    ended = len(found.points) - len(done) - refused - wrong
+    refused = sum(point.result.status == Status.REFUSED for point in outcome.points)
+    wrong = sum(point.result.status == Status.WRONG_MODEL for point in outcome.points)
+    ended = len(outcome.points) - len(done) - refused - wrong
     built = f"{wrong} of a wrong model, " if wrong else ""
     said.append(
-        f"{counted(len(found.points), 'runs')}: {refused} refused, {built}{ended} that did not reach the end, "
+        f"{counted(len(outcome.points), 'runs')}: {refused} refused, {built}{ended} that did not reach the end, "
         f"all with a reason; {len(broken)} that reached it silently "
         f"with {quantity} off by more than {number(BROKEN * scale)} {unit}."
     )

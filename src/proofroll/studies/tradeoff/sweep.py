@@ -176,13 +176,15 @@ def _run(
         options.append((facts.name, facts.settings | ({facts.resolution: value} if facts.resolution else {})))
     resolved, truth_facts = resolve_with_truth(options, runner.workers)
     cases: list[tuple[Curve, tuple[Case, ...]]] = []
-    for (curve, value), found in zip(wanted, resolved, strict=True):
+    for (curve, value), resolved_facts in zip(wanted, resolved, strict=True):
         try:
-            if isinstance(found, ProofrollError):
-                raise found
-            if found.step is not None:
-                whole_steps(0.0, question.until, found.step)
-            cases.append((curve, question.cases(scene, found, max(question.every, found.step or 0.0))))
+            if isinstance(resolved_facts, ProofrollError):
+                raise resolved_facts
+            if resolved_facts.step is not None:
+                whole_steps(0.0, question.until, resolved_facts.step)
+            cases.append(
+                (curve, question.cases(scene, resolved_facts, max(question.every, resolved_facts.step or 0.0)))
+            )
         except ProofrollError as error:
             curve.dropped[value] = str(error)
     intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()

@@ -127,41 +127,41 @@ def tradeoff(
     return study
 
 
-def _time(found: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:
+def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:
     """Measures the speed of every point that reached the end, and of the truth."""
-    cases = {point.case.key: point.case for point in found.points if point.result.status == Status.DONE}
+    cases = {point.case.key: point.case for point in tradeoff.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
-    seconds = BRIEF_SECONDS if found.brief else None
+    seconds = BRIEF_SECONDS if tradeoff.brief else None
     with Stopwatch(workers) as stopwatch:
         timings = interleaved(
             {key: partial(stopwatch, case, seconds) for key, case in cases.items()},
-            min(rounds, BRIEF_ROUNDS) if found.brief else rounds,
-            once_above=BRIEF_ONCE if found.brief else np.inf,
+            min(rounds, BRIEF_ROUNDS) if tradeoff.brief else rounds,
+            once_above=BRIEF_ONCE if tradeoff.brief else np.inf,
             progress=lambda key: tell(f"timing {cases[key].engine.name}"),
         )
-    found.truth_timing = timings.get(truth.key)
-    for point in found.points:
+    tradeoff.truth_timing = timings.get(truth.key)
+    for point in tradeoff.points:
         point.timing = timings.get(point.case.key)
 
 
-def _check(found: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[Case, Result], None]) -> None:
+def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[Case, Result], None]) -> None:
     """Runs the points on any formulation's own Pareto front, for any quantity, at every corner of the range.
 
     A question about one kind of model must not lose a formulation that another one of the same engine dominates.
     """
     formulations: dict[tuple[str, object], list[Curve]] = {}
-    for curve in found.curves:
+    for curve in tradeoff.curves:
         formulations.setdefault((curve.facts.name, curve.facts.settings.get("formulation")), []).append(curve)
     chosen = {
         point.case.key: point
         for curves in formulations.values()
-        for quantity in found.quantities
+        for quantity in tradeoff.quantities
         for point in front(pareto_entries(curves, quantity))
     }
     asked = []
-    for values in itertools.product(*found.over.values()):
-        place = dict(zip(found.over, values, strict=True))
-        question = dataclasses.replace(found.question, parameters={**found.question.parameters, **place})
+    for values in itertools.product(*tradeoff.over.values()):
+        place = dict(zip(tradeoff.over, values, strict=True))
+        question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **place})
         scene = question.loaded
         runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
         intervals = {case.every for both in runs.values() for case in both}
@@ -184,7 +184,7 @@ def _check(found: Tradeoff, truth: EngineFacts, runner: Runner, told: Callable[[
             else:
                 said = results[truths[lost].key].message
                 corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
-    for point in found.points:
+    for point in tradeoff.points:
         point.corners = corners.get(point.case.key)
 
 

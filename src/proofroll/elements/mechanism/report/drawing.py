@@ -79,19 +79,19 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
     """The outline of each shape that may touch, a patch of each plane, and the names of what touches at the start."""
     mechanism = element.mechanism
     motion = Tree(mechanism).at(*mechanism.start())
-    found, index = touches(mechanism, motion), mechanism.body_index
+    touching, index = touches(mechanism, motion), mechanism.body_index
     e3, up = direction(element)
     e1 = np.cross(up, e3) / np.linalg.norm(np.cross(up, e3))
     angles = np.linspace(0.0, 2 * np.pi, _OUTLINE)
     rim = np.outer(np.cos(angles), e1) + np.outer(np.sin(angles), np.cross(e3, e1))
     drawn_already: set[bytes] = set()
-    for contact, each in zip(mechanism.contacts, found, strict=True):
+    for contact, each in zip(mechanism.contacts, touching, strict=True):
         for body, shape in ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)):
             p, R = motion.p_WB[index[body]], motion.R_WB[index[body]]
             if isinstance(shape, HalfSpace):
                 n = R @ shape.normal
                 x, y = frame_of_axis(n)[:, 0], frame_of_axis(n)[:, 1]
-                middle = np.mean([one.place for one in found], axis=0)
+                middle = np.mean([one.place for one in touching], axis=0)
                 middle = middle - n * (n @ (middle - p - R @ shape.point))
                 outline = middle + _PATCH * _reach(element) * np.array([x + y, y - x, -x - y, x - y, x + y])
             else:
@@ -100,7 +100,7 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
             if path.round(3).tobytes() not in drawn_already:
                 picture.path(path, "hidden" if isinstance(shape, HalfSpace) else "thin")
                 drawn_already.add(path.round(3).tobytes())
-        if each.gap <= TOUCHING and len(found) <= _MOST_NAMES:
+        if each.gap <= TOUCHING and len(touching) <= _MOST_NAMES:
             _name(picture, np.asarray(at(each.place)), contact.name, "letter", (0.0, 14.0))
 
 

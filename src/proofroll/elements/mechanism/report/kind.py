@@ -82,7 +82,7 @@ class MechanismReport(ReportKind):
 def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]:
     """Determinate components of the wrenches on children that change most, in the order of joints and loops."""
     names = [connection.name for connection in element.mechanism.connections]
-    found = []
+    reactions = []
     for kind, unit in (("force", "N"), ("torque", "N m")):
         components = [truth[f"{kind}.{name}.{axis}"] for name in names for axis in "xyz"]
         # At time 0 a reaction belongs to the certificate.
@@ -92,9 +92,9 @@ def _reactions(element: MechanismElement, truth: xr.Dataset) -> list[Observable]
         widest = max(ranges.values(), default=0.0)
         moving = [name for name, width in ranges.items() if width > _STILL * widest]
         largest = sorted(moving, key=lambda name: -ranges[name])[:_MOST]
-        found += [
+        reactions += [
             Observable(name, unit, str(truth[name].attrs["long_name"]), Role.REACTION, floor=_STILL * widest)
             for name in moving
             if name in largest
         ]
-    return found
+    return reactions

@@ -135,8 +135,8 @@ def _camera(element: MechanismElement) -> tuple[float, float]:
 
 def _columns(sampled: dict[str, npt.NDArray[Any]], names: list[str], times: FloatArray) -> FloatArray:
     """Variables at the frames, 0 where they have no value, shape (n, names)."""
-    found = [np.interp(times, sampled["time"], np.nan_to_num(sampled[name])) for name in names]
-    return np.stack(found, axis=1) if found else np.zeros((times.size, 0))
+    columns = [np.interp(times, sampled["time"], np.nan_to_num(sampled[name])) for name in names]
+    return np.stack(columns, axis=1) if columns else np.zeros((times.size, 0))
 
 
 def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], times: FloatArray) -> Placed:
@@ -166,8 +166,8 @@ def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -
     turn = turn + 2 * np.pi * whole * axis
     at = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
     part = (times - grid[at]) / np.diff(grid)[at]
-    found = Rotation.from_rotvec(part[:, None] * turn[at]) * stored[at]
-    return np.asarray(found.as_quat(scalar_first=True))
+    turned = Rotation.from_rotvec(part[:, None] * turn[at]) * stored[at]
+    return np.asarray(turned.as_quat(scalar_first=True))
 
 
 def _reachable(motion: Placed, true: Placed, length: float) -> Placed:
