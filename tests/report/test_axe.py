@@ -41,11 +41,14 @@ def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visi
     [(1400, "light"), *(pytest.param(*look, marks=pytest.mark.drill) for look in [(900, "dark"), (400, "light")])],
 )
 def test_axe_finds_nothing_of_weight(report_page: Path, visit: Visiting, width: int, scheme: str) -> None:
-    """No violation that is serious or moderate, folded, unfolded and with tables that sort; a planted one is found."""
+    """No violation that is serious or moderate, folded, printed, unfolded, with tables that sort; a planted one is."""
     with visit(report_page, viewport={"width": width, "height": 900}) as opened:
         opened.page.emulate_media(color_scheme=scheme)
         opened.page.add_script_tag(content=Path(AXE_FILE_PATH).read_text(encoding="utf-8"))
         assert grave(opened) == []
+        opened.page.emulate_media(media="print")
+        assert grave(opened) == []
+        opened.page.emulate_media(media="screen")
         opened.unfold()
         opened.page.evaluate("document.querySelectorAll('#choice button').forEach((button) => button.click())")
         opened.page.evaluate("document.getElementById('verdicts').scrollIntoView()")
