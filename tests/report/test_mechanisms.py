@@ -13,6 +13,7 @@ import pytest
 from browsing import Visit
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.errors import Refused
 from proofroll.core.truth import truth
 from proofroll.elements.mechanism.report.replay import _turned, drawn
 from proofroll.files.comparison_file import load_comparison
@@ -113,3 +114,20 @@ def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
     case, _, numbers = drawn(Replayed(scene, true, Path("none"), [], "ladder", "as it is"))
     assert [joint["at"][2] for joint in case["joints"][1:]] == [-0.75, 0.75]
     assert next(width for name, _, width, _, _ in numbers.arrays if name == "force") == 9
+    assert next(width for name, _, width, _, _ in numbers.arrays if name == "slip") == 2
+    floor, wall, *ends = case["shapes"]
+    assert [item["kind"] for item in case["shapes"]] == ["plane", "plane", "sphere", "sphere"]
+    assert floor["at"][2] == pytest.approx(0.0, abs=1e-15)
+    assert wall["at"][0] == pytest.approx(0.0, abs=1e-15)
+    assert [(item["body"], item["at"][2], item["half"]) for item in ends] == [
+        (0, -0.75, [0.02] * 3),
+        (0, 0.75, [0.02] * 3),
+    ]
+
+
+def test_nothing_is_replayed_of_a_motion_that_is_not_unique() -> None:
+    """Where laws alone are known of a scene, there is no true motion beside which runs could be drawn."""
+    scene = load_scene("painleve_rod")
+    true = truth(scene, np.linspace(0.0, 0.01, 3))
+    with pytest.raises(Refused, match="no true motion is known"):
+        drawn(Replayed(scene, true, Path("none"), [], "rod", "as it is"))

@@ -67,7 +67,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
     text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
     for column in choice.columns:
-        forces = not choice.without_forces.issuperset(column.studies)
+        forces = not choice.unjudged[True].issuperset(column.studies)
         _, cell = choice.cheapest(column, EVERYDAY, forces)
         if math.isfinite(cell.cost):
             text += f" For {NEEDS[forces]} to {100 * EVERYDAY:g} %, the cheapest is {cell.name}: {cell.text} s of "

@@ -44,8 +44,8 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
         return Advised(column.title, f"For {title} no engine was run.")
     first, *others = engines
     asked = f"For {title} to {number(tolerance)}{' with forces' if forces else ''}"
-    if forces and matrix.without_forces.issuperset(column.studies):
-        return Advised(column.title, f"{asked}: forces are not judged there.")
+    if matrix.unjudged[forces].issuperset(column.studies):
+        return Advised(column.title, f"{asked}: {'forces are' if forces else 'motion is'} not judged there.")
     said = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
@@ -122,10 +122,10 @@ def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
 
 def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, without: ChoiceCell) -> str:
     """Sentence about forces, which were not asked for."""
-    if matrix.without_forces.issuperset(column.studies):
+    if matrix.unjudged[True].issuperset(column.studies):
         return " Forces are not judged there."
     name, cell = min(_engines(matrix, column, tolerance, True), key=lambda item: item[1].cost)
-    judged = [study for study in column.studies if study not in matrix.without_forces]
+    judged = [study for study in column.studies if study not in matrix.unjudged[True]]
     if len(judged) < len(column.studies) and math.isfinite(cell.cost):
         return (
             f" In {', '.join(judged)}, where forces are judged, take {_named(name, cell)} ({cell.text} s/s) for both."

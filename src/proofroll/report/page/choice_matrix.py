@@ -107,19 +107,21 @@ class ChoiceMatrix:
     def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
         """Cell at a tolerance, a part of the size."""
         own = [name for name in column.studies if name in row.found]
-        if forces and own:
-            judged = [name for name in own if name not in self.without_forces]
-            if not judged:
-                return ChoiceCell(Verdict.NOT_JUDGED, "no forces", "forces are not judged here", why="no forces judged")
-            own = judged
-        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in own]
+        judged = [name for name in own if name not in self.unjudged[forces]]
+        if own and not judged:
+            what = "no forces" if forces else "no motion"
+            return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
+        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in judged]
         return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
 
     @cached_property
-    def without_forces(self) -> set[str]:
-        """Studies in which no run has forces that are judged, as where they are not unique."""
-        sizes = [(name, item.forces) for row in self.rows for name, items in row.found.items() for item in items]
-        return {name for name, _ in sizes} - {name for name, forces in sizes if forces is not None}
+    def unjudged(self) -> tuple[set[str], set[str]]:
+        """Studies that ran, but in which no motion is judged, or not forces with it, as where these are not unique."""
+        items = [(name, item) for row in self.rows for name, own in row.found.items() for item in own]
+        ran = {name for name, item in items if item.blame is None}
+        motion = ran - {name for name, item in items if item.motion is not None}
+        both = motion | (ran - {name for name, item in items if item.forces is not None})
+        return motion, both
 
     @property
     def models(self) -> list[ChoiceRow]:
@@ -147,7 +149,7 @@ class ChoiceMatrix:
             if math.isfinite(cell.cost):
                 unit = "" if said else " s of computing per second of motion"
                 said.append(f"{name} for {column.group} ({cell.text}{unit})")
-            elif not (forces and self.without_forces.issuperset(column.studies)):
+            elif not self.unjudged[forces].issuperset(column.studies):
                 without.append(column.group)
         nothing = f"nothing that was run and timed holds it for {', '.join(without)}" if without else ""
         if not said:

@@ -30,14 +30,14 @@ SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     """Replay of comparisons, all of scenes of one kind.
 
-    There is one case for each truth of the comparisons. Its ghosts are the engines' runs with ``default``
-    settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is seen. At
-    first, of each engine the ``default`` one is shown that is furthest off.
+    There is one case for each truth of the comparisons that knows the motion. Its ghosts are the engines' runs with
+    ``default`` settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is
+    seen. At first, of each engine the ``default`` one is shown that is furthest off.
     """
     shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
         for name, point in outcome.points.items():
-            if point.reference is not None:
+            if point.reference is not None and np.isfinite(point.reference.dataset["p_WB"]).all():
                 shown_in.setdefault(point.case.key, (point, []))[1].append((outcome, name))
     looks = {id(outcome): _looks(outcome) for outcome in outcomes}
     cases, numbers = [], []

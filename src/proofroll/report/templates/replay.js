@@ -241,7 +241,7 @@
     key();
   }
 
-  const SIGNS = { arrow: "M1 5H19M14 1L20 5L14 9", line: "M1 5H21" };
+  const SIGNS = { arrow: "M1 5H19M14 1L20 5L14 9", line: "M1 5H21", dot: "M9 5H13M11 3V7" };
   function key() {
     const drawn = (path) => {
       const holder = make("span");

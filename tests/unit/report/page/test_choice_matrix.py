@@ -68,6 +68,14 @@ def test_a_scene_without_judged_forces_takes_no_part_where_forces_count() -> Non
     assert at([*ARM, chain], 4, forces=True)[:2] == at(ARM, 4, forces=True)[:2]
 
 
+def test_a_scene_without_judged_motion_takes_no_part() -> None:
+    """Where laws alone are judged no cell is a verdict on an engine, and the group is decided by its other scenes."""
+    laws = replace(LINE, role="residual", study="chain", scene="chain")
+    assert at([laws], 2)[:2] == (Verdict.NOT_JUDGED, "no motion")
+    assert at([*ARM, laws], 2)[:2] == at(ARM, 2)[:2]
+    assert "nothing that was run" not in choice_matrix([laws], STUDIES).answer(1e-2, False)
+
+
 def test_the_limit_of_forces_says_nothing_of_motion() -> None:
     """Where forces tend to another limit and the motion does not, that counts only where forces are asked for."""
     lines = [LINE, replace(FORCE, limit="another limit", verdict="differs")]

@@ -12,9 +12,11 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.checks import WORLD, Vector
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
+from proofroll.elements.mechanism.contacts.observables import SLIDES
 from proofroll.elements.mechanism.contacts.shapes import HalfSpace
 from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -28,6 +30,7 @@ from proofroll.report.replay.replay import frame_times, in_sight
 _SCALE, _SEEN = 0.035, 1e-3
 # A mechanism that is further from the true one than this many lengths has left the picture.
 _FAR = 20.0
+_PATCH, _FLAT = 0.6, 0.02  # half of a plane's patch over its reach; half thickness of a disc over its radius
 _TURN = 2.0**-14  # to which a quaternion is rounded
 _ROUNDED = 2.0**-17  # to which a length is, as a part of the mechanism's, and a force as a part of the largest
 _LASTS = 4.0  # how long a replay should last at least [s]
@@ -44,7 +47,11 @@ def seen(scene: Scene) -> float:
 
 
 def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]:
-    """Drawing of a mechanism in the replay: see :data:`proofroll.report.replay.records.Drawer`."""
+    """Drawing of a mechanism in the replay: see :data:`proofroll.report.replay.records.Drawer`.
+
+    Raises:
+        Refused: the true motion is not known.
+    """
     element = the_mechanism(replayed.scene)
     mechanism, length = element.mechanism, element.length
     bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
@@ -57,7 +64,10 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     signs = np.repeat([1.0] * (len(joints) - len(touching)) + [sign for *_, sign in touching], 3)
     names = [f"force.{name}.{axis}" for name, *_ in joints for axis in "xyz"]
     readings = _readings(element)
-    true = some(replayed.true, [*_MOTION, *names, *(name for name, _ in readings)])
+    slips = [f"slip.{contact.name}" for contact in mechanism.contacts]
+    true = some(replayed.true, [*_MOTION, *names, *slips, *(name for name, _ in readings)])
+    if not np.isfinite(true["p_WB"]).all():
+        raise Refused("no true motion is known, so there is none to draw")
     fastest = float(np.linalg.norm(true["w_WB"], axis=-1).max())
     times = frame_times(float(true["time"][-1]), fastest)
     placed = _placed(element, true, times)
@@ -76,6 +86,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     force = _columns(true, names, times) * signs
     largest = float(np.abs(force).max(initial=0.0))
     numbers.put("force", 0, force if largest else None, _ROUNDED * largest)
+    numbers.put("slip", 0, _columns(true, slips, times) if slips else None, _ROUNDED * element.speed)
     for run, motion in enumerate([placed, *ghosts]):
         numbers.put("p", run, motion.p_WB, least)
         numbers.put("q", run, motion.q_WB, _TURN)
@@ -97,6 +108,9 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
         "bodies": [{"com": coms.get(name), "rods": [[coms[name], at] for at in skeleton[name] if name in coms]}
                    for name in bodies],
         "joints": [{"body": index[body], "at": at} for _, body, at in joints],
+        "contacts": len(touching),
+        "slips": SLIDES * element.speed,
+        "shapes": [_shape(geometry, index[geometry.body], element, com) for geometry in mechanism.geometries],
         "springs": [[index[s.body_a], s.position_a, index[s.body_b], s.position_b] for s in mechanism.springs]
                    + [[index[j.parent], j.position, index[j.child], j.child_position]
                       for j in mechanism.joints if j.kind in {"prismatic", "planar"}],
@@ -114,6 +128,31 @@ def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
         body, shape, sign = contact.body_a, contact.shape_a, 1.0
     x, y, z = shape.centre.tolist()
     return body, (x, y, z), sign
+
+
+def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatArray) -> dict[str, Any]:
+    """A shape that may touch: its frame in its body's, and its half sizes [m]; of a plane those of a patch."""
+    at, frame, half = (
+        np.array(geometry.position),
+        geometry.frame,
+        np.array(geometry.axes or (geometry.radius or 0,) * 3),
+    )
+    if geometry.kind == "box":
+        half = np.array(geometry.size) / 2
+    if geometry.kind == "circle":
+        half[2] = _FLAT * half[0]
+    if geometry.kind == "plane":
+        if geometry.body == WORLD:  # below what moves
+            middle, n = com.mean(axis=(0, 1)), frame[:, 2]
+            at, reach = middle - n * (n @ (middle - at)), element.length + float(np.ptp(com, axis=0).max())
+        else:  # as far as what it meets is at first
+            pairs = [pair.geometries for pair in element.mechanism.pairs if geometry.name in pair.geometries]
+            owner = {each.name: element.mechanism.body_index[each.body] for each in element.mechanism.geometries}
+            meets = [owner[name] for pair in pairs for name in pair if owner[name] not in {-1, body}]
+            reach = float(np.max(np.linalg.norm(com[0, meets] - com[0, body], axis=-1), initial=0.0))
+        half = np.array([_PATCH * reach, _PATCH * reach, 0.0])
+    turn = Rotation.from_matrix(frame).as_quat()
+    return {"body": body, "kind": geometry.kind, "at": at.tolist(), "turn": turn.tolist(), "half": half.tolist()}
 
 
 def _readings(element: MechanismElement) -> list[tuple[str, str]]:

@@ -1,4 +1,4 @@
-// A mechanism in the replay: bodies as rods between their joints, joints, springs, tracked points, reactions.
+// A mechanism in the replay: bodies as rods between their joints, shapes that touch, springs, tracked points, forces.
 replayed.mechanism = (replay) => {
   const { ui, css, straight, smooth, fixed, digits, colour } = replay;
   let cells, stage;
@@ -61,7 +61,22 @@ replayed.mechanism = (replay) => {
       scene.add(group);
       return group;
     });
-    if (!ghost) for (const { body, at } of shown.joints) groups[body].add(dot(at, 0.34 * size, joint));
+    const dots = ghost ? [] : shown.joints.map(({ body, at }) => {
+      const mesh = dot(at, 0.34 * size, joint.clone());
+      groups[body].add(mesh);
+      return mesh;
+    });
+    for (const { body, kind, at, turn, half } of shown.shapes) {
+      if (!Math.max(...half) || (ghost && kind === "plane")) continue;
+      const unit = { plane: () => new T.PlaneGeometry(2, 2), box: () => new T.BoxGeometry(2, 2, 2),
+        circle: () => new T.CylinderGeometry(1, 1, 2, 48).rotateX(Math.PI / 2) }[kind] || (() => new T.SphereGeometry(1, 32, 20));
+      const paint = { color: kind === "plane" ? colour("--wall") : tone, transparent: true, opacity: ghost ? 0.15 : kind === "plane" ? 0.5 : 0.25 };
+      const mesh = new T.Mesh(unit(), new T.MeshPhongMaterial({ ...paint, depthWrite: false, side: T.DoubleSide }));
+      mesh.position.set(...at);
+      mesh.quaternion.set(...turn);
+      mesh.scale.set(...half.map((one) => one || 1));
+      groups[body].add(mesh);
+    }
     groups.forEach((group) => group.traverse((item) => { item.renderOrder = ghost ? 3 : 0; }));
     const springs = shown.springs.map(() => {
       const shape = new T.BufferGeometry();
@@ -71,7 +86,7 @@ replayed.mechanism = (replay) => {
       scene.add(line);
       return line;
     });
-    return { groups, springs };
+    return { groups, springs, dots };
   }
 
   function build(scene) {
@@ -121,11 +136,18 @@ replayed.mechanism = (replay) => {
       const from = stage.runs[0].groups[body].localToWorld(new T.Vector3(...at));
       arrow.point(from, new T.Vector3(...now.slice(3 * k, 3 * k + 3)), colour("--ink"));
     });
+    const first = shown.joints.length - shown.contacts;
+    if (shown.contacts) straight(shown.runs[0].slip).forEach((slip, k) => { // a mark where what presses slips
+      const presses = now.length && Math.hypot(...now.slice(3 * (first + k), 3 * (first + k) + 3)) > 0;
+      stage.runs[0].dots[first + k].material.color.set(colour(!presses ? "--grid" : slip > shown.slips ? "--slips" : "--sticks"));
+    });
   }
 
   const key = (forces) => [
-    ...(forces ? [{ sign: "arrow", text: `force of a joint on its child, what of it is determinate (1 cm is ${forces} N)` }] : []),
+    ...(forces ? [{ sign: "arrow", text: `force of a joint on its child, or of a contact, what of it is determinate (1 cm is ${forces} N)` }] : []),
     { sign: "line", text: "path of a tracked point", tone: "var(--link)" },
+    ...(replay.shown.contacts ? [["slips", "slips"], ["sticks", "sticks"], ["is open", "grid"]].map(([word, tone]) =>
+      ({ sign: "dot", text: `contact that ${word}`, tone: `var(--${tone})` })) : []),
   ];
 
   // The camera follows where the mechanism would be lost in its way.
