@@ -127,3 +127,59 @@ def test_settings_that_do_nothing_here_are_refused(options: dict[str, Any]) -> N
     """Options of other formulations are one line."""
     with pytest.raises(InputError, match="pinocchio"):
         replace(PRESETS["matched"], **options)
+
+
+def _on_a_guide(**law: Any) -> Mechanism:
+    """A mass of 1 kg on a vertical guide."""
+    joint = Joint("guide", "prismatic", "world", "mass", **law)
+    return Mechanism((Body("mass", 1.0, inertia=(0.1, 0.1, 0.1)),), (joint,))
+
+
+@pytest.mark.parametrize(("dt", "error"), [(1e-2, 4.5e-2), (1e-3, 4.4e-3)])
+def test_dry_friction_is_of_first_order(dt: float, error: float) -> None:
+    """A mass on a spring that rubs is off by as much as an impulse a step leaves, and samples change nothing."""
+    scene = load_scene("spring_friction")
+    run, alone = (PINOCCHIO.build(scene, replace(PRESETS["matched"], dt=dt)) for _ in range(2))
+    found, times = [], np.arange(1, 31) * 0.05
+    for t in times:
+        run.sample()
+        run.advance(float(t))
+        found.append(run.sample().p_WB[0, 0])
+    n = np.floor(times * 10 / np.pi)  # half swings are pi/10 s, and each ends 0.06 m nearer
+    true = (-1.0) ** n * 0.03 + (0.97 - 0.06 * n) * np.cos(10 * times)
+    assert 0.3 * error < np.abs(found - true).max() < 1.3 * error
+    alone.advance(float(times[-1]))
+    assert alone.sample().p_WB[0, 0] == run.sample().p_WB[0, 0]
+
+
+def test_a_joint_holds_without_creep_and_tells_its_friction() -> None:
+    """15 N hold a weight of 9.81 N; 5 N rub with all of it, against the motion."""
+    held, falls = (PINOCCHIO.build(_on_a_guide(friction=size), PRESETS["matched"]) for size in (15.0, 5.0))
+    for run, force, speed in ((held, 9.81, 0.0), (falls, 5.0, -4.81 * 0.2)):
+        run.advance(0.2)
+        found = run.sample()
+        assert found.friction[0] == pytest.approx(force, abs=1e-6)
+        assert found.v_WB[0, 2] == pytest.approx(speed, abs=1e-9)
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_mass_falls_on_a_stop_of_pinocchio(restitution: float) -> None:
+    """It rests there with its weight on it, or rebounds with the restitution; without being thrown."""
+    low = _on_a_guide(q0=(1.0,), limits=(0.0, 2.0), restitution=restitution)
+    run, fall = PINOCCHIO.build(low, PRESETS["matched"]), np.sqrt(2 / 9.81)
+    run.advance(round(fall * (1 + restitution), 3))
+    assert run.sample().p_WB[0, 2] == pytest.approx(restitution**2, abs=5e-3)
+    run.advance(2.0)
+    assert run.sample().p_WB[0, 2] == pytest.approx(0.0, abs=5e-5)
+    assert run.sample().stop[0] == pytest.approx(9.81, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["spring_friction", "pendulum_friction", "friction_hold", "stop"])
+@pytest.mark.parametrize("preset", ["default", "matched", "tuned"])
+def test_a_start_with_laws_of_joints_is_certified(name: str, preset: str) -> None:
+    """First accelerations and forces are the scene's."""
+    scene = load_scene(name)
+    (element,) = scene.elements
+    run = PINOCCHIO.build(scene, PRESETS[preset])
+    lines = element.certify(run.built(), run.sample())
+    assert [line for line in lines if not line.holds] == []

@@ -40,7 +40,9 @@ class Pinocchio:
         "constraint_dynamics": constraint_dynamics.PROVIDES,
         "impulses": impulses.PROVIDES,
     }
-    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"impulses": frozenset({MechanismCapability.CONTACT})}
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {
+        "impulses": frozenset(MechanismCapability[name] for name in ("CONTACT", "JOINT_FRICTION", "STOPS"))
+    }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "composite": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},
         "free_flyer": {BallCapability.IMPACTS: "its rows hold the ball on the wall"},

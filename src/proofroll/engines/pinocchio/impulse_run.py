@@ -1,4 +1,4 @@
-"""Formulation ``impulses``: the motion of bodies that touch, and what is read back of it."""
+"""Formulation ``impulses``: bodies that touch, joints that rub and stop, and what is read back of their motion."""
 
 from __future__ import annotations
 
@@ -49,8 +49,8 @@ class ImpulseRun(MechanismRun):
                 raise Diverged(f"the state is not finite at t = {steps.t:.6g} s")
         steps.t = t
 
-    def _kick(self) -> tuple[Array, Array]:
-        """Accelerations v̇ and forces on body a of each contact [N] of the step that begins.
+    def _kick(self) -> tuple[Array, Array, Array]:
+        """Accelerations v̇, forces on body a of each contact [N] and of rows of joints, of the step that begins.
 
         At time 0 they are those of a part of it, with what later steps find one step late.
         """
@@ -60,11 +60,11 @@ class ImpulseRun(MechanismRun):
         else:
             span = _PART * self._dt
             kick = steps.beginning(span, convex=self._settings.convex)
-        return (kick.v - steps.v) / span, kick.impulse / span
+        return (kick.v - steps.v) / span, kick.impulse / span, kick.along / span
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, and accelerations and forces of the step that begins."""
-        q, v, (acceleration, pressing) = self.steps.q, self.steps.v, self._kick()
+        q, v, (acceleration, pressing, _) = self.steps.q, self.steps.v, self._kick()
         found = self.steps.terms(q, v, self._dt)[-1]
         self.tree.now = self.steps.t
         data = self._placed(acceleration)
@@ -85,7 +85,9 @@ class ImpulseRun(MechanismRun):
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`; the forces are those of the step that begins."""
-        return replace(super().sample(), contact_force=self._kick()[1])
+        _, pressing, along = self._kick()
+        forces = self.steps.joints.along_joints(self.steps.q, along) if along.size else {}
+        return replace(super().sample(), contact_force=pressing if self.steps.contacts else None, **forces)
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
@@ -101,7 +103,7 @@ class ImpulseRun(MechanismRun):
             softened[name] = Regularised(_MARGIN * (unsure + apart), _PARTS if self._settings.convex else _FOUND)
             if softened[name].tolerance > CAPS["acceleration"].tolerance:
                 unsaid[name] = None  # the first step of a hop tells nothing of the model
-        return replace(found, **unsaid, **self.steps.read(), regularised=softened)
+        return replace(found, **unsaid, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _beginning(self, span: float) -> Impulses:
         return self.steps.beginning(span, convex=False)

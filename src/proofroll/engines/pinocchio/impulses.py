@@ -1,4 +1,4 @@
-"""Steps of a mechanism whose bodies touch: Pinocchio's terms, and its solver of contact with friction.
+"""Steps of a mechanism whose bodies touch, or whose joints rub and stop: Pinocchio's terms, and its solver.
 
 Contacts are points to Pinocchio, posed anew in each step where the shapes are nearest. Its solver finds the impulses of
 a step in the cones of friction: those of Coulomb's law (De Saxcé's term makes of the cone's dual the law), or those of
@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
-from proofroll.engines.pinocchio import joint_tree
+from proofroll.engines.pinocchio.joint_rows import JointRows
 from proofroll.engines.pinocchio.joint_tree import JointTree
 from proofroll.engines.pinocchio.plane_contact import solver_of
 from proofroll.engines.pinocchio.settings import PinocchioSettings
@@ -30,12 +30,10 @@ PROVIDES: frozenset[str] = (
     | FORCES
     | {_CAPABILITY.ARMATURE, _CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION, _CAPABILITY.CONTACT_REBOUNDS}
     | {_CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS}
+    | {_CAPABILITY.JOINT_FRICTION, _CAPABILITY.STOPS, _CAPABILITY.REBOUNDS}
 )
 _OF_A_TREE = "its steps are those of a tree with contacts"
-LACKING: Mapping[str, str] = {
-    **joint_tree.LACKING,
-    **dict.fromkeys(ALL_LOOPS | {_CAPABILITY.COUPLINGS}, _OF_A_TREE),
-}
+LACKING: Mapping[str, str] = dict.fromkeys(ALL_LOOPS | {_CAPABILITY.COUPLINGS}, _OF_A_TREE)
 # An approach of less than so many steps of gravity is no impact: nothing rebounds.
 _SOFT = 5.0
 # Part of a gap that a step at its middle closes; all of it would throw what has sunk in.
@@ -57,14 +55,16 @@ class Impulses(NamedTuple):
     Attributes:
         v: velocity after it, shape (nv,).
         impulse: on body a of each contact, world axes [N s], shape (contacts, 3).
+        along: of the joints' rows [N s, N m s], shape (rows,).
     """
 
     v: Array
     impulse: Array
+    along: Array
 
 
 class _Solver(NamedTuple):
-    """Pinocchio's objects for some of the contacts: their points, its solver with options and result."""
+    """Pinocchio's objects for some of the contacts and rows of joints: points, its solver with options and result."""
 
     points: list[Any]
     point_datas: list[Any]
@@ -76,11 +76,12 @@ class _Solver(NamedTuple):
 
 
 class ImpulseSteps:
-    """A tree with contacts, and its steps.
+    """A tree with contacts, dry friction and stops of joints, and its steps.
 
     Attributes:
         q, v, t: configuration, velocity, time [s].
         restitution: of each contact [1].
+        joints: rows of joints, which come after the contacts.
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
@@ -98,6 +99,9 @@ class ImpulseSteps:
         self._gravity = float(np.linalg.norm(mechanism.gravity))
         self._index = mechanism.body_index
         self.restitution = np.array([contact.restitution for contact in self.contacts])
+        self.joints = JointRows(tree)
+        stops = [item.joint.restitution for item in self.joints.stops]
+        self._returned = np.concatenate([self.restitution, np.zeros(len(self.joints.friction)), stops])
         self._solvers: dict[tuple[int, ...], _Solver] = {}
         try:
             J, _, inverse, _ = self.terms(self.q, self.v, self._dt)
@@ -138,7 +142,8 @@ class ImpulseSteps:
         if self._midpoint:
             q = pin.integrate(self._model, q, 0.5 * self._dt * v)
         J, free, inverse, found = self.terms(q, v, self._dt)
-        return self._solved(J, free, inverse, found, self._shifts(J, v, found), convex=self._settings.convex)
+        shifts = self._shifts(J, q, v, found)
+        return self._solved(J, free, inverse, found, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from the present on, with the turning of the contacts (J̇v), which steps find later.
@@ -147,9 +152,11 @@ class ImpulseSteps:
         """
         J, free, inverse, found = self.terms(self.q, self.v, span)
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
-        shifts = (ahead - J) @ self.v
-        shifts[[each.gap > TOUCHING for each in found], 2] = np.inf
-        return self._solved(J, free, inverse, found, shifts, convex=convex)
+        shifts = np.zeros((len(self._returned), 3))
+        shifts[: len(found)] = (ahead - J) @ self.v
+        apart = [each.gap > TOUCHING for each in found] + [False] * len(self.joints.friction)
+        shifts[apart + [item.gap(self.q) > TOUCHING for item in self.joints.stops], 2] = np.inf
+        return self._solved(J, free, inverse, found, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, places and friction of the contacts' points as Pinocchio holds them; gaps of shapes at its poses."""
@@ -214,19 +221,20 @@ class ImpulseSteps:
     def _solver(self, which: tuple[int, ...]) -> _Solver:
         if which not in self._solvers:
             models, datas = pin.StdVec_ConstraintModel(), pin.StdVec_ConstraintData()
+            rows, count = (*self.joints.friction, *self.joints.stops), len(self.contacts)
             for k in which:
-                contact = self.contacts[k]
-                b, a = (self._joint(body) for body in (contact.body_b, contact.body_a))
-                point = pin.PointContactConstraintModel(self._model, b, pin.SE3.Identity(), a, pin.SE3.Identity())
-                models.append(pin.ConstraintModel(point))
+                if k < count:
+                    contact = self.contacts[k]
+                    b, a = (self._joint(body) for body in (contact.body_b, contact.body_a))
+                    point = pin.PointContactConstraintModel(self._model, b, pin.SE3.Identity(), a, pin.SE3.Identity())
+                    point.setFriction(contact.friction)
+                    models.append(pin.ConstraintModel(point))
+                else:
+                    models.append(rows[k - count].model)
                 datas.append(models[len(models) - 1].createData())
             points = [models[i].extract() for i in range(len(which))]
-            for point, k in zip(points, which, strict=True):
-                point.setFriction(self.contacts[k].friction)
-            settings = self._settings
-            solve, options, result = solver_of(
-                settings.solver or "admm", float(settings.solver_tolerance or 0.0), len(which)
-            )
+            settings, size = self._settings, sum(3 if k < count else 1 for k in which)
+            solve, options, result = solver_of(settings.solver or "admm", float(settings.solver_tolerance or 0.0), size)
             made = [datas[i].extract() for i in range(len(which))]
             self._solvers[which] = _Solver(points, made, models, datas, solve, options, result)
         return self._solvers[which]
@@ -235,47 +243,68 @@ class ImpulseSteps:
         k = self._index[body]
         return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
 
-    def _shifts(self, J: Array, v: Array, found: Sequence[Touching]) -> Array:
-        """Terms added to slides and to speeds of gaps [m/s], shape (contacts, 3); infinite where none can close."""
-        shifts, dt = np.zeros((len(found), 3)), self._dt
-        shifts[:, 2] = np.inf
-        for k, each in enumerate(found):
-            approach = float(J[k, 2] @ v)
-            e = float(self.restitution[k])
+    def _shifts(self, J: Array, q: Array, v: Array, found: Sequence[Touching]) -> Array:
+        """Terms added to slides and speeds of gaps [m/s], shape (contacts + rows of joints, 3); inf: cannot close."""
+        first, dt = len(found) + len(self.joints.friction), self._dt
+        shifts = np.zeros((len(self._returned), 3))
+        gaps = [(k, each.gap, float(J[k, 2] @ v)) for k, each in enumerate(found)]
+        speeds = self.joints.J[len(self.joints.friction) :] @ v
+        gaps += [(k, item.gap(q), float(speeds[k - first])) for k, item in enumerate(self.joints.stops, first)]
+        for k, gap, approach in gaps:
+            e = float(self._returned[k])
             hits = e and -e * approach > _SOFT * self._gravity * dt
+            shifts[k, 2] = np.inf
             if self._midpoint:
-                if each.gap <= max(TOUCHING, self._gravity * dt**2):
-                    shifts[k, 2] = e * approach if hits else _CLOSED * each.gap / dt
+                if gap <= max(TOUCHING, self._gravity * dt**2):
+                    shifts[k, 2] = e * approach if hits else _CLOSED * gap / dt
             else:
-                reached = each.gap + dt * (approach - dt * self._gravity) <= 0
-                shifts[k, 2] = e * approach if hits and reached else each.gap / dt
+                reached = gap + dt * (approach - dt * self._gravity) <= 0
+                shifts[k, 2] = e * approach if hits and reached else gap / dt
         return shifts
 
     def _solved(
-        self, J: Array, free: Array, inverse: Array, found: Sequence[Touching], shifts: Array, *, convex: bool
+        self,
+        J: Array,
+        free: Array,
+        inverse: Array,
+        found: Sequence[Touching],
+        shifts: Array,
+        span: float,
+        *,
+        convex: bool,
     ) -> Impulses:
-        """Impulses of those contacts that would close, and of those that they close in turn."""
-        impulse, v = np.zeros((len(found), 3)), free
-        which: tuple[int, ...] = ()
+        """Impulses of friction, of those contacts and stops that would close, and of those that they close in turn."""
+        count, v = len(found), free
+        blocks = [*J, *self.joints.J[:, None]]
+        of_blocks = [*shifts[:count], *shifts[count:, 2:]]
+        rubs = count + len(self.joints.friction)
+        gaps = [k for k in (*range(count), *range(rubs, len(blocks))) if np.isfinite(shifts[k, 2])]
+        impulse, along, which = np.zeros((count, 3)), np.zeros(len(blocks) - count), tuple(range(count, rubs))
+        changed = bool(which)
         while True:
-            closing = {k for k in range(len(found)) if np.isfinite(shifts[k, 2]) and J[k, 2] @ v + shifts[k, 2] < 0}
-            if closing <= set(which):
-                break
-            which = tuple(sorted({*which, *closing}))
+            closing = {k for k in gaps if blocks[k][-1] @ v + shifts[k, 2] < 0}
+            if closing <= set(which) and not changed:
+                return Impulses(v, impulse, along)
+            which, changed = tuple(sorted({*which, *closing})), False
             solver = self._solver(which)
             for own, k in enumerate(which):
-                self._posed(solver, own, found[k])
-            rows = J[list(which)].reshape(3 * len(which), -1)
+                if k < count:
+                    self._posed(solver, own, found[k])
+                elif k < rubs:
+                    solver.points[own].setTimeStep(span)  # bounds are forces, and without it of a step of 1 s
+                    solver.points[own].calc(self._model, self._data, solver.point_datas[own])
+            rows = np.concatenate([blocks[k] for k in which])
             to_joints = inverse @ rows.T
-            shift = shifts[list(which)].ravel()
             G = rows @ to_joints
-            for own, k in enumerate(which):
-                self._check(k, G[3 * own : 3 * own + 3, 3 * own : 3 * own + 3])
+            ends = np.cumsum([len(blocks[k]) for k in which])
+            for end, k in zip(ends, which, strict=True):
+                if k < count:
+                    self._check(k, G[end - 3 : end, end - 3 : end])
             solver.result.reset()
             solver.options.solve_ncp = not convex
             if not solver.solve.solve(
                 pin.DelassusOperatorDense(G),
-                rows @ free + shift,
+                rows @ free + np.concatenate([of_blocks[k] for k in which]),
                 solver.models,
                 solver.datas,
                 solver.options,
@@ -287,7 +316,9 @@ class ImpulseSteps:
                 )
             got = np.array(solver.result.retrieveConstraintImpulses())
             v = free + to_joints @ got
-            impulse[:] = 0.0
-            for own, k in enumerate(which):
-                impulse[k] = frame_of_axis(found[k].normal) @ got[3 * own : 3 * own + 3]
-        return Impulses(v, impulse)
+            impulse[:], along[:] = 0.0, 0.0
+            for end, k in zip(ends, which, strict=True):
+                if k < count:
+                    impulse[k] = frame_of_axis(found[k].normal) @ got[end - 3 : end]
+                else:
+                    along[k - count] = got[end - 1]

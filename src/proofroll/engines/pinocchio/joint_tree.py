@@ -23,8 +23,8 @@ _OF_JOINTS = {
 }
 PROVIDES: frozenset[str] = ALL_JOINTS | ALL_LOOPS | FORCES | _OF_JOINTS
 LACKING: Mapping[str, str] = {
-    MechanismCapability.JOINT_FRICTION: "these equations have no law that switches; Pinocchio's solver of dry friction "
-    "in joints belongs to its contacts"
+    MechanismCapability[name]: "these equations have no law that switches"
+    for name in ("JOINT_FRICTION", "STOPS", "REBOUNDS")
 }
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 # Column of a joint's own velocities that turns about (or slides along) its axis.

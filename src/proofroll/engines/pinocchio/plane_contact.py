@@ -103,9 +103,8 @@ class PlaneContact:
         return float(self.point.getFriction())
 
 
-def solver_of(kind: str, tolerance: float, contacts: int = 1) -> tuple[Any, Any, Any]:
-    """Solver, its options and its result for so many contacts."""
-    size = 3 * contacts
+def solver_of(kind: str, tolerance: float, size: int = 3) -> tuple[Any, Any, Any]:
+    """Solver, its options and its result for so many rows."""
     if kind == "pgs":
         solver, options, result = pin.PGSConstraintSolver(size), pin.PGSSolverSettings(), pin.PGSSolverResult()
     else:

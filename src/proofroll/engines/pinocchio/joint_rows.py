@@ -1,0 +1,85 @@
+"""Dry friction and stops of joints as Pinocchio's own constraints of one row each, for its solver of a step."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from proofroll.elements.mechanism.named_forces import on_joint
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import SwitchedJoint, switched_joints
+from proofroll.engines.pinocchio.joint_tree import JointTree
+
+# Distance [rad, m] up to which a joint is at its stop.
+_AT_STOP = 1e-9
+
+
+class JointRow(NamedTuple):
+    """One constraint of a joint.
+
+    Attributes:
+        joint: whose.
+        model: pin.ConstraintModel.
+        sign: of the coordinate in its row: what friction opposes, or what leads away from a stop.
+        limit: coordinate of the stop; None: friction.
+    """
+
+    joint: SwitchedJoint
+    model: Any
+    sign: float
+    limit: float | None
+
+    def gap(self, q: Array) -> float:
+        """Distance from the stop."""
+        return self.sign * float(q[self.joint.coordinate] - (self.limit or 0.0))
+
+
+class JointRows:
+    """The rows of all joints: of friction first, then of stops.
+
+    Attributes:
+        friction, stops: these rows.
+        J: all of them on the velocities, (rows, nv).
+    """
+
+    def __init__(self, tree: JointTree) -> None:
+        self.switched = switched_joints(tree.mechanism)
+        self._count = len(tree.mechanism.joints)
+        self.friction = [self._friction(tree, joint) for joint in self.switched if joint.friction]
+        self.stops = [
+            self._stop(tree, joint, limit, sign)
+            for joint in self.switched
+            for limit, sign in ((joint.low, 1.0), (joint.high, -1.0))
+            if np.isfinite(limit)
+        ]
+        self.J = np.zeros((len(self.friction) + len(self.stops), tree.model.nv))
+        for row, item in zip(self.J, (*self.friction, *self.stops), strict=True):
+            row[item.joint.velocity] = item.sign
+
+    @staticmethod
+    def _friction(tree: JointTree, joint: SwitchedJoint) -> JointRow:
+        bound = np.array([joint.friction])
+        model = pin.JointFrictionConstraintModel(tree.model, [tree.joint[joint.number]], -bound, bound)
+        return JointRow(joint, pin.ConstraintModel(model), 1.0, None)
+
+    @staticmethod
+    def _stop(tree: JointTree, joint: SwitchedJoint, limit: float, sign: float) -> JointRow:
+        low, high = np.full(tree.model.nq, -np.inf), np.full(tree.model.nq, np.inf)
+        (low if sign > 0 else high)[joint.coordinate] = limit
+        model = pin.JointLimitConstraintModel(tree.model, [tree.joint[joint.number]], low, high)
+        model.makeSelectionMaximal()
+        return JointRow(joint, pin.ConstraintModel(model), sign, limit)
+
+    def along_joints(self, q: Array, force: Array) -> dict[str, Array]:
+        """Forces of friction and stops along the coordinates of all joints, from those of the rows [N, N m]."""
+        found = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
+        total = {joint.number: 0.0 for joint in self.switched}
+        closed = {item.joint.number for item in self.stops if item.gap(q) <= _AT_STOP}
+        for item, size in zip((*self.friction, *self.stops), force, strict=True):
+            total[item.joint.number] += item.sign * float(size)
+        for joint in self.switched:
+            on = on_joint(joint.number in closed, joint.friction, total[joint.number])
+            found["friction"][joint.number], found["stop"][joint.number] = on
+        return found
