@@ -1,8 +1,8 @@
 """Pinocchio without the adapter: its kinematics, dynamics and contact solver, with the cylinder's directions by hand.
 
 The models with rows are built here; the plane and its solver come from the adapter's builder. Rows with rolling run
-under scipy's DOP853, as the adapter's preset ``matched`` does. The loop of mechanisms is that of the
-reproducer's program.
+under scipy's DOP853, as the adapter's preset ``matched`` does. The loop of mechanisms is
+:mod:`mechanism_loop`.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import BallCapability, RollingBall
+from proofroll.elements.mechanism.joint import FACTS
 from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.engines.pinocchio.constraint_dynamics import ConstraintDynamics
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.plane_contact import PlaneContact
-from proofroll.engines.pinocchio.reproducer.mechanism import loop_of
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
+from proofroll_benchmarks.bare.mechanism_loop import MechanismLoop
 from proofroll_benchmarks.bare.steps import dop853
 
 
@@ -51,7 +53,7 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 
 def _mechanism(scene: Scene, settings: Any) -> Bare:
     mechanism_run = MechanismRun(mechanism_of(scene), settings)
-    loop, frames = loop_of(mechanism_run, settings), mechanism_run.tree.body
+    loop, frames = _loop_of(mechanism_run, settings), mechanism_run.tree.body
 
     def run(times: FloatArray) -> FloatArray:
         *_, last = loop.states(times.tolist())
@@ -59,6 +61,35 @@ def _mechanism(scene: Scene, settings: Any) -> Bare:
         return np.array([loop.data.oMf[frame].translation for frame in frames])
 
     return Bare(run, 1e-11, "the same steps; sums are in another order")
+
+
+def _loop_of(run: MechanismRun, settings: Any) -> MechanismLoop:
+    """The loop without the adapter, on the model of a run at time 0.
+
+    Raises:
+        Refused: the mechanism has actuators, couplings, or drives in time.
+    """
+    if run.tree.mechanism.actuators or run.tree.mechanism.couplings or run.tree.varies:
+        raise Refused("there is no bare loop with actuators, couplings or drives in time")
+    tree, constraints = run.tree, run.dynamics if isinstance(run.dynamics, ConstraintDynamics) else None
+    adaptive = settings.integrator == "dop853"
+    return MechanismLoop(
+        tree.model,
+        np.concatenate([tree.q0, tree.v0]),
+        [
+            (a, b, FACTS[loop.kind].translations, FACTS[loop.kind].rotations)
+            for loop, (a, b) in zip(tree.mechanism.loops, tree.loops, strict=True)
+        ],
+        [(a, b, spring.stiffness, spring.damping, spring.length) for spring, a, b in tree.springs],
+        [(stiffness, rest, q.start, v.start) for stiffness, rest, q, v in tree.sprung],
+        tree.drive,
+        tree.damping,
+        run.rank,
+        bool(settings.projection and run.rank),
+        0.0 if adaptive else settings.dt or 0.0,
+        settings.rtol or 0.0 if adaptive else 0.0,
+        (constraints.constraints, pin.ProximalSettings(*constraints.proximal)) if constraints and tree.loops else None,
+    )
 
 
 def _ball(body: RollingBall) -> Any:

@@ -9,7 +9,7 @@ import importlib
 import math
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,6 @@ _INSTEAD = {
     "Diverged": "class Diverged(RuntimeError):\n    pass",
     "Refused": "class Refused(RuntimeError):\n    pass",
     "InputError": "class InputError(RuntimeError):\n    pass",
-    "bounded": "def bounded(*_, **__):\n    pass",
     "read_only": "def read_only(item):\n    return item",
 }
 _Place = tuple[str, str]  # module, name
@@ -50,10 +49,10 @@ class CutOut:
         attributes: names by which the definitions ask for attributes.
     """
 
-    def __init__(self, wanted: Sequence[object], uses: Iterable[str], without: Iterable[str] = ()) -> None:
-        """Takes functions and classes, attributes that the program itself asks for, and names that it never needs."""
+    def __init__(self, wanted: Sequence[object], uses: Iterable[str], instead: Mapping[str, str] = {}) -> None:
+        """Takes functions and classes, attributes that the program asks for, and texts in place of definitions."""
         self.attributes = set(uses)
-        self._instead = _INSTEAD | {name: f"{name} = None" for name in without}
+        self._instead = _INSTEAD | dict(instead)
         self._kept: dict[_Place, ast.stmt] = {}
         self._needs: dict[_Place, list[_Place]] = {}
         self._imports: set[str] = set()
@@ -79,15 +78,16 @@ class CutOut:
 
     def literal(self, value: Any) -> str:
         """A value as a program writes it: of an object of no class among these, the attributes that they ask for."""
+        value = value.item() if isinstance(value, np.generic) else value
         if isinstance(value, np.ndarray):
             return f"np.array({self.literal(value.tolist())})"
         if isinstance(value, (list, tuple)):
             inner = "".join(f"{self.literal(item)}, " for item in value)
             return f"({inner})" if isinstance(value, tuple) else f"[{inner}]"
-        if isinstance(value, float) and not math.isfinite(value):
-            return f"float('{value}')"
-        if value is None or isinstance(value, (bool, int, float, str)):
-            return repr(value)
+        if isinstance(value, dict):
+            return "{" + ", ".join(f"{key!r}: {self.literal(item)}" for key, item in value.items()) + "}"
+        if value is None or isinstance(value, (bool, int, float, str, slice)):
+            return f"float('{value}')" if isinstance(value, float) and not math.isfinite(value) else repr(value)
         if (kind := type(value).__name__) in self.names:
             given = {field.name: getattr(value, field.name) for field in dataclasses.fields(value) if field.init}
         else:
@@ -112,6 +112,8 @@ class CutOut:
             elif source[0].partition(".")[0] == _OURS:
                 if name != source[1].name:
                     raise ValueError(f"{module} takes {source[1].name} under another name: {name}")
+                if name not in {*self._instead, *_read(source[0]).defined, *_read(source[0]).imported}:
+                    raise ValueError(f"{module} takes the module {name}, of which no part can be cut out")
                 return self._take((source[0], name))
             else:
                 self._imports.add(f"from {source[0]} import {ast.unparse(source[1])}")
@@ -206,7 +208,8 @@ def _first(node: ast.stmt) -> int:
 def _optional(part: ast.stmt) -> str:
     """Name of a method or of a fact of a class that may be left out; empty: it stays."""
     if isinstance(part, _Function):
-        return "" if part.name.startswith("__") else part.name
+        # what a dataclass checks of its values was checked of those that a program has
+        return "" if part.name.startswith("__") and part.name != "__post_init__" else part.name
     declared = isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
     if declared and ast.unparse(part.annotation).startswith("ClassVar"):  # type: ignore[attr-defined]  # it is an AnnAssign
         return str(part.target.id)  # type: ignore[attr-defined]
@@ -215,15 +218,20 @@ def _optional(part: ast.stmt) -> str:
 
 def _asked(node: ast.AST, drops: Sequence[ast.AST]) -> tuple[list[str], set[str]]:
     """Names that a statement needs to be executed and called, and its attributes."""
-    names, attributes = dict[str, None](), set[str]()
+    names, attributes, bound = dict[str, None](), set[str](), set[str]()
     for part in _parts(node, drops):
-        if isinstance(part, ast.Name):
+        if isinstance(part, ast.Name) and isinstance(part.ctx, ast.Load):
             names[part.id] = None
+        elif isinstance(part, ast.Name):
+            bound.add(part.id)
+        elif isinstance(part, ast.arg):
+            bound.add(part.arg)
         elif isinstance(part, ast.Attribute):
             attributes.add(part.attr)
         elif isinstance(part, ast.Constant) and isinstance(part.value, str) and part.value.isidentifier():
             attributes.add(part.value)
-    return list(names), attributes
+    # within a function another thing may have the name of one at the top; a class has such names, too
+    return [name for name in names if name not in bound or isinstance(node, ast.ClassDef)], attributes
 
 
 def _parts(node: ast.AST, drops: Sequence[ast.AST]) -> Iterator[ast.AST]:

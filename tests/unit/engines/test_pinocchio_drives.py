@@ -12,7 +12,6 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
-from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
 
 pytest.importorskip("pinocchio")
@@ -84,8 +83,8 @@ def test_couplings_are_rows() -> None:
         built(made, "constraint_dynamics")
 
 
-def test_programs_lack_actuators() -> None:
-    """A program without the actuators of the scene is refused."""
-    kind = load_engine("pinocchio")
-    with pytest.raises(Refused, match="no actuators"):
-        kind.reproducer(load_scene("servo"), kind.presets["null_space"]["default"])
+def test_programs_lack_drives_in_time() -> None:
+    """A program without what changes the scene's drives is refused; it could not be read with Pinocchio alone."""
+    kind, moved = load_engine("pinocchio"), wheel(Actuator("a", "j", "position", Formula("sin(7*t)"), kp=50.0))
+    with pytest.raises(Refused, match="no drives in time"):
+        kind.reproducer(moved, kind.presets["null_space"]["default"])

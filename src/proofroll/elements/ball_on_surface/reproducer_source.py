@@ -5,7 +5,7 @@ They are for :meth:`proofroll.core.engine_abilities.Reproduces.reproducer`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from proofroll.core.arrays import FloatArray
@@ -33,7 +33,7 @@ def cut_program(
     wanted: Sequence[Any],
     uses: Iterable[str],
     run: str,
-    without: Sequence[str] = (),
+    instead: Mapping[str, str] = {},
     **values: Any,
 ) -> str:
     """A program: numbers, the definitions ``wanted`` with all that they need, ``BODY`` and ``SETTINGS``, and ``run``.
@@ -44,7 +44,7 @@ def cut_program(
         wanted: functions and classes.
         uses: attributes that ``run`` asks for.
         run: text that defines ``run(times)``.
-        without: names of definitions that this program never needs.
+        instead: texts that stand in for definitions, by their names.
         values: further numbers, by their names.
 
     Raises:
@@ -55,7 +55,7 @@ def cut_program(
     if body.surface.generators is None:
         raise Refused("programs are written only for walls that slide along themselves")
     uses = {*uses, "triad", "nearby", "surface"}
-    cut = CutOut([*wanted, type(body.surface)], uses, without)
+    cut = CutOut([*wanted, type(body.surface)], uses, instead)
     given = f"\n\nBODY = {cut.literal(body)}\nSETTINGS = {cut.literal(settings)}\n"
     return f"{cut.head}\n{assigned(**ball_numbers(body), **values)}\n\n{cut.text}{given}{_WALL}{run}"
 

@@ -21,8 +21,8 @@ from proofroll.engines.pinocchio.null_space import LoopRows, NullSpace
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
 
-class MechanismRun:
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+class MechanismMotion:
+    """Steps of a mechanism from sample to sample."""
 
     def __init__(self, mechanism: Mechanism, settings: PinocchioSettings) -> None:
         self._mechanism = mechanism
@@ -32,7 +32,7 @@ class MechanismRun:
         rows = LoopRows(self.tree)
         mu = settings.proximal  # which constraint_dynamics has, and nothing else
         self.dynamics = NullSpace(self.tree, rows) if mu is None else ConstraintDynamics(self.tree, mu)
-        self._rows, self.rank = rows, rows.rank
+        self.rows, self.rank = rows, rows.rank
         self._turns = self._nq != self._model.nv  # configurations hold quaternions
         if self._turns:
             require_tangent_map()
@@ -66,7 +66,7 @@ class MechanismRun:
         if self._turns:
             q = pin.normalize(self._model, q)
         if self._eliminates:
-            q, v = self._rows.eliminated(self._data, q, v)
+            q, v = self.rows.eliminated(self._data, q, v)
         return np.concatenate([q, v, y[self._end :]])
 
     def advance(self, t: float) -> None:
@@ -77,7 +77,18 @@ class MechanismRun:
         except np.linalg.LinAlgError as error:
             raise Diverged(f"the equations became singular between {start:g} s and {t:g} s ({error})") from None
         except Stalled as error:
-            raise Diverged(f"{error}; {pose(self._mechanism, self.sample())}") from None
+            raise Diverged(f"{error}{self._where()}") from None
+
+    def _where(self) -> str:
+        """Clause on the pose now, for messages."""
+        return ""
+
+
+class MechanismRun(MechanismMotion):
+    """See :class:`proofroll.core.engine.Engine` for the methods."""
+
+    def _where(self) -> str:
+        return f"; {pose(self._mechanism, self.sample())}"
 
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, and what the reactions are."""

@@ -34,5 +34,5 @@ def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
     if isinstance(model, Generic) and math.isfinite(body.contact.mu_static):
         raise Refused("the loop that switches Exudyn's constraint of rolling off while the ball slips is proofroll's")
     kind = type(model)
-    run, never = _RUN.format(model=kind.__name__), ["SwitchedIntegration"]
+    run, never = _RUN.format(model=kind.__name__), {"SwitchedIntegration": "SwitchedIntegration = None"}
     return cut_program(body, settings, [kind], ["advance", "sample"], run, never)

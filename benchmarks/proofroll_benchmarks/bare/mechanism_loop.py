@@ -1,4 +1,4 @@
-"""A mechanism by Pinocchio's terms alone: the text of programs, and the loop that measures what an adapter costs."""
+"""A mechanism by Pinocchio's terms alone: the loop that measures what an adapter costs."""
 
 from __future__ import annotations
 
