@@ -49,7 +49,7 @@ class EvenValues:
 
     @property
     def values(self) -> FloatArray:
-        """All of them."""
+        """All values of the range."""
         return np.linspace(self.low, self.high, self.count)
 
     @property

@@ -93,7 +93,7 @@ def asked(
 
 
 def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
-    """One line on standard error for each of ``engines`` that some of the comparisons, which have others, lack."""
+    """Names on standard error each engine that is missing from some of the comparisons, one line each."""
     from proofroll.core.plugins import parse_engine, plain_name
 
     rows = {item.name: {parse_engine(row.engine).name for row in item.rows} for item in comparisons}

@@ -37,7 +37,7 @@ class _Module(NamedTuple):
 
 
 class CutOut:
-    """Definitions that others of the package need, each once, in an order in which they can be executed.
+    """Definitions with all that they need from the package, each once, in an executable order.
 
     Methods and fields of classes that nothing calls are left out: a name counts as called where it is an attribute
     somewhere, or a text. Annotations are kept, and need nothing.

@@ -1,4 +1,4 @@
-"""The result of a run: all variables with their units, made of the parts that its elements give."""
+"""Result of a run: the variables of all its elements with units."""
 
 from __future__ import annotations
 

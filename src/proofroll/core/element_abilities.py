@@ -73,7 +73,7 @@ class CountsTurns(Protocol):
 
     @property
     def turn_interval(self) -> float | None:
-        """Longest interval between two samples over which their rates tell the turns between them [s].
+        """Longest sampling interval over which rates still count whole turns [s].
 
         None: it has no such angle.
         """

@@ -1,4 +1,4 @@
-"""The protocol between proofroll and an engine. Implement it in under 60 lines; see CONTRIBUTING.md.
+"""Protocol between proofroll and an engine; an adapter takes some 60 lines, see CONTRIBUTING.md.
 
 An adapter contains no clock, no file and no plot: the runner owns the time grid, the stopwatch, the detection of
 NaN, timeouts and files. An adapter knows surfaces, contact laws, joints, never a scene by name.

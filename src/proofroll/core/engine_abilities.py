@@ -81,7 +81,7 @@ class TellsCaveats(Protocol):
 
     @staticmethod
     def caveat(settings: Any) -> str:
-        """Part of these settings that is not the engine's own: one clause without a full stop; empty: none."""
+        """Clause on the part of these settings that is not the engine's own; empty: none."""
 
 
 @runtime_checkable
@@ -93,7 +93,7 @@ class TellsFamily(Protocol):
 
     @staticmethod
     def family(settings: Any) -> str:
-        """Law that a model with these settings has: a clause without a full stop; empty: there is one family alone."""
+        """Clause on the laws that a model with these settings follows; empty: the engine has one family only."""
 
 
 @runtime_checkable
@@ -142,7 +142,7 @@ class WritesModels(Protocol):
 
     @classmethod
     def model_file(cls, scene: Scene, settings: Any) -> str:
-        """The text of that file.
+        """Text of the model file.
 
         Raises:
             Refused: there is none for this scene or formulation.
@@ -203,7 +203,7 @@ class SaysWhyNot(Protocol):
 
 @runtime_checkable
 class MadeFor(Protocol):
-    """Ability of an engine with formulations that are offered for some scenes alone.
+    """Ability of an engine to offer a formulation for certain scenes only.
 
     Without what it is made for such a formulation is the same model as another one; asked for by name it builds it.
 
@@ -215,7 +215,7 @@ class MadeFor(Protocol):
 
 
 def offered(formulation: str, requires: Collection[str], made_for: Mapping[str, Collection[str]]) -> bool:
-    """True if a scene that requires this is one that the formulation is made for (:class:`MadeFor`)."""
+    """True if a formulation is offered for a scene with these requirements (:class:`MadeFor`)."""
     return formulation not in made_for or not set(requires).isdisjoint(made_for[formulation])
 
 

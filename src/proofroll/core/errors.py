@@ -53,7 +53,7 @@ class Diverged(ProofrollError):  # noqa: N818 -- a finding about the engine
 
 @contextmanager
 def told_of(place: str) -> Iterator[None]:
-    """Context manager: adds the name of a file to an InputError raised in the block, see :meth:`InputError.of`."""
+    """Context that adds a file's name to an InputError, see :meth:`InputError.of`."""
     try:
         yield
     except InputError as error:

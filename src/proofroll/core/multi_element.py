@@ -90,7 +90,7 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
 
 
 def represents(scene: Scene, formulation: str, provides: Mapping[str, Collection[str]]) -> bool:
-    """True if a run in this formulation has a model of each element, and of one at least in the formulation itself."""
+    """True if every element has a model in such a run, and at least one has it in the formulation itself."""
     formulations = [formulation_for(alone.requires, formulation, provides) for alone in each_alone(scene)]
     return None not in formulations and formulation in formulations
 

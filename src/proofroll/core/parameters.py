@@ -67,7 +67,7 @@ class Parameters:
         return _NUMBERED.sub(lambda found: f"{evaluated(where, found[1], self.quantities):g}", content)
 
     def beside(self, name: str, value: float) -> Parameters:
-        """These numbers and a plain one of this name."""
+        """Numbers extended by one plain number of this name."""
         return Parameters({**self.values, name: value}, self.units)
 
     @cached_property

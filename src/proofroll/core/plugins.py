@@ -166,7 +166,7 @@ def parse_engine(text: str) -> EngineSpec:
 
 
 def resolve_settings(engine: Any, options: Mapping[str, Any], requires: Collection[str] = ()) -> Any:
-    """Complete settings of an engine's class: the preset of the formulation, with the given options put over it.
+    """Complete settings of an engine: the preset of its formulation, overridden by the given options.
 
     Where no formulation is given it is the first that provides what the scene ``requires``, of those that are made for
     such scenes if there is one.

@@ -82,7 +82,7 @@ def asking(failed: FailedRun, *names: str) -> str:
 
 
 def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any], signs: str) -> str:
-    """The whole file.
+    """Text of the whole program.
 
     Args:
         failed: what it shows.

@@ -37,7 +37,7 @@ def powers_of(unit: str) -> Powers:
 
 
 def _product(one: Powers, two: Powers, power: float) -> Powers:
-    """Powers of one unit times another one to a power."""
+    """Powers of base units of a product: one unit times a power of another."""
     powers = {name: one.get(name, 0.0) + power * two.get(name, 0.0) for name in [*one, *two]}
     return {name: value for name, value in sorted(powers.items()) if value}
 

@@ -81,7 +81,7 @@ def _tables(kind: Any) -> list[Any]:
 
 
 def _keys(kind: Any, place: Sequence[str | int], own: Iterable[str]) -> list[str]:
-    """The keys of the tables at a place of a type, as files write them."""
+    """Allowed keys of the tables at a place in a type, in the spelling of files."""
     tables = _tables(kind)
     for part in place:
         hints = [get_type_hints(table, include_extras=True) for table in tables]

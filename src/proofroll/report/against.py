@@ -229,7 +229,7 @@ def _noise(pairs: Iterable[tuple[TableLine, TableLine]]) -> tuple[float, float]:
 
 
 def _cost(old: TableLine, new: TableLine, drift: float, factor: float) -> str:
-    """A cost beyond both intervals, as a clause; empty: it is not, or an interval is not known."""
+    """Clause on a cost that left both intervals; empty: it did not, or an interval is unknown."""
     one, other = _interval(old), _interval(new)
     if one is None or other is None:
         return ""

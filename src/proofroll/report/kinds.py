@@ -48,7 +48,7 @@ class ReportKind(Protocol):
 
     @staticmethod
     def group(scene: Scene) -> str:  # noqa: ARG004 -- for those who tell several apart
-        """Group of scenes to which it belongs, in one or two words for the head of a column."""
+        """Name of the scene's group in one or two words, for the head of a column."""
         return OTHER
 
     @staticmethod

@@ -66,7 +66,7 @@ def verdict_text(row: ReportedRow) -> str:
 
 
 def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
-    """Short text on what a verdict leaves open; of a row, a run or a judgement."""
+    """Detail beside the verdict of a row, a run or a judgement, in few words."""
     match entry.verdict:
         case "differs":
             return {"no ladder": "one step only"}.get(entry.limit, str(entry.limit))

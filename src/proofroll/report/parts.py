@@ -105,7 +105,7 @@ class Part(Protocol):
         return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
-        """Makes it, with the least effort that says something."""
+        """Runs the study with the least effort that gives a result."""
 
     def entry(self) -> PartEntry:
         """Entry of the part, with the further names of its template; only after it was made or taken."""

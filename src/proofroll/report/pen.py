@@ -33,7 +33,7 @@ class View:
     scale: float
 
     def __call__(self, point: npt.ArrayLike) -> FloatArray:
-        """Place of points in the picture [px], y downwards, the point zero at zero, shape (..., 2)."""
+        """Positions of points in the picture [px], shape (..., 2): y downwards, the origin at (0, 0)."""
         back = _unit(self.viewer)
         right = _unit(np.cross(np.asarray(self.up, dtype=np.float64), back))
         upright = np.cross(back, right)
@@ -110,7 +110,7 @@ class Drawing:
         return [*low.tolist(), *(high - low).tolist()]
 
     def picture(self, label: str) -> Picture:
-        """All of it; ``label``: what it shows."""
+        """The finished picture; ``label`` says what it shows."""
         return Picture(self.box, self.marks, label)
 
     def path(self, points: npt.ArrayLike, look: str, closed: bool = False) -> None:

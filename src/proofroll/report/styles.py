@@ -1,4 +1,4 @@
-"""Look of a row in every figure of a comparison: colour, dashes, width and symbol; never colour alone."""
+"""Style of a row in all figures of a comparison: colour with dashes, width and symbol."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ def expand_robot(path: str) -> dict[str, Any]:
 
 
 def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
-    """Answer of the engine that defines MJCF, with its name; or the reason that there is none."""
+    """Answer of the engine that defines MJCF and its name, or a reason without an answer."""
     for name in reader_names():
         try:
             reader = load_reader(name)

@@ -42,19 +42,19 @@ class RobotTruth:
 
     @classmethod
     def of(cls, robot: Robot, states: RobotStates, like: RobotTruth | None = None) -> RobotTruth:
-        """Evaluated by the first formulation; differences are relative to the sizes of ``like``, or its own.
+        """Truth by the first formulation; differences are relative to the sizes of ``like``, by default its own.
 
         Joints that the states do not have are at rest.
         """
         return cls(robot, states.completed(robot), like)
 
     def first(self, count: int) -> RobotTruth:
-        """The truth at the first states alone."""
+        """Truth restricted to the first states."""
         return RobotTruth(self.robot, self.states.first(count))
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        """Values by the first formulation."""
+        """Dynamics evaluated by the first formulation."""
         if self.like is not None and _moves_alike(self.robot, self.like.robot):
             return self.like.dynamics
         return world_jacobians(self.robot, self.states, self.frames)

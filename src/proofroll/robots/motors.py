@@ -87,7 +87,7 @@ def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:
 
 
 def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | None:
-    """An actuator of a position and one of a velocity zero at the same joint as one; None: they are not that."""
+    """One actuator in place of a position actuator and a damper (velocity 0) at the same joint; None: another pair."""
     by_kind = {item["kind"]: item for item in (one, two)}
     if set(by_kind) != {"position", "velocity"} or one["gear"] != two["gear"] or {"limit"} & (one.keys() | two.keys()):
         return None
@@ -98,7 +98,7 @@ def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | 
 
 
 def _range(given: Mapping[str, str], what: str) -> tuple[float, float] | None:
-    """Range of a control or a force where it holds."""
+    """Range of a control or force where the file limits it; None: it does not."""
     ends = _numbers(given.get(f"{what}range", ""))
     if given.get(f"{what}limited") == "false" or len(ends) != 2:
         return None

@@ -147,7 +147,7 @@ def _to_write(case: Case, what: str) -> tuple[str, dict[str, Any]]:
 
 @contextlib.contextmanager
 def lent_workers(workers: Workers | None) -> Iterator[Workers]:
-    """The workers that are given, or some that end with the block."""
+    """Context with the given workers, or with new ones that end with it."""
     if workers is not None:
         yield workers
         return

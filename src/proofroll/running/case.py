@@ -111,7 +111,7 @@ class EngineFacts:
         return float(self.settings["dt"]) if self.resolution == "dt" else None
 
     def on(self, requires: Collection[str]) -> EngineFacts:
-        """The same, with the order for a scene that requires this."""
+        """Facts with the order of convergence for a scene with these requirements."""
         return replace(self, order=lowest(self.order, self.lowered, requires), lowered={})
 
 

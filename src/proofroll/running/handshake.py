@@ -16,7 +16,7 @@ PROTOCOL = 2
 
 
 def identify_and_settle(place: str) -> dict[str, Any]:
-    """Identity of this worker, which becomes the one for engines ``NAME@place`` alone."""
+    """Identity of this worker; from then on it serves engines ``NAME@place`` alone."""
     from proofroll.running import loading
 
     loading.settle(place)

@@ -43,7 +43,7 @@ def changed(kind: Any) -> str | None:
 
 
 def _held() -> dict[str, tuple[Any, ...]]:
-    """Functions, classes, what these have, and constants of all modules that judge, by their full names."""
+    """Functions, classes with their members, and constants of all judging modules, by full name."""
     modules = [module for name, module in list(sys.modules.items()) if name.startswith(_JUDGING)]
     return {name: held for module in modules for name, held in _of_module(module)}
 

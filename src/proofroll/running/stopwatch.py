@@ -16,7 +16,7 @@ SECONDS = 0.05
 
 
 class Stopwatch:
-    """Keeps one worker per engine, which stays warm between the rounds of :func:`proofroll.running.timing.interleaved`.
+    """Clock with one worker per engine, kept warm between the rounds of :func:`proofroll.running.timing.interleaved`.
 
     They come from ``workers`` and go back there.
     """

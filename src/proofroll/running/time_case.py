@@ -1,4 +1,4 @@
-"""Speed of an engine: runs that only advance it, up to a last sample, and end where the judged run does."""
+"""Speed of an engine from clean runs: they only advance, take one last sample, and end where the judged run ends."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def clean_runs(kind: Any, scene: Scene, settings: Any, recording: Recording) -> 
 
 
 def is_put_off(advancing: float, sampling: float, usual: float) -> bool:
-    """True if a last sample does work that ``advance`` left: from seconds of both, and of a sample of a sampled run."""
+    """True if the last sample does work that ``advance`` put off, by the seconds of both and of a usual sample."""
     return sampling > max(_LEAST_SECONDS, _PART * advancing, _PUT_OFF * usual)
 
 

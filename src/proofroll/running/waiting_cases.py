@@ -12,7 +12,7 @@ from proofroll.running.time_budget import TimeBudget
 
 
 class WaitingCases:
-    """Cases that wait. A worker goes on with its engine while it can: starting another costs more than many a case.
+    """Cases that wait for a worker, which keeps its engine while it can: a new worker costs more than many cases.
 
     Args:
         budget: of the processor time of the cases, or None.

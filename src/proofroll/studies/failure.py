@@ -75,7 +75,7 @@ class RunOutcome:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """Yardstick of a run.
+    """Sizes and limits by which a run counts as failed.
 
     Attributes:
         scene: what was run.

@@ -29,7 +29,7 @@ class BallReport(ReportKind):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """One ball on one surface."""
+        """True for one ball on one surface."""
         return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
 
     @staticmethod
@@ -42,7 +42,7 @@ class BallReport(ReportKind):
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
-        """One for all cases: with rolling resistance where any has it."""
+        """One drawing for all cases; it shows rolling resistance if some case has it."""
         from proofroll.ball_studies.report.drawings import overview
 
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)

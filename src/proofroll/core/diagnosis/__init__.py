@@ -160,7 +160,7 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
 
 
 def _share(one: Cause, other: Cause) -> bool:
-    """True if they explain the same quantity."""
+    """True if two causes explain the same quantity."""
     return bool({one.quantity, *one.covers} & {other.quantity, *other.covers})
 
 

@@ -69,7 +69,7 @@ def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[flo
 
 
 def said_delay(delay: float, step: float | None) -> str:
-    """A shift in time, in steps where it is some."""
+    """Text of a shift in time, in steps if it is a half, one or two of them."""
     word = "late" if delay > 0 else "early"
     if step:
         steps = abs(delay) / step

@@ -79,7 +79,7 @@ def said_factor(factor: float) -> str:
 
 
 def telling(factor: float) -> bool:
-    """True if a factor is a known mistake, or too far from one for a method's error."""
+    """True if a factor is that of a known mistake, or farther from 1 than a method's error can be."""
     return known_factor(factor) is not None or abs(factor - 1) > _METHOD
 
 
@@ -122,7 +122,7 @@ class Residuals(Generic[M]):
 
     @property
     def alone(self) -> bool:
-        """True if there is but one equation, which any one number closes."""
+        """True if there is only one equation, which a single unknown always closes."""
         return len(self.left(self.plain)) < 2
 
     def explained(self, model: M | None) -> int:

@@ -93,7 +93,7 @@ def _otherwise(line: Mapping[str, Any]) -> str:
 
 
 def _is_single(line: Mapping[str, Any]) -> bool:
-    """True if the found numbers are the float32 of the expected ones, and not only by being equal to them."""
+    """True if the found numbers are the expected ones rounded to float32, and some of them changed by that."""
     return np.array_equal(np.float32(line["expected"]), np.asarray(line["found"])) and any(line["expected"])
 
 

@@ -45,7 +45,7 @@ def both(evidence: Evidence) -> tuple[xr.Dataset, xr.Dataset] | None:
 
 @hypothesis("float32", "every number of the run, or each built one that differs, is exactly a float32")
 def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
-    """Numbers of 24 bits: of random doubles one in 5e8 is such a one."""
+    """Hypothesis: samples hold numbers of single precision (24 bits); one random double in 5e8 looks so by chance."""
     yield from single_precision(evidence.lines)
     run, truth = evidence.run, evidence.truth
     said_so = any(str(line["because"]).endswith(ROUNDED) for line in evidence.lines)  # what is declared is no finding

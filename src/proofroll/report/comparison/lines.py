@@ -53,7 +53,7 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
 
 
 def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
-    """End and cost of a run; without clean runs the cost of the sampled one, beside which others ran."""
+    """Status and cost of a run; without clean runs the cost of the sampled run, which others disturbed."""
     cost, done = Cost.of(result.timings), result.status == Status.DONE
     rough = result.wall_seconds / outcome.comparison.until if done and not result.host and result.wall_seconds else None
     return {

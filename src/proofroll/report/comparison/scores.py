@@ -41,7 +41,7 @@ def closest(content: ReportedComparison, choice: ChoiceMatrix) -> Candidate | No
 
 
 def furthest_off(content: ReportedComparison, runs: Sequence[ReportedRun]) -> Judgement | None:
-    """The largest error of a coordinate in parts of its scale, where it can be judged and is finite."""
+    """Judgement of the coordinate with the largest finite relative error, ill-posed ones left out."""
     motion = content.headlines("motion")
     judged = (judgement for run in runs for judgement in run.judgements if judgement.observable in motion)
     finite = [item for item in judged if item.verdict != "ill-posed" and math.isfinite(item.error)]

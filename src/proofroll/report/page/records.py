@@ -152,7 +152,7 @@ class ReportContent:
 
     @cached_property
     def precision(self) -> dict[str, WorkPrecision]:
-        """Work–precision pictures by the id of the section that they belong to, of studies whose runs allow them."""
+        """Work–precision pictures by the id of their section, for studies with enough timed runs."""
         sections = {item.name: f"c{number}" for number, item in enumerate(self.comparisons)}
         sections |= {item.name: f"speed{number}" for number, item in enumerate(self.entries.get("tradeoffs", ()))}
         lines: dict[str, list[TableLine]] = {name: [] for name in sections}

@@ -1,4 +1,4 @@
-"""A scene at its start as one page: how it starts, its drawing and its parameters."""
+"""Page of one scene: its start, its drawing and its parameters."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class Ghost:
 
     @property
     def default(self) -> bool:
-        """True for the settings of the obvious model."""
+        """True if its settings are those of the obvious model (preset ``default``)."""
         return self.settings.get("preset") == "default"
 
     def ending(self, reached: float) -> str:
@@ -57,7 +57,7 @@ class Ghost:
 
 @dataclass(frozen=True)
 class Replayed:
-    """One truth and the runs beside it.
+    """A true motion and the runs shown beside it.
 
     Attributes:
         scene: with the parameters of the case.

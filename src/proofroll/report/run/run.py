@@ -117,7 +117,7 @@ def _told(event: Event) -> str:
 
 
 def run_lines(content: RunContent) -> list[Any]:
-    """A run for a person, as things that rich prints."""
+    """Lines and tables about a run for the terminal, printed by rich."""
     from rich.table import Table
     from rich.text import Text
 

@@ -1,4 +1,4 @@
-"""The heat maps as a picture and as a table of a page: colour, and text that says the same."""
+"""Heat maps as a picture and as a table of a page; each colour has its text."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Screen(Console):
             yield segment if segment.control else Segment(printable(segment.text), segment.style)
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """See :class:`rich.console.Console`; of a table that is too wide, columns go below the others: none is cut."""
+        """Prints as :class:`rich.console.Console` does; columns of a table that is too wide move below the others."""
         if len(objects) == 1 and isinstance(objects[0], Table):
             for part in fitted(objects[0], self):
                 super().print(part, **options)

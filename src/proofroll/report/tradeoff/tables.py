@@ -165,7 +165,7 @@ def corner_table(study: TradeoffStudy, quantity: str) -> Table:
 
 
 def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
-    """The largest error at any corner and where that is; a corner without a result is worse than any error."""
+    """Largest error over all corners, with its corner; a corner without a result counts as larger than any error."""
     missing = [corner for corner in corners if corner.errors.get(quantity) is None]
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""

@@ -14,7 +14,7 @@ from proofroll.robots.model import Array, Robot, RobotBody
 
 
 def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
-    """An engine's own rule of what is impossible is not predicted: what it holds is looked at."""
+    """Bodies that an engine holds otherwise and may have called impossible, by whatever rule."""
     robot, reading = evidence.robot, evidence.reading
     scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)
     other = {

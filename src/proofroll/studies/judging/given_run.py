@@ -184,7 +184,7 @@ def _dataset(run: Run) -> xr.Dataset:
 
 
 def _from_file(path: Path) -> Run:
-    """A dataset, or of numpy's own files the arrays by name."""
+    """Content of a file: a dataset, or for numpy's own formats arrays by name."""
     from proofroll.files.trajectory_file import read, read_arrays
 
     try:

@@ -176,7 +176,7 @@ def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runne
         tell(f"{where}: {finished} of {len(points)} points", 1)
 
     def ask(point: MapPoint, searching: Searching, rung: int | None) -> list[Case]:
-        """Goes on with a search until it needs a case that has not been run; that case, unless another asked for it."""
+        """Advances a search to its next missing case; returns that case unless another search asked for it."""
         while rung is not None:
             if point.too_long(rung, effort):
                 rung = _send(point, searching, None)

@@ -37,7 +37,7 @@ class ClaimJudgement:
 
 @dataclass(frozen=True)
 class Holds:
-    """Claim: the coarsest step that holds a tolerance with margin at the scene's own parameters; no clock.
+    """Claim on the coarsest step that holds a tolerance with margin at the scene's own parameters; nothing is timed.
 
     Attributes:
         engine: whose curves, ``name[key=value,…]``.
@@ -52,7 +52,7 @@ class Holds:
     because: str
 
     def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
-        """Exactly, in a brief study too."""
+        """Judgement of the claim; exact in a brief study, too."""
         said = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
         if unknown := _unknown(study, [self.engine]):
             return ClaimJudgement(said, self.because, None, unknown)
@@ -79,7 +79,7 @@ class Converges:
     because: str
 
     def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
-        """Exactly, in a brief study too."""
+        """Judgement of the claim; exact in a brief study, too."""
         lowest, highest = self.order
         said = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
         if unknown := _unknown(study, [self.engine]):

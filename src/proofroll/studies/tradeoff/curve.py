@@ -183,7 +183,7 @@ class Curve:
         return Floor(done[best], errors[best], changes[least + 1])
 
     def saturated(self, quantity: str) -> bool:
-        """True if the two loosest tolerances give the same run: something else than they limits its steps.
+        """True if the two loosest tolerances give the same run, so that something else limits its steps.
 
         Where an array happens to lie in memory may change the round-off of a run, so equal is equal up to that.
         """

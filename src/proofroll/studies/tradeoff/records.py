@@ -69,7 +69,7 @@ class Corner:
     message: str
 
     def off(self, relative: bool) -> dict[str, float]:
-        """``relative`` or ``errors``."""
+        """Relative errors, or else ``errors``."""
         return self.relative if relative else self.errors
 
 

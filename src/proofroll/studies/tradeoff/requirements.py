@@ -90,7 +90,7 @@ def _lives_on_the_grid(study: TradeoffStudy, sparse: SparseRun, name: str, absol
 
 
 def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, required: Requirements, absolute: float) -> str | None:
-    """Reason that it does not hold it at some corner of the range."""
+    """Reason that a point misses the tolerance at some corner of the range."""
     name, unit = required.quantity, study.quantities[required.quantity].unit
     if point.corners is None:
         return "it was not checked over the range of the parameters"

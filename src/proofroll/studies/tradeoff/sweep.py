@@ -37,7 +37,7 @@ Progress = Callable[[Case, Result], None]
 def curves_of(
     engines: Iterable[str], workers: Workers | None = None, requires: frozenset[str] = frozenset()
 ) -> tuple[list[Curve], dict[str, str]]:
-    """A curve without points for every formulation and preset of the engines, and why some engine has none.
+    """Empty curves, one for each formulation and preset of the engines; and reasons by engine without one.
 
     An engine is a name, or ``name[key=value,…]`` for one formulation or setting; none means all that are installed.
     Formulations that provide nothing of what the scene requires are for other kinds of scenes, and left out.

@@ -91,7 +91,7 @@ class RunInVersion:
 
 @dataclass(frozen=True)
 class OrderChange:
-    """Observed orders of convergence of a quantity that are those of different methods."""
+    """Change of a quantity's observed order of convergence that means another method."""
 
     quantity: str
     old: float

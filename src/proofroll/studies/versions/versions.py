@@ -112,7 +112,7 @@ def compared(
     rounds: int,
     progress: Progress | None = None,
 ) -> VersionsStudy:
-    """The same cases in two versions of an engine, the old and the new ``NAME`` or ``NAME@PLACE``, and what changed.
+    """Differences between two versions of an engine (``NAME`` or ``NAME@PLACE``) on the same cases.
 
     Speeds are measured in so many rounds; with 0 they are not. ``progress`` is called with what has just been done.
 

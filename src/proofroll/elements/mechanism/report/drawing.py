@@ -158,7 +158,7 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
 
 
 def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
-    """A direction that is given for z up, for another direction that is up."""
+    """A direction for z up, turned to another upward direction."""
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
     across = np.cross(up, first)
     across /= np.linalg.norm(across)

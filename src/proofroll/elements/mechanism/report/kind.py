@@ -43,7 +43,7 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """One mechanism alone."""
+        """True for one mechanism alone."""
         return len(scene.elements) == 1 and isinstance(scene.elements[0], MechanismElement)
 
     @staticmethod
