@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
+from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.page.records import ReportContent
 from proofroll.report.parts import PartEntry
 from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines, verdict_table
@@ -25,6 +26,18 @@ def test_the_table_of_verdicts_is_plain_where_nobody_watches(content: ReportCont
     assert max(map(len, text.splitlines())) <= WIDTH
     for row in content.comparisons[0].rows:
         assert row.verdict in text
+
+
+def test_a_column_without_numbers_is_left_out(content: ReportContent) -> None:
+    """Where nothing was timed no column of costs takes the room of names."""
+
+    def head(comparison: ReportedComparison) -> list[str]:
+        return [str(column.header) for column in verdict_table(comparison).columns]
+
+    found = content.comparisons[0]
+    untimed = replace(found, rows=[replace(row, seconds_per_second=None) for row in found.rows])
+    assert "s/s" in head(found)
+    assert [name for name in head(found) if name != "s/s"] == head(untimed)
 
 
 def test_the_console_is_as_wide_in_a_pipe_as_at_most_on_a_terminal(

@@ -119,7 +119,8 @@ def _from_report(
     matrix = choice_matrix(lines, studies)
     advised = advice(matrix, part, forces)
     content = {"report": str(path), "tolerance": part, "with_forces": forces, "advice": advised}
-    options.show(content, as_json, lambda: [item.sentence for item in advised])
+    key = "s/s: seconds of computing per second of motion; ~: to a factor of about two."
+    options.show(content, as_json, lambda: [*(item.sentence for item in advised), key])
     single = [item for item, column in zip(advised, matrix.columns, strict=False) if len(column.studies) == 1]
     raise typer.Exit(options.OK if all(item.choice for item in single) else options.CONTRADICTED)
 

@@ -56,30 +56,35 @@ def console() -> Screen:
 
 def verdict_table(content: ReportedComparison) -> Table:
     """One line per engine with settings: the worst over all points of the parameters."""
-    names = columns(content)
-    before = seconds_before(content)
+    names, before = columns(content), seconds_before(content)
+    worst = [
+        max((row.observables[name] for name, _ in names if name in row.observables), key=_beyond, default=None)
+        for row in content.rows
+    ]
+    numbers = {
+        "order": [item.order if item else None for item in worst],
+        "s before": [before.get(place) for place in range(len(content.rows))],
+        "s/s": [row.seconds_per_second for row in content.rows],
+    }
+    numbers = {name: found for name, found in numbers.items() if any(value is not None for value in found)}
     table = plain_table(
         # Where the window is narrow those with a least width break between words, and nothing is cut.
         Column("engine formulation setting", min_width=_WORD, overflow="fold"),
         *unbroken("step"),
         Column("verdict", min_width=_WORD),
         *(Column(Text(f"{name} [{unit}]"), justify="right", min_width=_NUMBER) for name, unit in names),
-        *numeric("order", *(["s before"] if before else []), "s/s"),
+        *numeric(*numbers),
         *unbroken(""),
         title=content.title,
     )
     for place, row in enumerate(content.rows):
         verdict, judged = row.verdict, row.observables
-        shown = [judged[name] for name, _ in names if name in judged]
-        worst = max(shown, key=_beyond, default=None)
         table.add_row(
             Text(" ".join(filter(None, (row.name, row.formulation, row.setting)))),
             step(row.resolution, row.resolution_value),
             Text(f"{SYMBOLS[verdict]} {verdict_text(row)}", style=STYLES[verdict]),
             *(number(judged[name].error if name in judged else None) for name, _ in names),
-            number(worst.order if worst else None),
-            *([number(before.get(place))] if before else []),
-            number(row.seconds_per_second),
+            *(number(found[place]) for found in numbers.values()),
             Text("") if row.as_expected else Text("!!", style="bold red"),
         )
     return table
