@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from rolling_rows import RollingContact
+
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface
@@ -14,7 +16,6 @@ from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
-from proofroll.truth.mechanism.rolling_rows import RollingContact
 
 
 def rolling_scene(scene: Scene) -> tuple[Mechanism, tuple[RollingContact, ...]]:

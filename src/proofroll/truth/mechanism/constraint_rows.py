@@ -1,24 +1,23 @@
-"""Constraint rows of joints, loops and rolling contacts between bodies that are each free in space."""
+"""Constraint rows of joints and loops between bodies that are each free in space."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from proofroll.elements.mechanism.joint import FACTS
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars, GeneralBody, Planar
-from proofroll.truth.mechanism.rolling_rows import RollingContact
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
-_NONE = (0.0, 0.0, 0.0)
+NONE = (0.0, 0.0, 0.0)
 _Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
-_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint, loop or rolling contact of two bodies: places from the centres of mass, frames by rows, in body axes."""
+    """A joint or loop of two bodies: places from the centres of mass, frames by rows, in body axes."""
 
     kind: str
     a: int
@@ -57,7 +56,7 @@ class ConstraintRow:
 class ConstraintRows:
     """Makes the rows for one state: what connects the bodies, and the views of these, the ground's last.
 
-    ``u_slices`` say where the velocities of each body lie among all, ``rolling`` which connections are those of balls.
+    ``u_slices`` say where the velocities of each body lie among all.
     """
 
     def __init__(
@@ -65,16 +64,12 @@ class ConstraintRows:
         bodies: Sequence[GeneralBody | Planar],
         u_slices: Sequence[slice],
         connections: Sequence[Connection],
-        rolling: Mapping[int, RollingContact],
         views: Sequence[BodyInScalars],
     ) -> None:
-        self._bodies, self._u_slices, self._connections = bodies, u_slices, connections
-        self._rolling, self._views = rolling, views
+        self._bodies, self._u_slices, self._connections, self._views = bodies, u_slices, connections, views
 
     def of(self, number: int) -> list[ConstraintRow]:
-        """All rows of a joint, loop or rolling contact."""
-        if number in self._rolling:
-            return self._of_rolling(number)
+        """All rows of a joint or loop."""
         c, a, b, arm_a, arm_b, d, towards = self._apart(number)
         A, B = columns(product(a.R, c.frame_a)), columns(product(b.R, c.frame_b))
         rows = []
@@ -83,30 +78,17 @@ class ConstraintRows:
             if len(facts.translations) < 3:
                 rows.append(self._sliding(number, A[k]))
                 continue
-            n: Sequence[Scalar] = _AXES[k]  # along the world's axes
+            n: Sequence[Scalar] = AXES[k]  # along the world's axes
             on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
-            given = ((n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
-            rows.append(self._row(number, dot(n, d), dot(n, towards), *given))
+            given = ((n, on_b), (scaled(-1.0, n), on_a), (n, NONE))
+            rows.append(self.row(number, dot(n, d), dot(n, towards), *given))
         for k, m in facts.rotations:
             x, y = A[k], B[m]
             t = cross(y, x)
             x_rate, y_rate = cross(a.w, x), cross(b.w, y)
             bias = add(dot(cross(a.w, x_rate), y), mul(2.0, dot(x_rate, y_rate)), dot(x, cross(b.w, y_rate)))
             back = scaled(-1.0, t)
-            rows.append(self._row(number, dot(x, y), bias, (_NONE, t), (_NONE, back), (_NONE, t)))
-        return rows
-
-    def _of_rolling(self, number: int) -> list[ConstraintRow]:
-        """The contact point of a ball does not move; only its distance from the wall can be violated by a place."""
-        ball, view = self._rolling[number], self._views[self._connections[number].b]
-        gap, e1, e1_rate = ball.normal(view.r, view.v)
-        arm = scaled(ball.radius, e1)
-        towards = scaled(ball.radius, cross(view.w, e1_rate))
-        rows = []
-        for n in _AXES:
-            residual = scaled(-1.0, scaled(gap, e1))
-            on_b, on_a = (n, cross(arm, n)), (scaled(-1.0, n), _NONE)
-            rows.append(self._row(number, dot(n, residual), dot(n, towards), on_b, on_a, (n, _NONE)))
+            rows.append(self.row(number, dot(x, y), bias, (NONE, t), (NONE, back), (NONE, t)))
         return rows
 
     def of_rate(self, number: int, kind: str) -> ConstraintRow:
@@ -117,7 +99,7 @@ class ConstraintRows:
         back = scaled(-1.0, axis)
         if kind == "revolute":
             bias = dot(cross(a.w, axis), minus(b.w, a.w))
-            return self._row(number, 0.0, bias, (_NONE, axis), (_NONE, back), (_NONE, axis))
+            return self.row(number, 0.0, bias, (NONE, axis), (NONE, back), (NONE, axis))
         return self._sliding(number, axis)
 
     def _apart(self, number: int) -> tuple[Any, ...]:
@@ -135,9 +117,9 @@ class ConstraintRows:
         n_rate = cross(a.w, n)
         bias = add(dot(n, towards), mul(2.0, dot(n_rate, slide)), dot(cross(a.w, n_rate), d))
         on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(plus(arm_a, d), n))
-        return self._row(number, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, _NONE))
+        return self.row(number, dot(n, d), bias, (n, on_b), (scaled(-1.0, n), on_a), (n, NONE))
 
-    def _row(
+    def row(
         self,
         number: int,
         residual: Scalar,

@@ -26,7 +26,6 @@ from proofroll.truth.mechanism.constraint_rows import ConstraintRow
 from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations, Switched
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
-from proofroll.truth.mechanism.rolling_rows import RollingContact
 
 _BESIDE = 1e-9  # m, rad, and part of velocities: between round-off and what a growth of 1e7 makes large
 RANK = 1e-8  # see analysis.RANK; this route finds its own rank
@@ -197,13 +196,13 @@ class MaximalCoordinates:
 
     Args:
         mechanism: see :class:`~proofroll.truth.mechanism.maximal_equations.MaximalEquations` for what is refused.
-        rolling: balls among its bodies that roll on walls; their forces come after those of joints and loops.
+        equations: of it.
     """
 
-    def __init__(self, mechanism: Mechanism, rolling: Sequence[RollingContact] = ()) -> None:
+    def __init__(self, mechanism: Mechanism, equations: type[MaximalEquations] = MaximalEquations) -> None:
         self.mechanism = mechanism
-        self.lean = NumericEquations(MaximalEquations(mechanism, allow_planar=True, rolling=rolling))
-        self._whole = NumericEquations(MaximalEquations(mechanism, allow_planar=False, rolling=rolling))
+        self.lean = NumericEquations(equations(mechanism, allow_planar=True))
+        self._whole = NumericEquations(equations(mechanism, allow_planar=False))
         self._compiled: dict[bool, MaximalTaylor] = {}
 
     def taylor(self, long_double: bool = False) -> MaximalTaylor:

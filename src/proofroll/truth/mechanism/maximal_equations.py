@@ -22,7 +22,6 @@ from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH
 from proofroll.elements.mechanism.signal import value_at
 from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
-from proofroll.truth.mechanism.rolling_rows import RollingContact
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for name in SMOOTH}
@@ -78,13 +77,12 @@ class MaximalEquations:
     Args:
         mechanism: any.
         allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
-        rolling: which of its bodies, free ones without joints of their own, are balls that roll on a wall.
 
     Raises:
         Refused: the mechanism has something of that.
     """
 
-    def __init__(self, mechanism: Mechanism, allow_planar: bool, rolling: Sequence[RollingContact] = ()) -> None:
+    def __init__(self, mechanism: Mechanism, allow_planar: bool) -> None:
         self.mechanism, self.bodies = mechanism, made_bodies(mechanism, allow_planar)
         self.x_slices = slices(body.nx for body in self.bodies)
         self.u_slices = slices(body.nu for body in self.bodies)
@@ -101,12 +99,8 @@ class MaximalEquations:
         index = mechanism.body_index
         self._com = {WORLD: np.zeros(3)} | {body.name: np.array(body.com) for body in mechanism.bodies}
         self.connections = [
-            self._connection(c.kind, c.a, c.b, c.position_a, c.position_b, c.frame_a, c.frame_b)
+            self.connection(c.kind, c.a, c.b, c.position_a, c.position_b, c.frame_a, c.frame_b)
             for c in mechanism.connections
-        ]
-        self._rolling = dict(enumerate(rolling, len(self.connections)))
-        self.connections += [
-            self._connection("rolling", WORLD, ball.body, _NONE, _NONE, np.eye(3), np.eye(3)) for ball in rolling
         ]
         self._ends = [
             (index[s.body_a], self._place(s.body_a, s.position_a), index[s.body_b], self._place(s.body_b, s.position_b))
@@ -154,7 +148,7 @@ class MaximalEquations:
             weight = [float(body.mass * g) for g in self.mechanism.gravity]
             force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, _NONE))
             rate += body.rate(x[at_x], u[at_u])
-        made = ConstraintRows(self.bodies, self.u_slices, self.connections, self._rolling, views)
+        made = self._rows(views)
         rows: list[ConstraintRow] = []
         laws, angle_rate = [], []
         efforts: list[Scalar] = [0.0] * len(self.mechanism.actuators)
@@ -210,10 +204,11 @@ class MaximalEquations:
 
     def rate_rows(self, state: Sequence[Scalar], joints: Sequence[int]) -> list[ConstraintRow]:
         """Rates of revolute and prismatic joints as rows; of a prismatic one the residual is the coordinate."""
-        made = ConstraintRows(
-            self.bodies, self.u_slices, self.connections, self._rolling, self._views(state, FUNCTIONS)
-        )
+        made = self._rows(self._views(state, FUNCTIONS))
         return [made.of_rate(number, self.mechanism.joints[number].kind) for number in joints]
+
+    def _rows(self, views: Sequence[BodyInScalars]) -> ConstraintRows:
+        return ConstraintRows(self.bodies, self.u_slices, self.connections, views)
 
     def _coupled(self, made: ConstraintRows, coupling: Coupling) -> ConstraintRow:
         """A coupling as a row on rates; that it holds between coordinates follows from the start."""
@@ -230,9 +225,10 @@ class MaximalEquations:
         ]
         return [*views, GROUND]
 
-    def _connection(
+    def connection(
         self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
     ) -> Connection:
+        """A connection of two bodies, by their names, with its places and axes in them."""
         index = self.mechanism.body_index
         places = (self._place(a, at_a), self._place(b, at_b))
         frames = ([clean(row) for row in frame] for frame in (frame_a, frame_b))

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 import xarray as xr
+from rolling_rows import rolling_equations
 from rolling_scenes import rolling_scene
 
 from proofroll.core.errors import Refused
@@ -37,7 +38,7 @@ def outside(true: xr.Dataset, witness: xr.Dataset, names: dict[str, str]) -> dic
 def witnessed(scene: Scene, element: BallOnSurface, method: str = "run_taylor") -> xr.Dataset:
     """The ball of a scene by rows of rolling, with all other elements in the same equations."""
     mechanism, rolling = rolling_scene(scene)
-    record = getattr(MaximalCoordinates(mechanism, rolling), method)(TIMES)
+    record = getattr(MaximalCoordinates(mechanism, rolling_equations(rolling)), method)(TIMES)
     ball = mechanism.body_index[element.name]
     contact = len(mechanism.joints) + len(mechanism.loops) + [one.body for one in rolling].index(element.name)
     motion = record.p_WB[:, ball], record.v_WB[:, ball], record.w_WB[:, ball]
@@ -60,7 +61,7 @@ def test_numbers_and_series_agree() -> None:
     """DOP853 on the same rows, projected after each step, moves the ball as the series do."""
     pytest.importorskip("heyoka")
     mechanism, rolling = rolling_scene(load_scene("bowl"))
-    route = MaximalCoordinates(mechanism, rolling)
+    route = MaximalCoordinates(mechanism, rolling_equations(rolling))
     one, two = route.run_dop853(TIMES[:3], 1e-12), route.run_taylor(TIMES[:3])
     assert np.abs(one.p_WB - two.p_WB).max() < 1e-12
     assert one.residual.max() < 1e-12
@@ -80,7 +81,7 @@ def test_truth_of_a_mixed_scene_agrees_with_rolling_rows() -> None:
     assert len(balls) > 10
     assert not outside(true, witnessed(mixed, ball), balls)
     mechanism, rolling = rolling_scene(mixed)
-    record = MaximalCoordinates(mechanism, rolling).run_taylor(TIMES)
+    record = MaximalCoordinates(mechanism, rolling_equations(rolling)).run_taylor(TIMES)
     angle = next(name for name in true.data_vars if str(name).startswith("v.pivot"))
     assert np.abs(record.v[:, -1] - true[angle].to_numpy()).max() < true[angle].attrs["error_bar"] + 1e-12
 
