@@ -6,13 +6,18 @@ import dataclasses
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 from unittest import SkipTest
 
 import numpy as np
 import pytest
+from honest import Rolling
+from liars import of_mechanism
+from lies import gravity, heavier
 from nonconforming import FAILS, Damped, Forgetful, Heavy
+from single_precision import Single
 from tiny import Tiny, TinySettings
 
 from proofroll.conformance import Check, checks, run_check
@@ -120,6 +125,62 @@ def test_names_that_fit_nothing() -> None:
         checks(Tiny, {"versoin": "misspelt"})
     with pytest.raises(ValueError, match="has no check"):
         run_check(Tiny, "versoin")
+
+
+def moved_centre(scene: Scene) -> Scene:
+    """The scene with the first body's centre of mass a tenth farther out."""
+    (element,) = scene.elements
+    first, *others = element.mechanism.bodies  # type: ignore[attr-defined]  # it is a mechanism
+    return of_mechanism(scene, bodies=(dataclasses.replace(first, com=1.1 * np.asarray(first.com)), *others))
+
+
+def moved_joint(scene: Scene) -> Scene:
+    """The scene with the last joint a tenth farther out on both bodies."""
+    (element,) = scene.elements
+    *others, last = element.mechanism.joints  # type: ignore[attr-defined]  # it is a mechanism
+    ends = {end: tuple(1.1 * np.asarray(getattr(last, end))) for end in ("position", "child_position")}
+    return of_mechanism(scene, joints=(*others, dataclasses.replace(last, **ends)))
+
+
+MODELS: Mapping[str, Callable[[Scene], Scene]] = {
+    "none": lambda scene: scene,
+    "gravity": gravity(1.1),
+    "mass": heavier("mass", 1.1),
+    "inertia": heavier("inertia", 1.1),
+    "centre": moved_centre,
+    "joint": moved_joint,
+    "radius": heavier("radius", 1.1),
+}
+
+
+def lying(engine: type[Any], model: Callable[[Scene], Scene]) -> type[Any]:
+    """An engine that moves another model than it says it has built."""
+
+    class Lying(engine):  # type: ignore[misc]  # any engine
+        @classmethod
+        def build(cls, scene: Scene, settings: Any) -> Any:
+            moves, right = engine.build(model(scene), settings), engine.build(scene, settings)
+            moves.built = right.built
+            return moves
+
+    return Lying
+
+
+@pytest.mark.parametrize(
+    ("engine", "formulation", "lies"),
+    [
+        (Single, "euler-matched-double_pendulum", ("gravity", "mass", "inertia", "centre", "joint")),
+        (Single, "euler-matched-falling_body", ("gravity", "centre")),  # falls alike at any mass
+        (Rolling, "order_1-matched-slow", ("gravity", "inertia", "radius")),  # rolls alike at any mass
+    ],
+)
+def test_another_model_than_is_said_is_noticed(engine: type[Any], formulation: str, lies: tuple[str, ...]) -> None:
+    """An engine of first order fails by its first steps where gravity, mass, inertia or geometry is off by a tenth."""
+    name = f"first_steps_fit_the_scene[{formulation}]"
+    for lie in ("none", *lies):
+        (own,) = [check for check in checks(lying(engine, MODELS[lie])) if check.name == name]
+        with pytest.raises(AssertionError, match="differs from the scene") if lie in lies else nullcontext():
+            own.run()
 
 
 class Weary(Damped):

@@ -37,6 +37,16 @@ def _with_law(scene: Scene, law: str, value: float) -> Scene:
     return replace(scene, name=f"{scene.name}-{law}", elements=(changed,))
 
 
+def _falling(scene: Scene) -> Scene:
+    """A scene of a free body, with gravity and a centre of mass outside the origin of its frame."""
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)  # it is one of ours
+    (body,) = element.mechanism.bodies
+    body = replace(body, com=(0.1, -0.2, 0.3))
+    changed = replace(element, mechanism=replace(element.mechanism, bodies=(body,), gravity=(0.0, 0.0, -9.81)))
+    return replace(scene, name="falling_body", elements=(changed,))
+
+
 def _with_drive(scene: Scene, drive: str) -> Scene:
     """A scene of two hinges that both move, with an actuator at the second or a coupling of the two."""
     (element,) = scene.elements
@@ -105,11 +115,15 @@ class MechanismKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Mechanisms with a loop, oblique axes, a top, springs, feet that slide, an impact, each law and each drive."""
+        """Mechanisms with a loop, oblique axes, a top, springs, feet that slide, an impact, each law and each drive.
+
+        In the two hinges and the falling body all that a model holds changes the first acceleration, gravity, too.
+        """
         from proofroll.files.scene_file import load_scene
 
         found = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators", "sled")}
-        plain = load_scene(_PLAIN)
+        found[_PLAIN] = plain = load_scene(_PLAIN)
+        found["falling_body"] = _falling(load_scene("free_body", w1=2.0, w3=1.0))
         found["two_spheres"] = _sooner(load_scene("two_spheres", friction=0.5), _SOONER)
         found |= {f"{_PLAIN}-{law}": _with_law(plain, law, value) for law, value in _LAWS.items()}
         return found | {f"{_PLAIN}-{drive}": _with_drive(plain, drive) for drive in _DRIVES}
