@@ -55,6 +55,7 @@ class Settings(Protocol):
     """A frozen dataclass with at least these fields; every field has a default.
 
     One of an engine that computes in single precision has ``precision = "single"`` besides, see :func:`precision_of`.
+    Names in ``unused``, if there is that, are fields that the formulation does not have: a run does not list them.
     """
 
     @property

@@ -84,7 +84,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         name=engine,
         version=kind.version(),
         code=digest(_of(kind)),
-        settings=dataclasses.asdict(settings),
+        settings=used(settings),
         resolution=settings.resolution,
         order=settings.order,
         lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
@@ -95,6 +95,12 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)
+
+
+def used(settings: Any) -> dict[str, Any]:
+    """Settings but those that their formulation does not use, which have the values of its presets."""
+    unused = getattr(settings, "unused", ())
+    return {name: value for name, value in dataclasses.asdict(settings).items() if name not in unused}
 
 
 def truth_version() -> str:

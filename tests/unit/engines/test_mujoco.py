@@ -14,14 +14,16 @@ from proofroll.conformance.subject import Subject, scenes
 from proofroll.core.certificate import certify, first_difference
 from proofroll.core.engine_abilities import declared_order
 from proofroll.core.errors import Diverged, InputError, Refused
+from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import time_grid
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.ball_on_surface.sampling import BallSample
 from proofroll.elements.ball_on_surface.surfaces import Cylinder
-from proofroll.engines.mujoco import Mujoco
+from proofroll.engines.mujoco import Mujoco, mjspec
 from proofroll.engines.mujoco.settings import OF_MECHANISMS, ORDER_OF_TURNING, PRESETS
 from proofroll.files.scene_file import load_scene
+from proofroll.running.identity import used
 from proofroll.running.recording import record
 from proofroll.running.simulation import build, simulate
 
@@ -442,3 +444,30 @@ def test_a_ball_below_the_least_inertia_is_refused() -> None:
     dust = load_scene("sphere_in_cylinder", radius=2.5e-8, cylinder_radius=2.25e-7, speed=4e-3)
     with pytest.raises(Refused, match="mass and inertia"):
         Mujoco.build(dust, Mujoco.presets["chart"]["matched"])
+
+
+@pytest.mark.parametrize("name", ["double_pendulum", "heavy_top"])
+def test_a_mechanism_as_a_spec_and_as_a_file(name):
+    """Spec and file hold the scene's names and every digit of its model, and start where it does."""
+    scene = load_scene(name, mass=1 / 3) if name == "heavy_top" else load_scene(name)
+    spec = mjspec(scene, dt=1 / 3000)
+    own, run = spec.compile(), Mujoco.build(scene, PRESETS["joints"]["default"])
+    assert [joint.name for joint in spec.joints] == [joint.name for joint in scene.elements[0].mechanism.joints]
+    read = mujoco.MjModel.from_xml_string(Mujoco.model_file(scene, PRESETS["joints"]["default"]))
+    for field in ("body_mass", "body_inertia", "body_ipos", "body_pos", "jnt_pos", "key_qpos", "key_qvel"):
+        assert np.array_equal(getattr(read, field), getattr(own, field)), field
+    assert own.opt.timestep == 1 / 3000
+    assert np.array_equal(own.key_qpos[0], run._data.qpos)
+    with pytest.raises(InputError, match="steps"):
+        mjspec(scene, steps=3)
+
+
+def test_a_mechanism_lists_no_settings_of_contact():
+    """Settings of a run are those of its formulation; what is resolved from them again is the same."""
+    settings = PRESETS["joints"]["matched"]
+    told = used(settings)
+    assert not {"cone", "friction", "start", "curvature", "condim"} & set(told)
+    assert {"integrator", "time_constant"} <= set(told)
+    assert resolve_settings(Mujoco, told) == settings
+    assert "cone" in used(PRESETS["geoms"]["matched"])
+    assert "condim" in used(PRESETS["free"]["matched"])

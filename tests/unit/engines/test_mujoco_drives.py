@@ -71,7 +71,7 @@ def test_what_changes_in_time_is_taken_at_each_stage(signal: Formula | Table) ->
     assert found.p_WB[0, 2] == pytest.approx(truth.q[1, 0], abs=1e-6)
     assert found.effort == pytest.approx(truth.named[1], abs=1e-4)
     with pytest.raises(Refused, match="in no MJCF"):
-        engine.model_file()
+        engine.spec()
     euler = built(made, "default", dt=1e-4)
     euler.advance(0.5)
     assert euler.sample().effort == pytest.approx(truth.named[1], abs=0.1)

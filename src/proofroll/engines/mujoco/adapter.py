@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.core.engine_abilities import Level, Term, require_provided
 from proofroll.core.events import Event
+from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration
@@ -27,7 +28,7 @@ from proofroll.engines.mujoco.friction import BoundedFriction, check_coefficient
 from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.model import read_spec, write_physics
-from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent
+from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent, written
 from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, check_restitution, lowered
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
@@ -154,7 +155,7 @@ class Mujoco(SteppedModel):
     def model_file(cls, scene: Scene, settings: MujocoSettings) -> str:
         """MJCF, whose keyframe ``start`` is time 0; see :class:`proofroll.core.engine_abilities.WritesModels`."""
         if settings.formulation in _MECHANISMS:
-            return _MECHANISMS[settings.formulation](scene, settings).model_file()
+            return written(_MECHANISMS[settings.formulation](scene, settings).spec())
         engine, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         for key in list(spec.keys):
             spec.delete(key)
@@ -162,7 +163,7 @@ class Mujoco(SteppedModel):
         pose = {"mpos": data.mocap_pos.ravel(), "mquat": data.mocap_quat.ravel()} if len(data.mocap_pos) else {}
         spec.add_key(name="start", qpos=data.qpos, qvel=data.qvel, **pose)
         compiled(spec)
-        return str(spec.to_xml())
+        return written(spec)
 
     @classmethod
     def reproducer(cls, scene: Scene, settings: MujocoSettings) -> str:
@@ -170,11 +171,11 @@ class Mujoco(SteppedModel):
         from proofroll.engines.mujoco.reproducer import mechanism_source, source
 
         if settings.formulation in _MECHANISMS:
-            xml = _MECHANISMS[settings.formulation](scene, settings).model_file()
+            xml = cls.model_file(scene, settings)
             return mechanism_source(xml, mechanism_of(scene))
         built, spec = cls._build_ball(scene, settings), _spec(scene, rolling_ball(scene), settings)
         compiled(spec)
-        return source(spec.to_xml(), built._model, built._data, built._body, settings)
+        return source(written(spec), built._model, built._data, built._body, settings)
 
     def _run(self, steps: int) -> None:
         self._formulation.run(self._data, steps)
@@ -262,3 +263,21 @@ def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:
     write_physics(spec, body, settings)
     _FORMULATIONS[settings.formulation].write(spec, body)
     return spec
+
+
+def mjspec(scene: Scene, **settings: Any) -> mujoco.MjSpec:
+    """MjSpec of a scene of one mechanism, as the formulation ``joints`` builds it; its keyframe ``start`` is time 0.
+
+    Bodies and joints have the scene's names; of several MuJoCo joints that make up one, .0, .1 … follow. Reactions come
+    from sensors ``FORCE0``, ``TORQUE0`` … of the joints in their order.
+
+    Args:
+        scene: holds one mechanism.
+        **settings: of the adapter, as ``dt`` and ``preset``.
+
+    Raises:
+        InputError: a setting that does not exist.
+        Refused: MuJoCo cannot represent it, or only with something that is set from outside in every step.
+    """
+    resolved = resolve_settings(Mujoco, {"formulation": "joints", **settings}, scene.requires)
+    return MujocoMechanism(scene, resolved).spec()

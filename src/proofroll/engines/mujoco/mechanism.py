@@ -71,8 +71,8 @@ class MujocoMechanism(SteppedModel):
         self._sites = [self._model.site(f"{number}").id for number in range(len(mechanism.joints))]
         # Sensors tell reactions; in each of the steps between samples they would cost a twentieth to a fifth of it.
         self._model.opt.disableflags |= _NO_SENSORS
-        for number, joint in enumerate(mechanism.joints):
-            self._start(number, joint)
+        for joint in mechanism.joints:
+            self._start(joint)
         signals = _signals(self._model, mechanism)
         self._moving = signals
         self._drive(self._model, self._data)
@@ -80,8 +80,8 @@ class MujocoMechanism(SteppedModel):
         with silent():
             mujoco.mj_forward(self._model, self._data)
 
-    def model_file(self) -> str:
-        """MJCF, whose keyframe ``start`` is time 0.
+    def spec(self) -> Any:
+        """MjSpec, whose keyframe ``start`` is time 0.
 
         Raises:
             Refused: a joint has a drive or an actuator a target, which is no part of a model but of its state.
@@ -94,11 +94,11 @@ class MujocoMechanism(SteppedModel):
         spec = mechanism_model.write(self._mechanism, self._settings)
         spec.add_key(name="start", qpos=self._data.qpos, qvel=self._data.qvel, ctrl=self._data.ctrl)
         compiled(spec)
-        return str(spec.to_xml())
+        return spec
 
-    def _start(self, number: int, joint: Joint) -> None:
+    def _start(self, joint: Joint) -> None:
         """Puts a joint's coordinates, velocities and drive into the state."""
-        parts = [self._model.joint(f"{number}.{part}") for part in range(len(mechanism_model.parts_of(joint)))]
+        parts = [self._model.joint(name) for name in mechanism_model.part_names(joint)]
         if not parts:
             return
         q, v = np.array(joint.q0), np.array(joint.v0)
@@ -164,7 +164,7 @@ class MujocoMechanism(SteppedModel):
         equalities = {
             model.equality(mechanism_model.coupling_name(item)).id: k for k, item in enumerate(mechanism.couplings)
         }
-        places = {int(model.joint(f"{k}.0").id): k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
+        places = {int(model.joint(joint.name).id): k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
         dofs = {int(model.jnt_dofadr[own]): k for own, k in places.items()}
         friction[list(dofs.values())] = stop[list(dofs.values())] = 0.0
         kinds = data.efc_type[: data.nefc].tolist()
@@ -224,7 +224,7 @@ class MujocoMechanism(SteppedModel):
             com=model.body_ipos[bodies].copy(),
             inertia=np.einsum("nij,nj,nkj->nik", R, model.body_inertia[bodies], R),
             joint_position=np.array([data.site(f"{number}").xpos for number in range(len(joints))]),
-            joint_axis=np.array([self._axis(data, number, joint.kind) for number, joint in enumerate(joints)]),
+            joint_axis=np.array([self._axis(data, joint) for joint in joints]),
             gravity=model.opt.gravity.copy(),
             rows=len(rows),
             rank=rank,
@@ -234,12 +234,12 @@ class MujocoMechanism(SteppedModel):
             regularised=self._softened(data, rows, accelerations) if len(rows) else {},
         )
 
-    def _axis(self, data: Any, number: int, kind: str) -> Array:
+    def _axis(self, data: Any, joint: Joint) -> Array:
         """Axis of turning or sliding along z of a joint's frame, in the world."""
-        if kind not in WITH_AXIS:
+        if joint.kind not in WITH_AXIS:
             return np.full(3, np.nan)
-        part = 0 if kind == "universal" else len(mechanism_model.PARTS[kind]) - 1
-        return np.array(data.xaxis[self._model.joint(f"{number}.{part}").id])
+        names = mechanism_model.part_names(joint)
+        return np.array(data.xaxis[self._model.joint(names[0 if joint.kind == "universal" else -1]).id])
 
     def _equality_rows(self, data: Any) -> Array:
         """Rows of the equality constraints on MuJoCo's velocities, shape (rows, nv)."""
@@ -294,7 +294,7 @@ class MujocoMechanism(SteppedModel):
 def _signals(model: Any, mechanism: Mechanism) -> list[tuple[Signal, str, int]]:
     """Signals with the field of MjData and the place in it where they act: targets, and drives that change."""
     signals = [(item.target, "ctrl", number) for number, item in enumerate(mechanism.actuators)]
-    for number, joint in enumerate(mechanism.joints):
+    for joint in mechanism.joints:
         if varies(joint.torque):
-            signals.append((joint.torque, "qfrc_applied", int(model.joint(f"{number}.0").dofadr[0])))
+            signals.append((joint.torque, "qfrc_applied", int(model.joint(joint.name).dofadr[0])))
     return signals

@@ -57,15 +57,15 @@ class MujocoGeoms(MujocoMechanism):
         super().__init__(own, settings)
         self._contacts = Contacts(self._model, own)
 
-    def model_file(self) -> str:
-        """MJCF, whose keyframe ``start`` is time 0.
+    def spec(self) -> Any:
+        """MjSpec, whose keyframe ``start`` is time 0.
 
         Raises:
             Refused: each step edits the contacts.
         """
         if self._settings.cone_correction:
             raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
-        return super().model_file()
+        return super().spec()
 
     def _run(self, steps: int) -> None:
         if not self._settings.cone_correction:

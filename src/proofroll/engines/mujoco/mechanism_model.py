@@ -41,12 +41,18 @@ def parts_of(joint: Joint) -> tuple[tuple[Any, int], ...]:
     return ((_FREE, 2),) if joint.kind == "free" and joint.parent == WORLD else PARTS[joint.kind]
 
 
+def part_names(joint: Joint) -> list[str]:
+    """Names of MuJoCo's joints that make up a joint: its own, or with .0, .1 … where there are several."""
+    count = len(parts_of(joint))
+    return [joint.name] if count == 1 else [f"{joint.name}.{part}" for part in range(count)]
+
+
 # s; MuJoCo lifts a shorter time constant to two steps.
 _SHORTEST = 1e-9
 
 
 def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
-    """The MjSpec; joint k of the mechanism has MuJoCo's joints ``k.0``, ``k.1`` …, a site ``k`` and two sensors."""
+    """The MjSpec; a joint has its name, or one for each of :func:`part_names`; joint k a site ``k`` and two sensors."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False  # or springs of hinges would have their rest in degrees
     option = spec.option
@@ -70,13 +76,12 @@ def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
         _set_law(tendon, spring.stiffness, spring.damping)
         tendon.springlength = [spring.length, spring.length]
     for actuator in mechanism.actuators:
-        _add_actuator(spec, f"{mechanism.joint_index[actuator.joint]}.0", actuator)
+        _add_actuator(spec, actuator)
     for coupling in mechanism.couplings:
         added = spec.add_equality(
             name=coupling_name(coupling), type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT
         )
-        ends = (coupling.joint_b, coupling.joint_a)
-        added.name1, added.name2 = (f"{mechanism.joint_index[name]}.0" for name in ends)
+        added.name1, added.name2 = coupling.joint_b, coupling.joint_a
         added.data[:2] = coupling.offset, coupling.ratio
         _set_softness(added, settings)
     if mechanism.contacts:
@@ -97,10 +102,8 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, set
     least = mujoco.mjMINVAL if joint.nv else 0.0
     added.mass, added.inertia = max(body.mass, least), np.maximum(moments, least)
     added.ipos, added.iquat = body.com, to_quaternion(axes)
-    for part, (kind, column) in enumerate(parts_of(joint)):
-        made = added.add_joint(
-            name=f"{number}.{part}", type=kind, pos=joint.child_position, axis=joint.child_frame[:, column]
-        )
+    for name, (kind, column) in zip(part_names(joint), parts_of(joint), strict=True):
+        made = added.add_joint(name=name, type=kind, pos=joint.child_position, axis=joint.child_frame[:, column])
         _set_law(made, joint.stiffness, joint.damping)
         made.springref = joint.rest
         made.frictionloss, made.armature = joint.friction, joint.armature
@@ -121,9 +124,9 @@ def coupling_name(coupling: Coupling) -> str:
     return f"coupling.{coupling.name}"
 
 
-def _add_actuator(spec: Any, joint: str, actuator: Actuator) -> None:
+def _add_actuator(spec: Any, actuator: Actuator) -> None:
     """MuJoCo's motor, velocity or position actuator; its limits are those of the motor, before the gear."""
-    added = spec.add_actuator(name=actuator.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=joint)
+    added = spec.add_actuator(name=actuator.name, trntype=mujoco.mjtTrn.mjTRN_JOINT, target=actuator.joint)
     added.gear[0] = actuator.gear
     added.gaintype, added.gainprm[0] = mujoco.mjtGain.mjGAIN_FIXED, 1.0
     if actuator.kind != "torque":

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.engines.mujoco.robot_compiled import body_of, matrix, robot_of
-from proofroll.engines.mujoco.running import mass_matrix
+from proofroll.engines.mujoco.running import mass_matrix, written
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 from proofroll.robots.protocol import AtState, Reading, Request, Whole, evaluate
 
@@ -55,7 +55,7 @@ class MujocoRobots:
         """An MJCF with repetitions, attached models and composites written out."""
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
-        return str(spec.to_xml())
+        return written(spec)
 
     def as_written(self, request: Request) -> Whole:
         """Numbers of the file itself, loaded from its path."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -20,6 +22,9 @@ _FATAL = (
     (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
 )
 
+# A function of MuJoCo's library that sets the digits of MJCF; those of a double, and MuJoCo's own.
+_DIGITS, _ALL, _USUAL = "_mjPRIVATE__set_xml_precision", 17, 6
+
 
 def compiled(spec: Any) -> Any:
     """The model; MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units.
@@ -31,6 +36,23 @@ def compiled(spec: Any) -> Any:
         return spec.compile()
     except ValueError as error:
         raise Refused(f"MuJoCo does not accept the model: {' '.join(str(error).split())}") from None
+
+
+def written(spec: Any) -> str:
+    """MJCF of a compiled spec, with all digits of a double; MuJoCo by itself writes six.
+
+    Its number of digits is a function of its library that Python does not show; where it is gone, six are left.
+    """
+    folder = Path(mujoco.__file__).parent
+    library = next((file for file in folder.iterdir() if file.name.removeprefix("lib").startswith("mujoco.")), None)
+    digits = getattr(ctypes.CDLL(str(library)), _DIGITS, None) if library else None
+    if digits is None:
+        return str(spec.to_xml())
+    digits(_ALL)
+    try:
+        return str(spec.to_xml())
+    finally:
+        digits(_USUAL)
 
 
 def forget_callbacks() -> None:

@@ -104,6 +104,12 @@ class MujocoSettings:
         return "dt"
 
     @property
+    def unused(self) -> tuple[str, ...]:
+        """See :class:`proofroll.core.engine.Settings`."""
+        own = OF_MECHANISMS.get(self.formulation, _OF_CONTACT)
+        return tuple(name for name in _OF_CONTACT if name not in own)
+
+    @property
     def order(self) -> int | None:
         """Measured; what in a scene takes it down, :func:`lowered` says.
 
@@ -198,10 +204,9 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
 
 def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
     plain, formulation = MujocoSettings(settings.formulation), settings.formulation
-    for name in _OF_CONTACT:
-        if name not in OF_MECHANISMS[formulation]:
-            said = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
-            yield getattr(settings, name) != getattr(plain, name), name, f"{said}; leave it out"
+    said = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
+    for name in settings.unused:
+        yield getattr(settings, name) != getattr(plain, name), name, f"{said}; leave it out"
     if settings.cone_correction:
         # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
         yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"

@@ -72,6 +72,11 @@ class PinocchioSettings:
     convex: bool = False
     proximal: Annotated[float, Gt(0)] | None = None
 
+    @property
+    def unused(self) -> tuple[str, ...]:
+        """See :class:`proofroll.core.engine.Settings`."""
+        return () if self.formulation == "impulses" else ("convex",)
+
     def __post_init__(self) -> None:
         """Refuses what the formulation or the integrator does not have, and what would change nothing.
 
