@@ -64,7 +64,9 @@ SceneName = Annotated[
 ]
 Budget = Annotated[
     float | None,
-    typer.Option("--budget", min=1, help="Processor-seconds for a scene or robot file, by default 60."),
+    typer.Option(
+        "--budget", min=1, help="Processor-seconds for a scene or robot file, with what engines compile; by default 60."
+    ),
 ]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 

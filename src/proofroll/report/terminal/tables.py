@@ -141,7 +141,8 @@ def budget_lines(content: ReportedComparison) -> list[str]:
     if not left or content.budget is None:
         return []
     more = f" and {len(left) - 1} more" if len(left) > 1 else ""
-    said = f"Left out, for {content.budget:g} s of processor time did not suffice: {left[0]}{more}."
+    seconds = f"{content.budget:g} s of processor time, building and compiling included,"
+    said = f"Left out, for {seconds} did not suffice: {left[0]}{more}."
     again = "" if left[0].startswith("the truth") else "The same command goes on with what is left; "
     return [f"{said} {again}--budget {10 * content.budget:g} gives it more time."]
 
