@@ -89,7 +89,9 @@ def test_a_first_look_stays_within_its_budget(
         patch.setattr("proofroll.running.time_budget.TimeBudget.end", lambda *_, **__: None)
         code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--jobs", "1")
     assert code == 0, err
-    said = "Left out, for 60 s of processor time, building and compiling included, did not suffice: reduced[formulation="
+    said = (
+        "Left out, for 60 s of processor time, building and compiling included, did not suffice: reduced[formulation="
+    )
     assert said in " ".join(out.split())
     assert "--budget 600" in out.replace("\n", " ")
     code, out, err = command_line("compare", "sphere_in_cylinder", "--out", str(tmp_path), "--json", "--budget", "50")
