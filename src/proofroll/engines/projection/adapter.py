@@ -21,7 +21,7 @@ from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.projection import mechanism
-from proofroll.engines.projection.geometry import geometry_of
+from proofroll.engines.projection.geometry import geometry_of, matrix
 from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
@@ -170,7 +170,7 @@ class Projection:
         """See :class:`proofroll.core.engine.Engine`."""
         x = self._motion.x
         kin = self._ball.kinematics(x)
-        frame = kin.local.F
+        frame = matrix(kin.frame)
         if isinstance(self._motion, Switching):
             force = self._motion.force
             sticking = self._motion.mode.sticking if self._bounded else None
@@ -192,7 +192,7 @@ class Projection:
         ball, x = self._ball, self._motion.x
         friction = self._motion.friction if isinstance(self._motion, Switching) else None
         kin = ball.kinematics(x)
-        frame = kin.local.F
+        frame = matrix(kin.frame)
         rates = self._motion.rates if isinstance(self._motion, (Switching, TaylorSeries)) else ball.rates(x)
         acceleration = ball.velocity_rate(kin, rates[self._coordinates : self._coordinates + 5].tolist())
         return BallBuilt(

@@ -34,31 +34,25 @@ class Shape(NamedTuple):
     turning: tuple[float, ...]
 
 
-class Local(NamedTuple):
-    """Geometry at one point of the surface.
+# e1, e2, e3 in the world, one after the other: the columns of F.
+Frame = tuple[float, ...]
 
-    Attributes:
-        frame: e1, e2, e3 in the world, one after the other: the columns of F.
-        shape: what is seen along them.
-    """
 
-    frame: tuple[float, ...]
-    shape: Shape
+def matrix(frame: Frame) -> FloatArray:
+    """The frame F, shape (3, 3)."""
+    return np.array(frame).reshape(3, 3).T
 
-    @property
-    def F(self) -> FloatArray:
-        """The frame as a matrix, shape (3, 3)."""
-        return np.array(self.frame).reshape(3, 3).T
 
-    def along(self, x: float, y: float, z: float) -> Vector:
-        """Components along e1, e2, e3 of a vector of the world."""
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = self.frame
-        return x1 * x + y1 * y + z1 * z, x2 * x + y2 * y + z2 * z, x3 * x + y3 * y + z3 * z
+def along(frame: Frame, x: float, y: float, z: float) -> Vector:
+    """Components along e1, e2, e3 of a vector of the world."""
+    x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame
+    return x1 * x + y1 * y + z1 * z, x2 * x + y2 * y + z2 * z, x3 * x + y3 * y + z3 * z
 
-    def in_world(self, a: float, b: float, c: float) -> Vector:
-        """Components in the world of a vector along e1, e2, e3."""
-        x1, y1, z1, x2, y2, z2, x3, y3, z3 = self.frame
-        return x1 * a + x2 * b + x3 * c, y1 * a + y2 * b + y3 * c, z1 * a + z2 * b + z3 * c
+
+def in_world(frame: Frame, a: float, b: float, c: float) -> Vector:
+    """Components in the world of a vector along e1, e2, e3."""
+    x1, y1, z1, x2, y2, z2, x3, y3, z3 = frame
+    return x1 * a + x2 * b + x3 * c, y1 * a + y2 * b + y3 * c, z1 * a + z2 * b + z3 * c
 
 
 @dataclass(frozen=True)
@@ -71,9 +65,9 @@ class GeneralSurface:
 
     surface: Surface
 
-    def at(self, place: Sequence[float]) -> Local:
-        """Local geometry at two coordinates."""
-        u = np.array(place)
+    def at(self, place: Sequence[float]) -> tuple[Frame, Shape]:
+        """Frame at a place, of which the first two numbers are the coordinates, and the shape seen along it."""
+        u = np.array(place[:2])
         frame = self.surface.frame(u)
         tangents = frame.T @ self.surface.tangents(u)
         second = np.tensordot(frame.T, self.surface.second(u), axes=1)
@@ -84,7 +78,7 @@ class GeneralSurface:
         products = np.stack([second[:, 0, 0], second[:, 0, 1] + second[:, 1, 0], second[:, 1, 1]], axis=1)
         axes = np.stack([turning[2, 1], turning[0, 2], turning[1, 0]], axis=1)  # of which these are skew matrices
         parts = tangents[1:], np.linalg.inv(tangents[1:]), products, axes
-        return Local(tuple(frame.T.ravel().tolist()), Shape(*(tuple(part.ravel().tolist()) for part in parts)))
+        return tuple(frame.T.ravel().tolist()), Shape(*(tuple(part.ravel().tolist()) for part in parts))
 
 
 class Uniform:
@@ -103,9 +97,9 @@ class Uniform:
         k1, k2, k3 = (0.0, 0.0, 0.0) if self.column is None else generators[self.column].axis
         cross = np.array([[0.0, -k3, k2], [k3, 0.0, -k1], [-k2, k1, 0.0]])
         # F0, F1, F2 of the frame F0 + sin α F1 + (1 - cos α) F2 at the coordinate α (Rodrigues).
-        self._parts = [(part @ self._start.F).T.ravel().tolist() for part in (np.eye(3), cross, cross @ cross)]
+        self._parts = [(part @ matrix(self._start[0])).T.ravel().tolist() for part in (np.eye(3), cross, cross @ cross)]
 
-    def at(self, u: Sequence[float]) -> Local:
+    def at(self, u: Sequence[float]) -> tuple[Frame, Shape]:
         """See :meth:`GeneralSurface.at`.
 
         Raises:
@@ -132,7 +126,7 @@ class Uniform:
             y3 + sin * b3 + back * e3,
             z3 + sin * c3 + back * f3,
         )
-        return Local(frame, self._start.shape)
+        return frame, self._start[1]
 
 
 Geometry = GeneralSurface | Uniform

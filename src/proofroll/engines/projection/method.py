@@ -30,7 +30,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.engines.projection.geometry import Geometry, Local, Vector
+from proofroll.engines.projection.geometry import Frame, Geometry, Shape, Vector, along, matrix
 from proofroll.engines.projection.orientation import Orientation
 
 Active = Literal["contact", "centre"] | None
@@ -40,7 +40,7 @@ class Kinematics(NamedTuple):
     """Kinematics of the ball in the velocities s: v = D s and v̇ = D ṡ + Ḋ s.
 
     Attributes:
-        local: geometry where the ball is.
+        frame, shape: geometry where the ball is.
         rates: of the coordinates: u̇, and of the angles if there are any.
         r: velocities of the rotation.
         pose: of the rotation, see :meth:`Orientation.pose`.
@@ -52,7 +52,8 @@ class Kinematics(NamedTuple):
         carried: velocity of the wall there, along e2 and e3 [m/s]; zero where the wall stands.
     """
 
-    local: Local
+    frame: Frame
+    shape: Shape
     rates: tuple[float, ...]
     r: Sequence[float]
     pose: tuple[float, ...]
@@ -112,29 +113,29 @@ class ProjectedBall:
         n = self._coordinates
         state = x.tolist()
         angles, (first, second, *r) = state[2:n], state[n:]
-        local = self._geometry.at(state[:2])
-        (t2u, t2v, t3u, t3v), _, second_derivatives, (p1, p2, p3, q1, q2, q3) = local.shape
+        frame, shape = self._geometry.at(state)
+        (t2u, t2v, t3u, t3v), _, second_derivatives, (p1, p2, p3, q1, q2, q3) = shape
         uu1, uv1, vv1, uu2, uv2, vv2, uu3, uv3, vv3 = second_derivatives
         uu, uv, vv = first * first, first * second, second * second
         drift = uu1 * uu + uv1 * uv + vv1 * vv, uu2 * uu + uv2 * uv + vv2 * vv, uu3 * uu + uv3 * uv + vv3 * vv
         o1, o2, o3 = p1 * first + q1 * second, p2 * first + q2 * second, p3 * first + q3 * second
         pose = self._orientation.pose(angles)
-        w1, w2, w3 = self._orientation.angular_velocity(pose, r, local)
+        w1, w2, w3 = self._orientation.angular_velocity(pose, r, frame)
         v2, v3 = t2u * first + t2v * second, t3u * first + t3v * second
         v = (0.0, v2, v3, w1, w2, w3)
         drawn, carried = (-o1 * v3, o1 * v2), (0.0, 0.0)
         if self._wall_rate is not None:
-            carried, gain2, gain3 = self._carried(local, state[:2], self._wall_rate, (v2, v3), (o1, o2, o3))
+            carried, gain2, gain3 = self._carried(matrix(frame), state[:2], self._wall_rate, (v2, v3), (o1, o2, o3))
             drawn = drawn[0] + gain2, drawn[1] + gain3
         turned = (o2 * w3 - o3 * w2, o3 * w1 - o1 * w3, o1 * w2 - o2 * w1)
-        rates = (first, second, *self._orientation.rates(angles, r, local))
-        return Kinematics(local, rates, r, pose, v, drift, drawn, turned, carried)
+        rates = (first, second, *self._orientation.rates(angles, r, frame))
+        return Kinematics(frame, shape, rates, r, pose, v, drift, drawn, turned, carried)
 
     def _carried(
-        self, local: Local, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
+        self, F: FloatArray, place: Sequence[float], W: FloatArray, v: tuple[float, float], turning: Vector
     ) -> tuple[tuple[float, float], float, float]:
         """Velocity W × (p + a e1) of a wall that turns at W along e2 and e3, and its rate along the turning axes."""
-        a, F, (_, o2, o3) = self.radius, local.F, turning
+        a, (_, o2, o3) = self.radius, turning
         W = W @ F
         velocity = cross(W, self._surface.position(np.array(place)) @ F + [a, 0.0, 0.0])
         rate = cross(W, np.array([0.0, v[0] + a * o3, v[1] - a * o2])) - cross(np.array(turning), velocity)
@@ -143,13 +144,13 @@ class ProjectedBall:
     def speed(self, x: FloatArray) -> float:
         """Speed of the centre [m/s]."""
         n = self._coordinates
-        t2u, t2v, t3u, t3v = self._geometry.at(x[:2].tolist()).shape.tangents
+        t2u, t2v, t3u, t3v = self._geometry.at(x[:2].tolist())[1].tangents
         first, second = x[n : n + 2].tolist()
         return math.hypot(t2u * first + t2v * second, t3u * first + t3v * second)
 
     def weight(self, kin: Kinematics) -> Vector:
         """Gravity along e1, e2, e3 [m/s²]: all of the applied force of a ball without resistance, over its mass."""
-        return kin.local.along(*self._g)
+        return along(kin.frame, *self._g)
 
     def normal_force(self, kin: Kinematics) -> float:
         """N = λ_h, the orthogonal projection; C_h = [1 0 0 0 0 0] picks e1, along which nothing but gravity acts."""
@@ -185,8 +186,8 @@ class ProjectedBall:
             if self.active:
                 F2, F3, slip_rate = F2 - slip_rate[0] / self.mobility, F3 - slip_rate[1] / self.mobility, (0.0, 0.0)
             a2, a3, b2, b3 = a2 + F2 / m, a3 + F3 / m, b2 - a * F3 / J, b3 + a * F2 / J
-        p2, p3, (first2, first3, second2, second3) = a2 - d2, a3 - d3, kin.local.shape.inverse
-        spin = self._orientation.acceleration(kin.pose, kin.r, (0.0, b2, b3), kin.turned, kin.local)
+        p2, p3, (first2, first3, second2, second3) = a2 - d2, a3 - d3, kin.shape.inverse
+        spin = self._orientation.acceleration(kin.pose, kin.r, (0.0, b2, b3), kin.turned, kin.frame)
         acceleration = (first2 * p2 + first3 * p3, second2 * p2 + second3 * p3, *spin)
         return Response(acceleration, (d1, a2, a3, 0.0, b2, b3), N, F2, F3, slip_rate)
 
@@ -196,10 +197,10 @@ class ProjectedBall:
 
     def velocity_rate(self, kin: Kinematics, acceleration: Sequence[float]) -> FloatArray:
         """v̇ = D ṡ + Ḋ s of accelerations ṡ, shape (6,)."""
-        (t2u, t2v, t3u, t3v), (d1, d2, d3), (first, second, *spin) = kin.local.shape.tangents, kin.drift, acceleration
-        still = self._orientation.acceleration(kin.pose, kin.r, (0.0, 0.0, 0.0), kin.turned, kin.local)
+        (t2u, t2v, t3u, t3v), (d1, d2, d3), (first, second, *spin) = kin.shape.tangents, kin.drift, acceleration
+        still = self._orientation.acceleration(kin.pose, kin.r, (0.0, 0.0, 0.0), kin.turned, kin.frame)
         spin = [one - other for one, other in zip(spin, still, strict=True)]  # ω̇ = A (ṙ - ṙ where ω̇ = 0)
-        rotation = self._orientation.angular_velocity(kin.pose, spin, kin.local)
+        rotation = self._orientation.angular_velocity(kin.pose, spin, kin.frame)
         return np.array((d1, t2u * first + t2v * second + d2, t3u * first + t3v * second + d3, *rotation))
 
     @staticmethod
@@ -241,8 +242,8 @@ class ProjectedBall:
             F2, F3 = (slip2 - slip[0]) / self.mobility, (slip3 - slip[1]) / self.mobility
             v2, v3, lever = F2 / self.mass, F3 / self.mass, self.radius / self.inertia
             w2, w3 = -lever * F3, lever * F2
-        first2, first3, second2, second3 = kin.local.shape.inverse
-        spin = self._orientation.solved(kin.pose, (0.0, w2, w3), kin.local)
-        result = x.copy()
-        result[self._coordinates :] -= (first2 * v2 + first3 * v3, second2 * v2 + second3 * v3, *spin)
-        return result
+        first2, first3, second2, second3 = kin.shape.inverse
+        spin1, spin2, spin3 = self._orientation.solved(kin.pose, (0.0, w2, w3), kin.frame)
+        *q, first, second, r1, r2, r3 = x.tolist()
+        first, second = first - first2 * v2 - first3 * v3, second - second2 * v2 - second3 * v3
+        return np.array((*q, first, second, r1 - spin1, r2 - spin2, r3 - spin3))

@@ -15,7 +15,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
-from proofroll.engines.projection.geometry import Local, Vector
+from proofroll.engines.projection.geometry import Frame, Vector, along, in_world
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -54,11 +54,11 @@ class Orientation(ABC):
         """
 
     @abstractmethod
-    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], local: Local) -> Vector:
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:
         """A r [rad/s]."""
 
     @abstractmethod
-    def solved(self, pose: tuple[float, ...], rate: Vector, local: Local) -> Vector:
+    def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:
         """A⁻¹ of a vector along e1, e2, e3.
 
         Raises:
@@ -67,11 +67,11 @@ class Orientation(ABC):
 
     @abstractmethod
     def acceleration(
-        self, pose: tuple[float, ...], r: Sequence[float], rate: Vector, turned: Vector, local: Local
+        self, pose: tuple[float, ...], r: Sequence[float], rate: Vector, turned: Vector, frame: Frame
     ) -> Vector:
         """ṙ = A⁻¹ (ω̇ - Ȧ r) [rad/s²], with ω̇ in ``rate``; ``turned`` is its part by the turning of the frame alone."""
 
-    def rates(self, angles: Sequence[float], r: Sequence[float], local: Local) -> Sequence[float]:  # noqa: ARG002 -- there may be none
+    def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:  # noqa: ARG002 -- there may be none
         """Rates of the angles [1/s]."""
         return ()
 
@@ -128,13 +128,13 @@ class EulerAngles(Orientation):
             raise FloatingPointError("the Euler angles overflow inside a step")
         return math.sin(theta), math.cos(theta), math.sin(psi), math.cos(psi)
 
-    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], local: Local) -> Vector:
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:
         """See :class:`Orientation`."""
-        return local.along(*_turning(pose, r))
+        return along(frame, *_turning(pose, r))
 
-    def solved(self, pose: tuple[float, ...], rate: Vector, local: Local) -> Vector:
+    def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:
         """See :class:`Orientation`."""
-        return _about_the_axes(pose, *local.in_world(*rate))
+        return _about_the_axes(pose, *in_world(frame, *rate))
 
     def acceleration(
         self,
@@ -142,17 +142,17 @@ class EulerAngles(Orientation):
         r: Sequence[float],
         rate: Vector,
         turned: Vector,  # noqa: ARG002 -- the angles are measured in the world, whatever the frame does
-        local: Local,
+        frame: Frame,
     ) -> Vector:
         """See :class:`Orientation`. θ̇ tilts the axis of φ, and ψ̇ turns the axes of φ and θ about the vertical."""
         sin, cos, sin_psi, cos_psi = pose
         phi_rate, theta_rate, psi_rate = r
-        x, y, z = local.in_world(*rate)
-        along, across = phi_rate * psi_rate * sin, phi_rate * theta_rate * cos - theta_rate * psi_rate
-        x, y = x - along * cos_psi - across * sin_psi, y - along * sin_psi + across * cos_psi
+        x, y, z = in_world(frame, *rate)
+        level, across = phi_rate * psi_rate * sin, phi_rate * theta_rate * cos - theta_rate * psi_rate
+        x, y = x - level * cos_psi - across * sin_psi, y - level * sin_psi + across * cos_psi
         return _about_the_axes(pose, x, y, z + phi_rate * theta_rate * sin)
 
-    def rates(self, angles: Sequence[float], r: Sequence[float], local: Local) -> Sequence[float]:  # noqa: ARG002 -- r is their rate
+    def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:  # noqa: ARG002 -- r is their rate
         """See :class:`Orientation`."""
         return r
 
@@ -233,12 +233,12 @@ class RotatingFrame(Orientation):
         """See :class:`Orientation`."""
         return ()
 
-    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], local: Local) -> Vector:  # noqa: ARG002 -- A = 1
+    def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:  # noqa: ARG002 -- A = 1
         """See :class:`Orientation`."""
         w1, w2, w3 = r
         return w1, w2, w3
 
-    def solved(self, pose: tuple[float, ...], rate: Vector, local: Local) -> Vector:  # noqa: ARG002 -- A = 1
+    def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:  # noqa: ARG002 -- A = 1
         """See :class:`Orientation`."""
         return rate
 
@@ -248,7 +248,7 @@ class RotatingFrame(Orientation):
         r: Sequence[float],  # noqa: ARG002 -- known by what it turns
         rate: Vector,
         turned: Vector,
-        local: Local,  # noqa: ARG002 -- everything is along its axes already
+        frame: Frame,  # noqa: ARG002 -- everything is along its axes already
     ) -> Vector:
         """See :class:`Orientation`. The axes turn with the frame: F ω' has the rate F (ω̇' + FᵀḞ ω')."""
         (a1, a2, a3), (b1, b2, b3) = rate, turned
@@ -265,9 +265,9 @@ class FollowedFrame(RotatingFrame):
         """See :class:`Orientation`."""
         return np.array([1.0, 0.0, 0.0, 0.0]), w
 
-    def rates(self, angles: Sequence[float], r: Sequence[float], local: Local) -> Sequence[float]:
+    def rates(self, angles: Sequence[float], r: Sequence[float], frame: Frame) -> Sequence[float]:
         """See :class:`Orientation`. q̇ = ½ ω ∘ q with ω in the world."""
-        x, y, z = (0.5 * w for w in local.in_world(*r))
+        x, y, z = (0.5 * w for w in in_world(frame, *r))
         q0, q1, q2, q3 = angles
         return (
             -x * q1 - y * q2 - z * q3,
