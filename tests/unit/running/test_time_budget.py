@@ -54,7 +54,7 @@ def test_what_a_case_did_not_take_is_for_others(monkeypatch: pytest.MonkeyPatch)
     assert 80 < budget.begin("c", 8) <= 88
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.drill), 2])
 def test_cases_beyond_the_budget_are_left_out(
     tmp_path: Path, make_case: Callable[..., Case], install_engines: Callable[[Mapping[str, str]], None], jobs: int
 ) -> None:

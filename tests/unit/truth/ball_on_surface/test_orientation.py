@@ -37,7 +37,12 @@ def test_precession(quadrature: Any) -> None:
 
 @pytest.mark.parametrize(
     "parameters",
-    [{}, {"mu_static": 0.15}, {"rolling_resistance": 5e-4, "mu_static": 0.35}, {"rolling_resistance": 5e-4}],
+    [
+        pytest.param({}, marks=pytest.mark.drill),
+        {"mu_static": 0.15},
+        pytest.param({"rolling_resistance": 5e-4, "mu_static": 0.35}, marks=pytest.mark.drill),
+        {"rolling_resistance": 5e-4},
+    ],
 )
 def test_both_routes_give_it(parameters: dict[str, float]) -> None:
     """Whoever asks the truth for the orientation gets unit quaternions from the identity on, with an error bar."""

@@ -200,7 +200,7 @@ def test_resistance_brings_a_ball_to_rest() -> None:
     assert bool(dataset.sticking.all())
 
 
-@pytest.mark.parametrize("resistance", [0.0, 5e-4])
+@pytest.mark.parametrize("resistance", [pytest.param(0.0, marks=pytest.mark.drill), 5e-4])
 def test_leaving_the_wall(resistance: float) -> None:
     """In a lying cylinder a slow ball leaves the wall where N = 0 and flies; its landing is refused with its time."""
     scene = cylinder(tilt=1.3, speed=2.0, mu_static=0.5, rolling_resistance=resistance)

@@ -54,6 +54,7 @@ def times_of(found: TwoRouteMotion, *expected: float) -> None:
         assert event.time_low <= event.time <= event.time_high <= event.time_low + TIGHT
 
 
+@pytest.mark.drill
 def test_a_sled_turns_about_a_foot_and_rests() -> None:
     """The right foot stops and becomes the pivot, then all rest where the laboratory found it; loads are known."""
     found = motion("sled", [0.0, 0.557674084, 0.65])
