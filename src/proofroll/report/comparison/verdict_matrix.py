@@ -70,7 +70,7 @@ def anchor(comparison: int, row: int, point: int) -> str:
 def overview(content: ReportedComparison, comparison: int) -> Matrix:
     """The verdict matrix: the worst of every row over all points."""
     points = list(dict.fromkeys(run.point for run in content.runs))
-    lines = []
+    lines, before = [], seconds_before(content)
     for index, row in enumerate(content.rows):
         runs = content.runs_of(index)
         worst = next((run for run in runs if run.verdict == row.verdict), runs[0])
@@ -78,7 +78,7 @@ def overview(content: ReportedComparison, comparison: int) -> Matrix:
         hrefs = {point: anchor(comparison, index, number) for number, point in enumerate(points)}
         cells = {name: Cell(item, hrefs[item.point], item.point) for name, item in row.observables.items()}
         shown = (verdict_text(row), hrefs[worst.point], row.message, row.as_expected, next(slowest, None))
-        lines.append(MatrixLine(row, cells, *shown, before=seconds_before(content).get(index)))
+        lines.append(MatrixLine(row, cells, *shown, before=before.get(index)))
     return _matrix(content, lines)
 
 

@@ -12,6 +12,7 @@ from proofroll.report.parts import Part, PartEntry, Tell, held
 from proofroll.report.stability import map as stability_map
 from proofroll.report.stability.tables import silent_lines
 from proofroll.running.runner import Runner
+from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.stability.axes import QUICK, Axis, Effort
 from proofroll.studies.stability.claims import STUDY, Claim, StabilityFile, file_for
 from proofroll.studies.stability.map import stability_path
@@ -20,23 +21,12 @@ from proofroll.studies.stability.study import make_stability
 from proofroll.studies.study_store import kept
 
 
-@dataclass(frozen=True)
-class JudgedBoundary:
-    """A claim in one sentence, what speaks ``against`` it, or why it is ``untested``; ``holds`` is None if untested."""
-
-    says: str
-    because: str
-    against: list[str]
-    untested: str
-    holds: bool | None
-
-
 @dataclass(frozen=True, kw_only=True)
 class StabilityEntry(PartEntry):
     """A map, the largest errors that no engine reports, what was claimed, and the axes that were left out."""
 
     silent: list[str]
-    claims: list[JudgedBoundary]
+    claims: list[ClaimJudgement]
     left_out: list[str]
 
 
@@ -99,8 +89,8 @@ class StabilityPart(Part):
             against = claim.contradictions(study.points)
             contradictions += against
             untested = "" if against else claim.untested(study.points)
-            holds = None if untested else not against
-            claims.append(JudgedBoundary(_says(claim, study.step_symbols), claim.because, against, untested, holds))
+            holds, found = None if untested else not against, untested or "; ".join(against)
+            claims.append(ClaimJudgement(_says(claim, study.step_symbols), claim.because, holds, found))
         points = [
             replace(point, reproducer=f"{self.folder}/{Path(point.reproducer).name}") if point.reproducer else point
             for point in study.points

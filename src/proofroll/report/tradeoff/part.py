@@ -18,10 +18,10 @@ from proofroll.report.tradeoff import tables as tradeoff_tables
 from proofroll.report.tradeoff.tables import default_quantities
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
+from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.study_store import kept
 from proofroll.studies.tradeoff.claims import STUDY, TradeoffClaims, load_claims
-from proofroll.studies.tradeoff.cost_claims import ClaimJudgement
 from proofroll.studies.tradeoff.recommend import Answer, by_hand, recommend
 from proofroll.studies.tradeoff.records import CurveBudget, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -17,7 +16,6 @@ from proofroll.core.events import EVENT_ORDER, Event, events_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Doubt
-from proofroll.files.trajectory_file import read
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,11 +36,6 @@ class Reference:
     dataset: xr.Dataset
     curves: dict[str, FloatArray]
     sizes: dict[str, float]
-
-    @classmethod
-    def read(cls, scene: Scene, path: Path) -> Self:
-        """Reference from a stored trajectory of the truth."""
-        return cls.of(scene, read(path))
 
     @classmethod
     def of(cls, scene: Scene, dataset: xr.Dataset) -> Self:

@@ -135,7 +135,7 @@ class Ladder:
             result = results[case.key]
             if result.status != Status.DONE:
                 raise Refused(f"there is no truth of this scene: {result.message}")
-            reference = Reference.read(self._scene_at(point), self._runner.store.trajectory(case))
+            reference = Reference.of(self._scene_at(point), self._runner.store.stored(case).dataset)
             if self.quantity not in reference.curves:
                 raise Refused(f"the truth of this scene has no {self.quantity}")
             self.truths[str(point)] = reference

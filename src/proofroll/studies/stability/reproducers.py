@@ -26,7 +26,7 @@ _NOTHING_TO_SHOW = {
 
 
 def with_programs(
-    found: StabilityMap, study: StabilityStudy, folder: Path, workers: Workers | None = None
+    stability_map: StabilityMap, study: StabilityStudy, folder: Path, workers: Workers | None = None
 ) -> StabilityStudy:
     """Writes a program into the folder for each point that shows a failure.
 
@@ -35,7 +35,7 @@ def with_programs(
     """
     points = list(study.points)
     wanted: list[tuple[int, str, Case]] = []
-    for index, (made, point) in enumerate(zip(found.points, study.points, strict=True)):
+    for index, (made, point) in enumerate(zip(stability_map.points, study.points, strict=True)):
         name = _shown(point)
         side = point.sides[name]
         if side.failure in _NOTHING_TO_SHOW:
@@ -45,7 +45,7 @@ def with_programs(
     for (index, name, case), (engine, reason) in zip(
         wanted, programs([item[-1] for item in wanted], workers), strict=True
     ):
-        made, point = found.points[index], study.points[index]
+        made, point = stability_map.points[index], study.points[index]
         element = made.place.scene.elements[0]
         if not isinstance(element, WritesPrograms):
             points[index] = replace(point, reproducer_note="elements of this kind offer no program")

@@ -13,7 +13,8 @@ from proofroll.core.errors import InputError, told_of
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_content, study_files
-from proofroll.studies.tradeoff.cost_claims import Cheapest, ClaimJudgement, Converges, Holds
+from proofroll.studies.claim_judgement import ClaimJudgement
+from proofroll.studies.tradeoff.cost_claims import Cheapest, Converges, Holds
 from proofroll.studies.tradeoff.curve import Question
 
 if TYPE_CHECKING:

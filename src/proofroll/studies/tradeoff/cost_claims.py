@@ -13,26 +13,10 @@ from dataclasses import dataclass, field
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.running.timing import FACTOR, Timing, named, ratio
+from proofroll.studies.claim_judgement import ClaimJudgement
 from proofroll.studies.tradeoff.recommend import fits, holding
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
-
-
-@dataclass(frozen=True)
-class ClaimJudgement:
-    """Judgement of a claim by a study.
-
-    Attributes:
-        claim: in one sentence.
-        because: its reason.
-        holds: None: undecided, for what is measured does not tell.
-        found: what the study shows, in one sentence.
-    """
-
-    claim: str
-    because: str
-    holds: bool | None
-    found: str
 
 
 @dataclass(frozen=True)

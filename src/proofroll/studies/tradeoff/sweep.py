@@ -193,6 +193,6 @@ def _run(
     for every, case in truths.items():
         if results[case.key].status != Status.DONE:
             raise ProofrollError(f"there is no truth here: {results[case.key].message}")
-        references[every] = Reference.read(scene, runner.store.trajectory(case))
+        references[every] = Reference.of(scene, runner.store.stored(case).dataset)
     for curve, both in cases:
         curve.points.append(judged([CurvePoint(case, results[case.key]) for case in both], references, runner))

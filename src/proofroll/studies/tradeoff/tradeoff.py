@@ -172,7 +172,7 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: Callabl
     corners: dict[str, list[Corner]] = {key: [] for key in chosen}
     for place, scene, truths, runs in asked:
         references = {
-            every: Reference.read(scene, runner.store.trajectory(case))
+            every: Reference.of(scene, runner.store.stored(case).dataset)
             for every, case in truths.items()
             if results[case.key].status == Status.DONE
         }

@@ -15,9 +15,7 @@ from proofroll.core.plugins import parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.turns import on_turns_of
 from proofroll.core.verdict import Verdict
-from proofroll.files.trajectory_file import read
 from proofroll.running.case import Status
-from proofroll.running.runner import Runner
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
@@ -121,7 +119,7 @@ class CaseDifference:
     changed: list[str]
 
 
-def case_difference(outcome: Outcome, before: Run, after: Run, runner: Runner) -> CaseDifference:
+def case_difference(outcome: Outcome, before: Run, after: Run) -> CaseDifference:
     """One case in both versions."""
     verdicts = [
         (one.observable, one.verdict, other.verdict)
@@ -149,7 +147,7 @@ def case_difference(outcome: Outcome, before: Run, after: Run, runner: Runner) -
         point=point_name(before.parameters),
         old=RunInVersion.of(before),
         new=RunInVersion.of(after),
-        numbers=_numbers(outcome, before, after, runner),
+        numbers=_numbers(outcome, before, after),
         orders=orders,
         changed=changed,
     )
@@ -159,12 +157,12 @@ def _ending(run: Run) -> str:
     return str(run.verdict) if run.result.status == Status.DONE else f"{run.result.status} ({run.result.message})"
 
 
-def _numbers(outcome: Outcome, before: Run, after: Run, runner: Runner) -> NumbersApart | None:
+def _numbers(outcome: Outcome, before: Run, after: Run) -> NumbersApart | None:
     """Difference of the trajectories; None: there are none."""
-    if before.case is None or after.case is None or not before.result.trajectory or not after.result.trajectory:
+    if before.trajectory is None or after.trajectory is None:
         return None
-    one, other = (read(runner.store.trajectory(case)) for case in (before.case, after.case))
     point = outcome.points[point_name(before.parameters)]
+    one, other = before.trajectory.dataset, after.trajectory.dataset
     return _apart(point.scene, one, other, point.reference.sizes if point.reference else {})
 
 

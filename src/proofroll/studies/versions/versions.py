@@ -129,7 +129,7 @@ def compared(
         outcome = evaluate(item, results, runner)
         one, other = ([run for run in outcome.runs if parse_engine(run.row.engine).name == side] for side in sides)
         pairs += [(outcome, before, after) for before, after in zip(one, other, strict=True)]
-    differences = [case_difference(outcome, before, after, runner) for outcome, before, after in pairs]
+    differences = [case_difference(outcome, before, after) for outcome, before, after in pairs]
     speeds = _speeds(pairs, runner, rounds, progress) if rounds else {}
     old, new = (EngineVersion(name, its.version, its.interpreter) for name, its in zip(sides, told, strict=True))
     return VersionsStudy(
@@ -187,11 +187,11 @@ def _rows(cases: Sequence[CaseDifference], speeds: Mapping[tuple[str, str], Inte
 
 
 def _speeds(
-    found: Sequence[tuple[Outcome, Run, Run]], runner: Runner, rounds: int, progress: Progress
+    pairs: Sequence[tuple[Outcome, Run, Run]], runner: Runner, rounds: int, progress: Progress
 ) -> dict[tuple[str, str], Interval]:
     """Time of the new version over that of the old one, for the first point of each setting that both run."""
     chosen: dict[tuple[str, str], tuple[Run, Run]] = {}
-    for outcome, before, after in found:
+    for outcome, before, after in pairs:
         if before.result.status == after.result.status == Status.DONE:
             chosen.setdefault((outcome.comparison.name, setting_of(before)), (before, after))
     speeds = {}
