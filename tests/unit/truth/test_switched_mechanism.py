@@ -9,6 +9,8 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.body_switching import SwitchedBodies
+from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.switched_truth import truth_of
 
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room
@@ -165,3 +167,10 @@ def test_friction_that_just_holds_is_ill_posed(scene: str, parameters: dict[str,
         found = truth_of(mechanism, np.array([0.0, 0.05]))
         said.add((found.horizon, tuple(found.events)))
     assert said == {(0.0, ())}
+
+
+def test_routes_share_ends_and_events_and_no_decision() -> None:
+    """What happens at an end is told in one place; what holds next, and what an impact does, by each route alone."""
+    assert SwitchedTree.change is SwitchedBodies.change
+    for name in ("begin", "_law", "_at_rest", "_hit", "holding"):
+        assert getattr(SwitchedTree, name) is not getattr(SwitchedBodies, name)

@@ -11,18 +11,18 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint, changes, left_by
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_switching import SETTLED, effort_event, guard_values, guards_of, noise_of
+from proofroll.truth.mechanism.joint_stretches import SETTLED, JointStretches, guard_values, noise_of
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
-from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
+from proofroll.truth.mechanism.stretches import StretchLaw
 
 _MOST = 6  # joints at rest together: each has up to three candidates
 _SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
 
 
-class SwitchedBodies(Stretches[Mode]):
+class SwitchedBodies(JointStretches):
     """The legs of a mechanism as bodies that are each alone; a state ends with the time.
 
     See :class:`proofroll.truth.hybrid.HybridRoute`.
@@ -52,28 +52,15 @@ class SwitchedBodies(Stretches[Mode]):
             noise_of(self.joints, self.motors, mode, self._along(state)[0], self._wanted(state)),
         )
 
-    def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
-        """See the protocol."""
-        if leg.guard is None:  # at a break
-            return Transition(leg.last, leg.mode, ())
-        which, kind = guards_of(self.joints, leg.mode)[leg.guard]
-        mode, last = list(leg.mode), np.append(leg.last[:-1], leg.end)
-        if kind in MODES:
-            mode[which] = kind
-            return Transition(last, tuple(mode), (effort_event(self.motors[which - len(self.joints)], kind),))
-        joint = self.joints[which]
-        still = [own in HOLDING for own in leg.mode[: len(self.joints)]]
-        if kind in {"up", "down"}:
-            was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
-            return Transition(last, tuple(mode), ((left_by(was), joint.name),))
-        if kind == "still":
-            still[which] = True
-            decided, margin = self._decided(last, still)
-            return Transition(last, decided, changes(self.joints, leg.mode, decided), margin)
+    def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
+        still = [own in HOLDING or k == which for k, own in enumerate(leg.mode[: len(self.joints)])]
+        return state, *self._decided(state, still)
+
+    def _hit(self, leg: Stretch[Mode], state: Array, which: int, _: float) -> tuple[Array, Mode, float, float]:
+        last, joint, delay = state, self.joints[which], 0.0
         speed = abs(float(self._along(last)[1][which]))
         fastest = self._fastest.setdefault(which, speed)
         state, margin = self._struck(last, leg.mode, which, joint.restitution)
-        delay = 0.0
         if joint.restitution and speed < SETTLED * fastest:
             free = self.equations.switched(state[:-1], self.switched(leg.mode))
             pull = abs(float(self._accelerations(free, state)[which]))
@@ -81,16 +68,12 @@ class SwitchedBodies(Stretches[Mode]):
             state, margin = self._struck(last, leg.mode, which, 0.0)
         rates = self._along(state)[1]
         still = [
-            (held and leg.mode[k] in {"low", "high"} and abs(rates[k]) <= _SLACK * speed)
+            (own in {"low", "high"} and abs(rates[k]) <= _SLACK * speed)
             or (k == which and (delay > 0 or not joint.restitution))
-            for k, held in enumerate(still)
+            for k, own in enumerate(leg.mode[: len(self.joints)])
         ]
         decided, after = self._decided(state, still)
-        settles = delay > 0 and decided[which] in HOLDING
-        happened = [("settle" if settles else "impact", joint.name)] + [
-            item for item in changes(self.joints, leg.mode, decided) if item[1] != joint.name
-        ]
-        return Transition(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
+        return state, decided, min(margin, after), delay
 
     def switched(self, mode: Mode) -> Switched:
         """Changes of the equations by a mode."""

@@ -16,7 +16,7 @@ from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, held
-from proofroll.truth.mechanism.joint_switching import SETTLED
+from proofroll.truth.mechanism.joint_stretches import SETTLED
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
 _MOST = 6  # contacts that are closed at once: each has up to four candidates

@@ -15,7 +15,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_guards import STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts
-from proofroll.truth.mechanism.joint_switching import SETTLED
+from proofroll.truth.mechanism.joint_stretches import SETTLED
 
 
 class ContactTree(ContactStretches):

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
-
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.drives import MODES, Actuator
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, held_by, left_by
+from proofroll.elements.mechanism.switches import HOLDING, Mode, held_by
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
-
-Motors = tuple[Actuator, ...]
-# Of the largest speed at which a joint hit its stop: of slower rebounds only the time is summed. They have 1e-12 of the
-# way of the first, which drowns in the round-off of the coordinate.
-SETTLED = 1e-6
-_NEAR = 1e-12  # relative: a coordinate this close to a stop is at it
-_DIGITS = 8  # last digits of a coordinate that are round-off
+from proofroll.truth.mechanism.joint_stretches import SETTLED, JointStretches, guard_values, noise_of
+from proofroll.truth.mechanism.stretches import StretchLaw
 
 
-class SwitchedTree(Stretches[Mode]):
+class SwitchedTree(JointStretches):
     """The legs of a mechanism in the coordinates of its tree; a state ends with the time.
 
     See :class:`proofroll.truth.hybrid.HybridRoute`.
@@ -52,27 +42,14 @@ class SwitchedTree(Stretches[Mode]):
             noise_of(self.joints, self.motors, mode, q[at_q], self._wanted(float(state[-1]), q, v)),
         )
 
-    def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
-        """See the protocol."""
-        if leg.guard is None:  # at a break
-            return Transition(leg.last, leg.mode, ())
-        which, kind = guards_of(self.joints, leg.mode)[leg.guard]
-        state, mode = leg.last.copy(), list(leg.mode)
-        state[-1] = leg.end
-        if kind in MODES:
-            mode[which] = kind
-            return Transition(state, tuple(mode), (effort_event(self.motors[which - len(self.joints)], kind),))
-        joint = self.joints[which]
+    def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
         q, v = self._parts(state)
-        if kind in {"up", "down"}:
-            # The force that holds has reached its bound: the joint leaves, and nothing else feels it yet.
-            was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
-            return Transition(state, tuple(mode), ((left_by(was), joint.name),))
-        if kind == "still":
-            v[joint.velocity] = 0.0
-            decided, margin = self.equations.decided(q, v, leg.end)
-            return Transition(state, decided, self._stopped(leg.mode, decided), margin)
-        q[joint.coordinate] = joint.low if kind == "low" else joint.high
+        v[self.joints[which].velocity] = 0.0
+        return state, *self.equations.decided(q, v, leg.end)
+
+    def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
+        joint, (q, v) = self.joints[which], self._parts(state)
+        q[joint.coordinate] = stop
         speed = abs(float(v[joint.velocity]))
         fastest = self._fastest.setdefault(which, speed)
         v[:], margin = self.equations.struck(q, v, which)
@@ -82,11 +59,7 @@ class SwitchedTree(Stretches[Mode]):
             v[joint.velocity] = 0.0
             delay = 2 * rebound / (pull * (1 - joint.restitution))
         decided, after = self.equations.decided(q, v, leg.end)
-        settles = delay > 0 and decided[which] in HOLDING
-        happened = [("settle" if settles else "impact", joint.name)] + [
-            item for item in self._stopped(leg.mode, decided) if item[1] != joint.name
-        ]
-        return Transition(state, decided, tuple(happened), np.inf if settles else min(margin, after), delay)
+        return state, decided, min(margin, after), delay
 
     def holding(self, state: Array, mode: Mode) -> Array:
         """Force of what holds or rubs along each switched joint's coordinate, N or N m."""
@@ -109,90 +82,3 @@ class SwitchedTree(Stretches[Mode]):
         return guard_values(
             self.joints, self.motors, mode, q[at_q], v[at_v], force, self._wanted(float(state[-1]), q, v)
         )
-
-    def _stopped(self, before: Mode, after: Mode) -> tuple[tuple[str, str], ...]:
-        return changes(self.joints, before, after)
-
-
-def guards_of(joints: tuple[SwitchedJoint, ...], mode: Mode) -> list[tuple[int, str]]:
-    """Ends that a leg in this mode may have: number of the joint, or after these of the motor, and kind.
-
-    ``up``, ``down``: the force that holds reaches its bound and the joint moves so; ``still``: a joint that moves
-    against friction comes to rest; ``low``, ``high``: it reaches a stop; ``least``, ``linear``, ``greatest``: an effort
-    comes to be so.
-    """
-    found = []
-    for number, (joint, own) in enumerate(zip(joints, mode, strict=False)):
-        low, high = joint.bounds(own)
-        if own in HOLDING:
-            found += [(number, "up")] * math.isfinite(low) + [(number, "down")] * math.isfinite(high)
-            continue
-        if own != "free":
-            found.append((number, "still"))
-        if math.isfinite(joint.low) and own != "forward":
-            found.append((number, "low"))
-        if math.isfinite(joint.high) and own != "backward":
-            found.append((number, "high"))
-    for number, own in enumerate(mode[len(joints) :], len(joints)):
-        found += [(number, other) for other in (("least", "greatest") if own == "linear" else ("linear",))]
-    return found
-
-
-def guard_values(
-    joints: tuple[SwitchedJoint, ...],
-    motors: Motors,
-    mode: Mode,
-    q: Array,
-    v: Array,
-    force: Array,
-    wanted: Sequence[float],
-) -> FloatArray:
-    """The guards of :func:`guards_of`, from the coordinates, rates and forces of the joints and the efforts wanted."""
-    found = []
-    for k, kind in guards_of(joints, mode):
-        if k < len(joints):
-            found.append(_guard_value(joints[k], mode[k], kind, float(q[k]), float(v[k]), float(force[k])))
-        else:
-            found.append(_beyond(wanted[k - len(joints)], motors[k - len(joints)].bound, mode[k], kind))
-    return np.array(found)
-
-
-def _beyond(wanted: float, bound: float, mode: str, kind: str) -> float:
-    """Effort beyond its bound, or back from it."""
-    if kind == "linear":
-        return bound - wanted if mode == "greatest" else bound + wanted
-    return wanted - bound if kind == "greatest" else -bound - wanted
-
-
-def effort_event(motor: Actuator, kind: str) -> tuple[str, str]:
-    """The event of an effort that reaches its limit or leaves it."""
-    return ("release" if kind == "linear" else "saturate", motor.name)
-
-
-def _guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float, force: float) -> float:
-    """The value of a guard, negative while the mode lasts."""
-    low, high = joint.bounds(mode)
-    if kind == "up":
-        return low - force
-    if kind == "down":
-        return force - high
-    if kind == "still":
-        return -v if mode == "forward" else v
-    return joint.low - q if kind == "low" else q - joint.high
-
-
-def noise_of(
-    joints: tuple[SwitchedJoint, ...], motors: Motors, mode: Mode, q: Array, wanted: Sequence[float]
-) -> FloatArray:
-    """Round-off of the guards of a leg that begins at coordinates q of its joints: one that leaves a stop is at it."""
-    found = []
-    for number, kind in guards_of(joints, mode):
-        if number >= len(joints):
-            motor = motors[number - len(joints)]
-            apart = abs(abs(wanted[number - len(joints)]) - motor.bound)
-            found.append(_DIGITS * float(np.spacing(motor.bound)) if apart <= _NEAR * motor.bound else 0.0)
-            continue
-        at = {"low": joints[number].low, "high": joints[number].high}.get(kind)
-        leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))
-        found.append(_DIGITS * float(np.spacing(max(1.0, abs(at)))) if leaves and at is not None else 0.0)
-    return np.array(found)
