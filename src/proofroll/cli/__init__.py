@@ -177,7 +177,7 @@ def main() -> None:
 
 
 def _unwritten(error: OSError | SystemExit) -> Any:
-    """The exit code where output cannot be written; a reader who closed a pipe has seen enough."""
+    """Exit code if output cannot be written; a pipe that its reader closed is no error."""
     if isinstance(error, SystemExit):
         if not isinstance(error.__context__, BrokenPipeError):
             return error.code  # of a command

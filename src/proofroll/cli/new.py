@@ -133,7 +133,7 @@ def _say(path: Path, *commands: str) -> None:
 
 
 def _comparison(name: str, where: str, loaded: Scene) -> str:
-    """The text of a comparison file: one percent of what moves, for each engine that can."""
+    """Text of a comparison file: each engine that can run the scene, held to one percent of what moves."""
     from proofroll.studies.comparison.default_comparison import able, bounds
 
     lines = (

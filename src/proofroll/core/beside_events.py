@@ -1,4 +1,4 @@
-"""Change of a curve where an event comes up to a step late, as it does where events end with steps.
+"""Change of a curve by an event that comes up to one step late, as in engines whose events fall on ends of steps.
 
 Steps of a ladder share many of their ends, so an event may be as late in each of its runs: these then differ by less
 than each is off, and their differences say nothing of that.

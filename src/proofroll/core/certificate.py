@@ -176,7 +176,7 @@ def worst_numbers(line: Line, most: int = _SHOWN) -> tuple[tuple[float, ...], tu
 
 
 def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[str, str]:
-    """Both as text, with so many digits that they are not the same."""
+    """Texts of two lists of numbers, with enough digits to differ."""
     for digits in range(6, 18):
         one, other = (", ".join(f"{value:.{digits}g}" for value in values) for values in (found, expected))
         if one != other:
@@ -185,7 +185,7 @@ def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[s
 
 
 def _single(line: Line) -> str:
-    """Note on numbers that are the scene's in single precision; else empty."""
+    """Note that built numbers are the scene's rounded to single precision; empty: they are not."""
     if len(line.found) != len(line.expected) or line.found == line.expected:
         return ""
     one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)

@@ -60,7 +60,7 @@ class StepNumber:
 
 @dataclass(frozen=True)
 class FirstMotion:
-    """Start of the bodies of an element, to be held against an engine's own first steps.
+    """True start of an element's bodies, compared with an engine's first steps.
 
     Attributes:
         acceleration: of the bodies at time 0 in the world [m/s²], shape (bodies, 3).

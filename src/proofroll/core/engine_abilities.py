@@ -102,11 +102,11 @@ class LowersOrder(Protocol):
 
     @staticmethod
     def lowered(settings: Any) -> Mapping[str, int]:
-        """Capability in the words of ``provides`` -> the lower order of convergence with it."""
+        """Lower order of convergence by the capability that causes it, as ``provides`` names it."""
 
 
 def lowest(order: int | None, lowered: Mapping[str, int], requires: Collection[str]) -> int | None:
-    """The order for a scene that requires this, of one without it and what lowers it; None: none is declared."""
+    """Order of convergence for a scene with these requirements, the lowest of those declared; None: none is."""
     return None if order is None else min([order, *(lowered[name] for name in lowered.keys() & set(requires))])
 
 

@@ -26,7 +26,7 @@ REQUIRED = ("p_WB", "v_WB", "w_WB")
 
 
 class IndependentElements:
-    """The elements of a scene in models of their own, advanced together; by the names of the elements."""
+    """Elements of a scene in separate models, by element name, advanced together."""
 
     def __init__(self, kind: Any, scene: Scene, settings: Any) -> None:
         self.parts, self._others = {}, []

@@ -82,7 +82,7 @@ def study_content(path: Path, study: str) -> dict[str, Any]:
 
 
 def named_file(name: str) -> Path | None:
-    """The file at a path, but a scene's, or the one of this name, with or without ``.toml``, in a folder of studies."""
+    """File of a study: at a path, or by its name in a folder of studies, with or without ``.toml``."""
     places = [Path(name), *(folder / file for folder in study_folders() for file in (f"{name}.toml", name))]
     return next((place for place in places if place.is_file() and place.name != "scene.toml"), None)
 

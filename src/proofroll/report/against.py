@@ -72,7 +72,7 @@ class Against:
 
     @property
     def sentence(self) -> str:
-        """Counts of the changes, in one sentence."""
+        """Sentence with the number of changes of each kind."""
         kinds = [item.kind for item in self.changes]
         words = {
             "verdict": "verdicts",

@@ -79,7 +79,7 @@ def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
 
 
 def unit(text: str) -> str:
-    """A unit as it is shown: nothing for a number without one."""
+    """Unit as it is shown; empty for a number without unit."""
     return "" if text == "1" else text.replace("^2", "²").replace("^3", "³")
 
 

@@ -137,7 +137,7 @@ class Drawing:
     def vector(
         self, ends: npt.ArrayLike, look: str, name: str, by: float = 11.0, beside: tuple[float, float] = (0.0, 0.0)
     ) -> None:
-        """A straight arrow between places, shape (2, 2), whose name stands ``by`` so many pixels past its tip."""
+        """Draws a straight arrow between two points, shape (2, 2), with its name ``by`` pixels past the tip."""
         self.arrow(ends, look)
         a, b = np.asarray(ends, dtype=np.float64)
         letters = "letter" if look == "thin" else f"{look}-letter"

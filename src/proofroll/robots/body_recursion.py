@@ -1,4 +1,4 @@
-"""The second formulation: spatial vectors in body axes, rotation first, and recursive Newton-Euler.
+"""Second formulation: recursive Newton-Euler on spatial vectors in body axes, rotation first.
 
 M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6.
 """

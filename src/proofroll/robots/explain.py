@@ -45,7 +45,7 @@ class RobotCause:
 
 @dataclasses.dataclass(frozen=True)
 class _Step:
-    """A truth under the causes found so far."""
+    """Truth of the robot as changed by the causes found so far."""
 
     truth: RobotTruth
     found: dict[str, float]

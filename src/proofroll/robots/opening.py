@@ -54,7 +54,7 @@ def _opened(path: Path, base: str, inside: Path, expand: Expand | None) -> Robot
 
 
 def _require_plain(root: Element, path: Path) -> None:
-    """Raises InputError if a URDF is a template that xacro has not yet been run on."""
+    """Raises InputError if a URDF is a xacro template that was not expanded."""
     tag = next((str(element.tag) for element in root.iter() if _XACRO in str(element.tag)), None)
     if tag is not None:
         raise InputError("file", path, f"it has <xacro:{tag.rpartition('}')[2]}>: {RUN_XACRO}")

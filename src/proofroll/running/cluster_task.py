@@ -40,7 +40,7 @@ _same: set[tuple[str, str, str]] = set()
 
 
 class Unfit(ProofrollError):  # noqa: N818 -- a fact about a worker, which ends the command that met it
-    """A Dask worker is not what the command runs on: a case would have another result there."""
+    """Error: a Dask worker differs from this machine's installation, so that cases would have other results."""
 
 
 @dataclasses.dataclass(frozen=True)

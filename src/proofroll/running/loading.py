@@ -44,7 +44,7 @@ def load(name: str) -> Any:
 
 
 def loaded(case: Case) -> tuple[Any, Any]:
-    """The engine's class and the settings of a case.
+    """Class of the engine, and complete settings, of a case.
 
     Raises:
         ProofrollError: the engine here is of another version than the one that was asked when the case was made.

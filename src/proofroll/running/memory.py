@@ -1,4 +1,4 @@
-"""Limit on memory: what the processes below a worker may have before they are ended.
+"""Limit on the memory of a worker and its descendants, beyond which they are ended.
 
 Resident memory is watched from outside. A limit on the address space would end engines that merely reserve it
 (just-in-time compilers, arenas, threads' stacks), and an allocation that fails ends a library anywhere, so that the

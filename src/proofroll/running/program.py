@@ -101,7 +101,7 @@ def _in_arrays(said: Mapping[str, Any]) -> dict[str, Any]:
 
 
 class _Built:
-    """Report of the program on its model; None: nothing."""
+    """Model as the program reports it; None: no report."""
 
     regularised: ClassVar[Mapping[str, Any]] = {}
 

@@ -149,7 +149,7 @@ def _finite(sample: AnySample, t: float, scene: Scene) -> AnySample:
 
 
 def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) -> None:
-    """Requires at each time the variables of the state that the sample at time 0 has."""
+    """Checks that each sample has the state variables of the first one."""
     for element in scene.elements:
         before, now = sample_of(scene, element, first), sample_of(scene, element, sample)
         for name in Sample.widths:

@@ -36,7 +36,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _require_untouched(engine: str) -> None:
-    """Checks that the engine has not replaced any code that judges it; an error ends the process, before the next row.
+    """Checks that the engine replaced no code that judges it; otherwise the process ends before the next row.
 
     Raises:
         ProofrollError: the engine has put something else in its place.

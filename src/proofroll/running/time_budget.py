@@ -44,7 +44,7 @@ class TimeBudget:
         return max(0.0, _OF_CASES * self.seconds - used)
 
     def wait(self) -> None:
-        """Another case waits to be begun."""
+        """Counts one more case that waits for a worker."""
         with self._lock:
             self._unfinished += 1
 

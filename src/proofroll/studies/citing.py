@@ -49,7 +49,7 @@ class Cited:
 
     @property
     def heading(self) -> str:
-        """Subject of the citation, in a few words."""
+        """Heading of a citation: its subject in a few words."""
         known = f" {', '.join(self.versions)}" if self.versions else ""
         return f"{self.name}{known}" if self.kind == "suite" else f"{self.kind} {self.name}{known}"
 
@@ -125,7 +125,7 @@ def _document(path: Path) -> object:
 
 
 def _walk(content: object) -> Iterator[_Named]:
-    """Engines and scenes that a document of ours names, at any place."""
+    """Engines and scenes named anywhere in a JSON document of proofroll."""
     if isinstance(content, list):
         for item in content:
             yield from _walk(item)

@@ -1,4 +1,4 @@
-"""Failure of a run, from its trajectory, and whether the engine reported it.
+"""Failures of runs, found in trajectories, and whether the engine reported them.
 
 Signs that only a kind of element has, as a ball off its wall, come from the elements.
 """

@@ -130,7 +130,7 @@ def kept(path: Path, kind: type[_Study]) -> tuple[_Study | None, list[str]]:
 
 
 def _seal(study: Mapping[str, Any]) -> str:
-    """Hash of all that a kept study holds besides it: a file that was cut or changed does not have it."""
+    """Hash of a kept study's content without the hash itself; shows a file that was cut or changed."""
     content = {key: value for key, value in study.items() if key != "seal"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 

@@ -57,7 +57,7 @@ class BallReport(ReportKind):
 
     @staticmethod
     def replay() -> ReplayKind:
-        """Balls rolling on their wall."""
+        """Drawing of balls on their wall in the replay."""
         from proofroll.ball_studies.report.replay import drawn, seen
         from proofroll.report.replay.records import ReplayKind
 

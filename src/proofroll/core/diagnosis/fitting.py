@@ -140,7 +140,7 @@ class Residuals(Generic[M]):
         return float(np.max(np.abs(self.left(model)), initial=0.0))
 
     def fit(self, model: Callable[[float], M | None], start: float) -> float:
-        """The number of a model that leaves least."""
+        """Fitted number of a model: the one with the smallest remainder."""
         return fitted(lambda x: self.left(model(x)), start, 1.0)
 
     def cause(self, name: str, says: str, model: M | None, remedy: str, number: int) -> Cause:

@@ -200,7 +200,7 @@ class Reported:
 
 
 def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Components along the axes of frames; NaN where they hang on one that is NaN."""
+    """Components along the axes of frames; NaN if they depend on a NaN."""
     return product(np.swapaxes(frame, -1, -2), vectors)
 
 

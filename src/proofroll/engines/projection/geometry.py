@@ -66,7 +66,7 @@ class GeneralSurface:
     surface: Surface
 
     def at(self, place: Sequence[float]) -> tuple[Frame, Shape]:
-        """Frame at a place, of which the first two numbers are the coordinates, and the shape seen along it."""
+        """Frame at a place, whose first two numbers are the coordinates, and the shape seen along it."""
         u = np.array(place[:2])
         frame = self.surface.frame(u)
         tangents = frame.T @ self.surface.tangents(u)

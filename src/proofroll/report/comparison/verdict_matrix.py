@@ -22,7 +22,7 @@ class Cell:
 
     @property
     def title(self) -> str:
-        """All about it: with error bar, tolerance, and what the ladder of steps says, where there is one."""
+        """Error with its bar, tolerance, and the limit from the ladder of steps, if there is one."""
         judgement = self.judgement
         said = (
             f"{symbol(judgement.observable)} {judgement.verdict}: error {error(judgement.error)} ± "

@@ -219,7 +219,7 @@ def _conclusions(content: LadderContent) -> Iterator[str]:
 
 
 def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, said: str) -> str:
-    """The cheapest rung within a tolerance."""
+    """Cheapest rung of the ladder within the tolerance."""
     within = [entry for entry in useful if entry[2] <= tolerance]
     if not within:
         return f"No rung is within {said} at its own step."

@@ -135,7 +135,7 @@ class ReportContent:
 
     @cached_property
     def choice(self) -> ChoiceMatrix:
-        """The matrix of its comparisons, and of the trade-offs that were made."""
+        """Choice matrix of the comparisons and of the trade-offs that were made."""
         studies = {
             item.name: ChoiceStudy(item.title, f"c{number}", list(dict.fromkeys(run.point for run in item.runs)))
             for number, item in enumerate(self.comparisons)

@@ -55,7 +55,7 @@ def _bytes(package: Any, name: str) -> bytes:
 
 
 def thinned(values: npt.NDArray[Any], step: float) -> bytes:
-    """Numbers as they compress best: multiples of ``step``, each as its difference from the one in the row before.
+    """Numbers coded for compression: multiples of ``step``, as differences from the row before.
 
     Little-endian int32, first the lowest bytes of all differences, then the next: what changes smoothly leaves mostly
     zeros.

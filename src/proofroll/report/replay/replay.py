@@ -70,7 +70,7 @@ def joined(parts: list[Replay]) -> Replay | None:
 
 
 def frame_times(until: float, fastest: float) -> FloatArray:
-    """Evenly spaced times of the frames [s], shape (n,): so many that the fastest body is seen to turn the right way.
+    """Evenly spaced times of frames [s], shape (n,), close enough that the fastest body appears to turn the right way.
 
     Args:
         until: the last time [s].

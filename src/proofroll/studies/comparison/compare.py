@@ -129,7 +129,7 @@ def compare(
 
 
 def _run(planned: Planned, result: Result, **judged: Any) -> Run:
-    """A run of a plan with its result and what was found of it."""
+    """A run of a plan with its result and judgements."""
     facts = planned.facts if isinstance(planned.facts, EngineFacts) else None
     return Run(planned.row, planned.parameters, facts, result, case=planned.ladder.get(1.0), **judged)
 

@@ -85,7 +85,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
 
 
 def _next(search: SearchResult[V], passes: Callable[[V], bool]) -> int | None:
-    """The rung to be looked at next for a boundary, or None if it is found."""
+    """Next rung to run for a boundary; None: the boundary is found."""
     holding, failing = search.boundary(passes)
     if holding is None:
         return None

@@ -118,7 +118,7 @@ class ExplainedBoundary(Explanation):
 
 @dataclass(frozen=True)
 class MappedPlace:
-    """A value of an axis, the scene's parameters there, and why there is no truth."""
+    """Place on an axis: its value, the scene's parameters there, and the reason if it has no truth."""
 
     axis: str
     value: FloatOrInf

@@ -74,7 +74,7 @@ class Question:
         return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
 
     def cases(self, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
-        """The run, and with an adaptive step the one over few samples."""
+        """Cases of a point: its run, and with an adaptive step that over few samples."""
         adaptive = facts.resolution not in {None, "dt"}
         return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
 

@@ -72,7 +72,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class CheckedOver:
-    """The ranges of parameters at whose corners a choice was checked, how many these are, and for how long [s]."""
+    """Check of a choice over ranges of parameters: the ranges, number of their corners, length of the runs [s]."""
 
     parameters: dict[str, list[float]]
     corners: int

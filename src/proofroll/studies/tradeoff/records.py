@@ -243,7 +243,7 @@ class TradeoffStudy:
     claims: TradeoffJudged = field(default_factory=TradeoffJudged)
 
     def front(self, key: str, quantity: str) -> list[MeasuredPoint]:
-        """The points of ``pareto`` or ``pareto_engines`` for an observable, cheapest first; none where it has none."""
+        """Points of the front ``pareto`` or ``pareto_engines`` for an observable, cheapest first."""
         numbers = {"pareto": self.pareto, "pareto_engines": self.pareto_engines}[key].get(quantity, [])
         by_number = {point.id: point for point in self.points}
         return [by_number[number] for number in numbers]
