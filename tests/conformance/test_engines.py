@@ -39,6 +39,22 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 }
 
 
+# Of what hangs on a formulation's model, not on its step, one preset is asked in every run of the tests, all others in
+# the drills; where each preset moves to, and what it is certified to be, is asked in every run.
+OF_MODELS = ("builds_or_refuses", "builds_only_what_is_required", "first_steps_fit_the_scene")
+
+
+def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...]:
+    """The mark of a check that repeats another preset's."""
+    name, _, about = check.name.partition("[")
+    formulation, _, preset = about.partition("-")
+    if name not in OF_MODELS:
+        return ()
+    presets = [*engine.presets[formulation]]
+    asked = "matched" if "matched" in presets else presets[0]
+    return () if preset.startswith(asked) else (pytest.mark.drill,)
+
+
 def all_checks() -> list[Any]:
     """The checks of all engines; one that is skipped for each engine that is not installed."""
     found: list[Any] = []
@@ -48,7 +64,10 @@ def all_checks() -> list[Any]:
         except Missing as reason:
             found.append(pytest.param(None, id=name, marks=pytest.mark.skip(reason=str(reason))))
             continue
-        found += [pytest.param(check, id=f"{name}-{check.name}") for check in checks(engine, KNOWN.get(name))]
+        found += [
+            pytest.param(check, id=f"{name}-{check.name}", marks=marks(engine, check))
+            for check in checks(engine, KNOWN.get(name))
+        ]
     return found
 
 
