@@ -76,6 +76,13 @@ class ProjectionSettings:
         return "rtol" if self.integrator == "taylor" else INTEGRATORS[self.integrator].resolution
 
     @property
+    def unused(self) -> tuple[str, ...]:
+        """See :class:`proofroll.core.engine.Settings`."""
+        other = "dt" if self.resolution == "rtol" else "rtol"
+        own = {"euler": "singularity", "dependent": "equations"}.get(self.formulation)
+        return (other, *(name for name in ("singularity", "equations") if name != own))
+
+    @property
     def order(self) -> int | None:
         """Declared order of convergence in dt; None with an adaptive step."""
         return None if self.integrator == "taylor" else INTEGRATORS[self.integrator].order
