@@ -47,6 +47,7 @@ def compare(
     workers = Workers()
     with options.spinner(comparison):
         loaded = asked(comparison, options.assignments(settings), workers, budget, scheduler)
+    tell_of_scene(comparison, loaded)
     tell_left_out([loaded], engine or [])
     outcomes = outcomes_of([loaded], engine or [], options.new_runner(out, fresh, jobs, scheduler, workers))
     content = outcome_content(outcomes[0])
@@ -70,9 +71,8 @@ def asked(
         InputError: there is neither, or something was given for a scene and this is a comparison, which has its own.
     """
     from proofroll.core.errors import InputError
-    from proofroll.core.plugins import engine_names, parse_engine
     from proofroll.files.comparison_file import load_comparison
-    from proofroll.files.scene_file import is_scene, means_scene
+    from proofroll.files.scene_file import means_scene
 
     if means_scene(name, alone=bool(budget or parameters)):
         from proofroll.studies.comparison.default_comparison import BUDGET, compared
@@ -84,12 +84,18 @@ def asked(
         raise InputError("--budget", budget, "a comparison file runs all that it asks for; name a scene, or use report")
     if parameters:
         raise InputError("--set", next(iter(parameters)), "a comparison file has its own points; name a scene instead")
-    loaded = load_comparison(name)
-    lacking = sorted(set(engine_names()) - {parse_engine(row.engine).name for row in loaded.rows})
-    if lacking and is_scene(name):
+    return load_comparison(name)
+
+
+def tell_of_scene(name: str, comparison: Comparison) -> None:
+    """Says on standard error that a name is a scene's, too, if its comparison lacks an engine that is installed."""
+    from proofroll.core.plugins import engine_names, parse_engine
+    from proofroll.files.scene_file import is_scene
+
+    lacking = sorted(set(engine_names()) - {parse_engine(row.engine).name for row in comparison.rows})
+    if lacking and is_scene(name) and comparison.budget is None:
         rows = f"{name} is the comparison of that name, which has no row of {', '.join(lacking)}"
         options.complain(f"{rows}; the scene alone, with every engine: proofroll compare {name} --budget 60")
-    return loaded
 
 
 def tell_left_out(comparisons: Sequence[Comparison], engines: Sequence[str]) -> None:
