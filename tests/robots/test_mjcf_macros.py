@@ -47,6 +47,16 @@ def test_repetition(tmp_path: Path) -> None:
     assert robot.bodies["a"].mass == pytest.approx(3 * robot.bodies["b0"].mass)
 
 
+def test_repetition_keeps_every_digit(tmp_path: Path) -> None:
+    """Numbers of what is repeated are those of the file, not six digits of them."""
+    ball = '<geom size="0.1" mass="0.123456789012345"/>'
+    text = (
+        f'<mujoco><worldbody><replicate count="2"><body name="b"><joint/>{ball}</body></replicate></worldbody></mujoco>'
+    )
+    robot = _meant(tmp_path / "robot.xml", text)
+    assert [body.mass for name, body in robot.bodies.items() if name.startswith("b")] == [0.123456789012345] * 2
+
+
 def test_attachment(tmp_path: Path) -> None:
     """A model that another file holds is attached, and what that attaches too."""
     (tmp_path / "part.xml").write_text(PART)
