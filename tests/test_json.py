@@ -45,13 +45,13 @@ from proofroll.robots.records import (
     UsedTruth,
 )
 from proofroll.robots.robot_file import LintRemark
+from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.ladder.models import Ran
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
-    MapClaims,
     MappedPlace,
     StabilityStudy,
 )
@@ -64,7 +64,6 @@ from proofroll.studies.tradeoff.records import (
     MeasuredPoint,
     MeasuredQuantity,
     SparseRun,
-    TradeoffJudged,
     TradeoffStudy,
     TruthCost,
 )
@@ -164,10 +163,10 @@ COMPARISON = (
     ShownObservable, ShownBand,
 )  # fmt: skip
 LADDER = (LadderContent, RungFound, Ran, TermFound, SideFound, KnownTruth, Absence)
-MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedPlace, Effort, Measured, MapClaims)
+MAP = (StabilityStudy, Axis, BoundaryPoint, Boundary, ExplainedBoundary, MappedPlace, Effort, Measured, JudgedFile)
 TRADEOFF = (
     TradeoffStudy, MeasuredQuantity, MeasuredPoint, SparseRun, Corner, DroppedStep, CurveBudget, TruthCost, Measured,
-    TradeoffJudged,
+    JudgedFile,
 )  # fmt: skip
 
 

@@ -23,9 +23,9 @@ from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.comparison.verdict_matrix import counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.page.choice_matrix import EVERYDAY, choice_matrix
+from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.html import page, templates
 from proofroll.report.page.records import report_content
-from proofroll.report.page.summary import three_sentences
 from proofroll.report.terminal.tables import closing_lines, verdict_table
 from proofroll.running.case import Result, Status
 from proofroll.running.store import Store

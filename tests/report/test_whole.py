@@ -12,9 +12,9 @@ from invented import further, stability_study, tradeoff_study
 
 from proofroll.core.errors import ProofrollError
 from proofroll.report.page.choice_matrix import choice_matrix
+from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.growing import Report, begun
 from proofroll.report.page.html import page
-from proofroll.report.page.summary import three_sentences
 from proofroll.report.parts import PartEntry, absent, all_parts, attempt, part_kinds, parts_of
 from proofroll.report.stability.part import StabilityPart
 from proofroll.running.store import Store

@@ -44,5 +44,4 @@ def stability(
         for name, reason in study.absent.items():
             options.complain(f"{name}: {reason}")
         raise typer.Exit(options.ENGINE)
-    contradicted = study.claims is not None and study.claims.contradictions
-    raise typer.Exit(options.CONTRADICTED if contradicted else options.OK)
+    raise typer.Exit(options.CONTRADICTED if study.claims.contradictions else options.OK)

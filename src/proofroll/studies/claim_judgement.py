@@ -1,8 +1,8 @@
-"""Judgement of a claim in a study's file."""
+"""Judgements of the claims in a study's file."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -20,3 +20,12 @@ class ClaimJudgement:
     because: str
     holds: bool | None
     found: str
+
+
+@dataclass(frozen=True)
+class JudgedFile:
+    """Judgement of the claims of one file by a study, as sentences; ``file`` is None where none was held against it."""
+
+    file: str | None = None
+    contradictions: list[str] = field(default_factory=list)
+    undecided: list[str] = field(default_factory=list)

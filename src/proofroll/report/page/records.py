@@ -21,9 +21,9 @@ from proofroll.report.comparison.summary import outcome_content
 from proofroll.report.kinds import kind_of
 from proofroll.report.long_table import LongTable, TableLine
 from proofroll.report.page.choice_matrix import ChoiceMatrix, ChoiceStudy, choice_matrix
+from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.precision import WorkPrecision, work_precision
 from proofroll.report.page.scene_sheet import SceneSheet, sheet_of
-from proofroll.report.page.summary import three_sentences
 from proofroll.report.parts import PartEntry, part_kinds
 from proofroll.running.timing import machine
 from proofroll.studies.comparison.outcome import Outcome

@@ -8,6 +8,7 @@ from typing import Any
 
 from proofroll.core.number_format import number
 from proofroll.core.validation import FloatOrInf
+from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.step_numbers import Explanation
 from proofroll.studies.study_store import Measured
@@ -126,14 +127,6 @@ class MappedPlace:
     problem: str | None
 
 
-@dataclass(frozen=True)
-class MapClaims:
-    """The file whose claims were held against a map, and what the map does not confirm."""
-
-    file: str
-    contradictions: list[str]
-
-
 @dataclass(frozen=True, kw_only=True)
 class StabilityStudy:
     """A map with counts on top.
@@ -182,7 +175,7 @@ class StabilityStudy:
     hosts: dict[str, int] = field(default_factory=dict)
     effort: Effort
     measured: Measured
-    claims: MapClaims | None = None
+    claims: JudgedFile = field(default_factory=JudgedFile)
 
 
 def dependence(points: Sequence[BoundaryPoint], name: str) -> str:

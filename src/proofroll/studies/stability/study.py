@@ -11,6 +11,7 @@ from pathlib import Path
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import hosts
 from proofroll.running.runner import Runner
+from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.failure import ACCURATE, NOT_RUN, REFUSED, WRONG_MODEL, meanings
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.claims import StabilityFile
@@ -20,7 +21,6 @@ from proofroll.studies.stability.records import (
     Boundary,
     BoundaryPoint,
     ExplainedBoundary,
-    MapClaims,
     StabilityStudy,
     dependence,
 )
@@ -53,7 +53,7 @@ def make_stability(
     stability_map = stability(asked.scene, axes, runner, engines=engines, effort=effort, progress=progress)
     path = stability_path(folder, asked.scene, axes, engines, effort)
     study = with_programs(stability_map, stability_study(stability_map), path.with_suffix(""), runner.workers)
-    study = replace(study, claims=MapClaims(asked.name, asked.contradictions(study)))
+    study = replace(study, claims=JudgedFile(asked.name, asked.contradictions(study)))
     keep(study, path)
     return study, path
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from proofroll.core.validation import FloatOrInf
 from proofroll.running.case import Status
+from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.study_store import Measured
 
 
@@ -190,15 +191,6 @@ class TruthCost(MeasuredCost):
     route: str
 
 
-@dataclass(frozen=True)
-class TradeoffJudged:
-    """Judgements of a file's claims by a study, as sentences."""
-
-    file: str | None = None
-    contradictions: list[str] = field(default_factory=list)
-    undecided: list[str] = field(default_factory=list)
-
-
 @dataclass(frozen=True, kw_only=True)
 class TradeoffStudy:
     """Error against cost.
@@ -240,7 +232,7 @@ class TradeoffStudy:
     brief: bool
     measured: Measured
     engines: list[str] = field(default_factory=list)
-    claims: TradeoffJudged = field(default_factory=TradeoffJudged)
+    claims: JudgedFile = field(default_factory=JudgedFile)
 
     def front(self, key: str, quantity: str) -> list[MeasuredPoint]:
         """Points of the front ``pareto`` or ``pareto_engines`` for an observable, cheapest first."""

@@ -16,6 +16,7 @@ from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status, hosts, told_hosts
 from proofroll.running.runner import Runner
 from proofroll.running.timing import Timing, write_benchmarks
+from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.study_store import keep, measured
 from proofroll.studies.tradeoff.claims import TradeoffClaims
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
@@ -28,7 +29,6 @@ from proofroll.studies.tradeoff.records import (
     MeasuredPoint,
     MeasuredQuantity,
     SparseRun,
-    TradeoffJudged,
     TradeoffStudy,
     TruthCost,
 )
@@ -61,7 +61,7 @@ def make_tradeoff(
     outcome = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
     study = tradeoff_study(outcome)
     judged = claims if not engines else None
-    said = TradeoffJudged(
+    said = JudgedFile(
         claims.name if claims else None,
         judged.contradictions(study) if judged else [],
         judged.undecided(study) if judged else [],
