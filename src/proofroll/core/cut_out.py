@@ -72,7 +72,8 @@ class CutOut:
         self._imports |= {"import numpy as np", "from types import SimpleNamespace"}  # for literals
         lines = sorted(self._imports, key=lambda line: (line.startswith("from"), line))
         self.head = "\n".join(["from __future__ import annotations", *lines]) + "\n"
-        self.text = "\n\n".join(self._source(place) for place in ordered)
+        # two names of one statement are one definition
+        self.text = "\n\n".join(dict.fromkeys(self._source(place) for place in ordered))
         if f" {_OURS}" in self.text:
             raise ValueError(f"an import of {_OURS} is inside a definition among {', '.join(self.names)}")
 
@@ -162,12 +163,14 @@ class CutOut:
             if not isinstance(part, (_Function, ast.ClassDef)):
                 continue
             words, own = ast.get_docstring(part) or "", part.body[0]
-            if "`" in words or _OURS in words:  # it leads to other places of the package
+            if ":`" in words or _OURS in words:  # it leads to other places of the package
                 gone |= set(range(own.lineno, (own.end_lineno or own.lineno) + 1))
                 if len(part.body) == 1:
                     emptied[own.lineno] = " " * own.col_offset + "..."
-        kept = []
-        for number in range(_first(node), (node.end_lineno or 0) + 1):
+        kept, begin = list[str](), _first(node)
+        while lines[begin - 2].startswith("#"):  # of a constant, what it is
+            begin -= 1
+        for number in range(begin, (node.end_lineno or 0) + 1):
             if number in emptied:
                 kept.append(emptied[number])
             elif number not in gone:

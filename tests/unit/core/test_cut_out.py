@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core.arrays import cross
 from proofroll.core.cut_out import CutOut
 from proofroll.core.engine import whole_steps
 from proofroll.core.integrators import RungeKutta4
+from proofroll.core.stalling import StepWatch
 from proofroll.elements.ball_on_surface.surfaces import Surface
 from proofroll.files.scene_file import load_scene
 
@@ -33,6 +35,14 @@ def test_it_runs_without_the_package() -> None:
     assert run.x == pytest.approx(math.exp(-1), rel=1e-5)
     assert {"RungeKutta4", "classical_step", "whole_steps"} <= set(cut.names)
     assert "proofroll" not in cut.head + cut.text
+
+
+def test_a_statement_stands_once_with_what_it_is() -> None:
+    """Two names of one assignment do not make it twice, and a constant keeps its comment."""
+    text = CutOut([cross], []).text
+    assert text.count("_NEXT, _LAST = ") == 1
+    assert "Cross products of two vectors" in text
+    assert "# No smooth motion needs such steps." in CutOut([StepWatch], ["took"]).text
 
 
 def test_methods_that_nothing_calls_are_left_out() -> None:

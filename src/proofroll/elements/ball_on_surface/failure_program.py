@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.failure import (
     off_surface,
 )
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.elements.ball_on_surface.reproducer_source import ball_numbers
+from proofroll.elements.ball_on_surface.reproducer_source import WALL, ball_numbers
 
 _SIGNS = '''
 
@@ -49,27 +49,18 @@ def signs(stopped, p, v, w):
     }
 '''
 
-_GEOMETRY = '''
-
-BODY = rolling_ball(SCENE)
-
-
-def frame(p):
-    """e1 (into the wall), e2, e3 for a ball at p."""
-    return BODY.surface.frame(BODY.surface.locate(p)).T
-
-
-def gap(p):
-    """Distance of the ball from the wall [m], negative where it has sunk in."""
-    return float(BODY.surface.gap(p))
-'''
-
 
 def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
     """An engine's part that runs it through proofroll, for failures of code that is at least in part proofroll's."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
-    return head + assigned(**ball_numbers(body)) + "\n" + asking(failed, "p_WB", "v_WB", "w_WB") + _GEOMETRY
+    return (
+        head
+        + assigned(**ball_numbers(body))
+        + "\n"
+        + asking(failed, "p_WB", "v_WB", "w_WB")
+        + f"\n\nBODY = rolling_ball(SCENE)\n{WALL}"
+    )
 
 
 def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:

@@ -14,7 +14,8 @@ from proofroll.core.errors import Refused
 from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
 
-_WALL = '''
+# The wall of a ``BODY``, for what holds a run against the laws.
+WALL = '''
 
 def frame(p):
     """e1 (into the wall), e2, e3 for a ball at p."""
@@ -57,7 +58,7 @@ def cut_program(
     uses = {*uses, "triad", "nearby", "surface"}
     cut = CutOut([*wanted, type(body.surface)], uses, instead)
     given = f"\n\nBODY = {cut.literal(body)}\nSETTINGS = {cut.literal(settings)}\n"
-    return f"{cut.head}\n{assigned(**ball_numbers(body), **values)}\n\n{cut.text}{given}{_WALL}{run}"
+    return f"{cut.head}\n{assigned(**ball_numbers(body), **values)}\n\n{cut.text}{given}{WALL}{run}"
 
 
 def ball_numbers(body: RollingBall) -> dict[str, float | FloatArray]:
