@@ -105,3 +105,14 @@ def test_a_clamped_servo_pushes_through_a_contact(engine: str, formulation: str,
     sample = run.sample()
     assert sample.p_WB[1, 0] == pytest.approx(0.07318356288203501, abs=bound)
     assert sample.effort == pytest.approx([0.6], abs=1e-6)
+
+
+def test_feet_that_hold_together_share_their_friction() -> None:
+    """A sled at rest on a slope stays, though the least share of friction is more than its least loaded foot bears."""
+    mechanism = mechanism_of(load_scene("sled_on_slope"))
+    turned = (*mechanism.joints[0].q0[:3], np.cos(1.12635), 0.0, 0.0, np.sin(1.12635))
+    resting = replace(mechanism.joints[0], q0=turned, v0=(0.0,) * 6)
+    run = PROJECTION.build(replace(mechanism, joints=(resting,)), DEFAULT)
+    run.advance(0.01)
+    assert run.events() == ()
+    assert np.abs(run.sample().v_WB).max() < 1e-9

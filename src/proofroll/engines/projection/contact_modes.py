@@ -205,6 +205,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def _excess(self, x: Array) -> list[Excess]:
         now = self.at(x)
         force, found = self.forces(now, self.mode), list[Excess]()
+        held: ContactMode = ()
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
                 found.append(Excess(k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
@@ -214,8 +215,14 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             if own.kind == "slip" and self.friction[k]:
                 found.append(Excess(k, "still", -float(across(each) @ self._toward[k]), True))
             elif own.kind == "stick":
-                T = float(np.linalg.norm(force[k] - N * each.normal))
-                found.append(Excess(k, "slip", T - self.friction[k] * N, True))
+                beyond = float(np.linalg.norm(force[k] - N * each.normal)) - self.friction[k] * N
+                if beyond > 0 and sum(one.kind == "stick" for one in self.mode) > 1:
+                    # of friction that several share only the sum is determinate: others may hold what this cannot
+                    held = held or self._decided(
+                        now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
+                    )
+                    beyond = -beyond if held[k].kind == "stick" else beyond
+                found.append(Excess(k, "slip", beyond, True))
         return found
 
     def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
