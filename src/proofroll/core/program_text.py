@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import sys
 from collections.abc import Mapping
-from types import ModuleType
 from typing import Any
 
 from proofroll.core.failed_run import FailedRun
@@ -60,17 +57,6 @@ def imported(head: str) -> list[str]:
     lines = [line.split() for line in head.splitlines() if line.startswith(("import ", "from "))]
     names = dict.fromkeys(words[1].partition(".")[0] for words in lines)
     return [name for name in names if name not in sys.stdlib_module_names]
-
-
-def module_text(module: ModuleType) -> str:
-    """Source of a module that imports nothing of proofroll: its imports, an empty line, and what it defines."""
-    text = inspect.getsource(module)
-    imports = [node for node in ast.parse(text).body if isinstance(node, ast.Import | ast.ImportFrom)]
-    lines = text.splitlines(keepends=True)
-    head = [
-        "".join(lines[node.lineno - 1 : node.end_lineno]) for node in imports if "__future__" not in ast.unparse(node)
-    ]
-    return "".join([*head, "\n", *lines[imports[-1].end_lineno :]]).replace("\n\n\n", "\n\n", 1)
 
 
 def asking(failed: FailedRun, *names: str) -> str:

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.engine_abilities import Reproduces
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine, resolve_settings
-from proofroll.core.program_text import imported, module_text
+from proofroll.core.program_text import imported
 from proofroll.elements.ball_on_surface.element import changed, rolling_ball
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.files.scene_file import load_scene
@@ -205,21 +205,12 @@ def test_what_has_no_program(engine: str, options: dict[str, str], parameters: d
         kind.reproducer(load_scene(CYLINDER, **parameters), resolve_settings(kind, options))
 
 
-def test_the_loop_of_mechanisms_stands_once() -> None:
-    """MuJoCo's program holds the text of the loop by which the adapter's cost is measured, and needs MuJoCo alone."""
-    loop = importlib.import_module("proofroll.engines.mujoco.reproducer.mechanism_loop")
-    kind = kind_of("mujoco")
-    text = kind.reproducer(load_scene("four_bar"), resolve_settings(kind, {"formulation": "joints"}))
-    assert text.startswith(module_text(loop))
-    assert "proofroll" not in text
-    assert set(imported(text.partition("\n\n")[0])) == {"mujoco", "numpy"}
-
-
 @pytest.mark.parametrize(
     ("engine", "options", "where"),
     [
         ("mujoco", {"formulation": "free", "preset": "tuned"}, "free:Free._add_curvature"),
         ("mujoco", {"formulation": "chart", "preset": "tuned"}, "chart:Chart._resister"),
+        ("mujoco", {"formulation": "joints", "preset": "tuned"}, "reproducer.mechanism_loop:stepped"),
         ("exudyn", {"formulation": "contact", "preset": "matched"}, "integration:Integration.advance"),
         ("pinocchio", {"formulation": "contact", "preset": "matched"}, "contact:ContactSteps.kick"),
         ("pinocchio", {"formulation": "composite", "preset": "default"}, "integrators:TangentRungeKutta4._step"),
@@ -230,7 +221,7 @@ def test_the_loop_of_mechanisms_stands_once() -> None:
 def test_the_loop_of_an_adapter_stands_once(engine: str, options: dict[str, str], where: str) -> None:
     """The program holds the lines of the adapter's own step, and needs the engine alone."""
     kind = kind_of(engine)
-    mechanism = options["formulation"] in {"null_space", "redundant"}
+    mechanism = options["formulation"] in {"joints", "null_space", "redundant"}
     scene = load_scene("four_bar") if mechanism else load_scene(CYLINDER, **RESISTED)
     text = kind.reproducer(scene, resolve_settings(kind, options))
     module, _, step = where.partition(":")

@@ -10,15 +10,16 @@ import mujoco
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
-from proofroll.core.program_text import assigned, module_text
+from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.reproducer_source import cut_program
 from proofroll.elements.mechanism import Mechanism
 from proofroll.engines.mujoco.chart import Chart
 from proofroll.engines.mujoco.free import Facets, Free
 from proofroll.engines.mujoco.friction import BoundedFriction
-from proofroll.engines.mujoco.reproducer import mechanism_loop
+from proofroll.engines.mujoco.reproducer.mechanism_loop import followed
 from proofroll.engines.mujoco.running import raise_if_fatal
 from proofroll.engines.mujoco.settings import MujocoSettings
 from proofroll.engines.mujoco.start import EVALUATIONS
@@ -85,7 +86,8 @@ def mechanism_source(xml: str, mechanism: Mechanism) -> str:
     places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
     places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
     asks = "# Places that are followed: body, and where on it [m].\n" + assigned(PLACES=places)
-    return f'{module_text(mechanism_loop)}\n\nMODEL = """{xml}"""\n{asks}{_MECHANISM}'
+    cut = CutOut([followed], [])
+    return f'{cut.head}\n{cut.text}\n\nMODEL = """{xml}"""\n{asks}{_MECHANISM}'
 
 
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
