@@ -6,12 +6,17 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.elements.mechanism.complementarity import complementary
 from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.files.scene_file import load_scene
+from proofroll.truth.hybrid import first_close, follow
+from proofroll.truth.mechanism import two_paths
 from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
+from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll.truth.mechanism.two_paths import CLOSE
 
 TIGHT = 1e-11  # of what two routes at 1e-14 leave after some ten switches, with room
 
@@ -174,3 +179,48 @@ def test_routes_share_ends_and_events_and_no_decision() -> None:
     assert SwitchedTree.change is SwitchedBodies.change
     for name in ("begin", "_law", "_at_rest", "_hit", "holding"):
         assert getattr(SwitchedTree, name) is not getattr(SwitchedBodies, name)
+
+
+def two_pendulums(later: float, restitution: float, *, cart: bool) -> Mechanism:
+    """Mirror images that swing onto stops, on the world or on a free cart; the second starts further away by a part."""
+    names, carrier = ("left", "right"), "cart" if cart else "world"
+    slide = Joint("slide", "prismatic", "world", "cart", axis=(1, 0, 0), q0=(0.0,), v0=(0.0,))
+    hinges = [
+        Joint(name, "revolute", carrier, name, (0, k, 0), axis=(0, 1, 0), q0=(0.6 * side * (1 + k * later),), v0=(0.0,),
+              limits=(-0.2, 1.0) if side > 0 else (-1.0, 0.2), restitution=restitution)
+        for k, (name, side) in enumerate(zip(names, (1, -1), strict=True))
+    ]  # fmt: skip
+    bodies = [Body(name, 1.0, (0, 0, -0.5), 0.1 * np.eye(3)) for name in names]
+    if cart:
+        bodies, hinges = [Body("cart", 1.0, (0, 0, 0), 0.1 * np.eye(3)), *bodies], [slide, *hinges]
+    return Mechanism(tuple(bodies), tuple(hinges), gravity=(0.0, 0.0, -9.81))
+
+
+def paths_of(mechanism: Mechanism, until: float):
+    """Paths of both routes, coarse ones."""
+    tree = JointCoordinates(mechanism)
+    bodies = SwitchedBodies(MaximalCoordinates(mechanism).lean, tree.switched, 1e-11)
+    return [follow(route, until, (), CLOSE) for route in (SwitchedTree(tree, 1e-11), bodies)]
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("later", "restitution"), [(0.0, 0.5), (1e-15, 0.5), (-1e-10, 0.5), (1e-12, 0.0)])
+def test_stops_hit_at_once_are_ill_posed_where_one_impact_moves_the_other(later: float, restitution: float) -> None:
+    """On a cart the first impact decides what the second does: round-off is not asked which comes first."""
+    for path in paths_of(two_pendulums(later, restitution, cart=True), 0.53):
+        assert first_close([path], CLOSE) == pytest.approx(0.521447, abs=1e-6)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize("later", [1e-15, -1e-15])
+def test_stops_hit_at_once_by_bodies_apart_are_well_posed(later: float) -> None:
+    """What one does nothing to the other: both routes go on, whichever they take first."""
+    paths = paths_of(two_pendulums(later, 0.0, cart=False), 0.53)
+    assert first_close(paths, CLOSE) == np.inf
+    assert two_paths._parted(*paths, lambda mode: mode) == np.inf
+    assert [sorted(item.name for item in path.happenings) for path in paths] == [["left", "right"]] * 2
+
+
+def test_stops_hit_one_after_the_other_are_well_posed() -> None:
+    """A difference that a file tells decides which comes first."""
+    assert first_close(paths_of(two_pendulums(1e-6, 0.5, cart=True), 0.53), CLOSE) == np.inf

@@ -100,7 +100,6 @@ class SwitchedBodies(JointStretches):
         return guard_values(self.joints, self.motors, mode, q, v, force, self._wanted(state))
 
     def _along(self, state: Array) -> tuple[Array, Array]:
-        """Coordinates and rates of the switched joints."""
         return self.equations.along(state[:-1], self._numbers)
 
     def _wanted(self, state: Array) -> list[float]:
@@ -158,7 +157,8 @@ class SwitchedBodies(JointStretches):
             size = abs(force) + sum(abs(bound) for bound in (low, high) if np.isfinite(bound))
             return min(high - force, force - low) / size if size else np.inf
         q = float(self._along(state)[0][which])
-        direction = {"forward": 1.0, "backward": -1.0}.get(mode, 1.0 if q <= joint.low else -1.0)
+        away = 1.0 if abs(q - joint.low) < abs(q - joint.high) else -1.0  # from the stop where it is, but for round-off
+        direction = {"forward": 1.0, "backward": -1.0}.get(mode, away)
         stuck = self.equations.switched(state[:-1], Switched((joint.number,)))
         needed = abs(float(stuck.solve(state[:-1], float(state[-1])).multipliers[-1]))
         response = self._accelerations(self.equations.switched(state[:-1], Switched(push={joint.number: 1.0})), state)

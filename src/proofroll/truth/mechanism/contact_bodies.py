@@ -61,7 +61,7 @@ class ContactBodies(ContactStretches):
         found = self.equations.at(state)
         speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
         fastest = self._fastest.setdefault(hit, speed)
-        hits = striking(leg.mode, found.touching, hit)
+        hits = striking(leg.mode, found.touching, hit, leg.end)
         closed = [own.kind != "open" or k in hits for k, own in enumerate(leg.mode)]
         laws = [self.contacts[k].restitution if k in hits else 0.0 for k in range(len(closed))]
         delay = 0.0

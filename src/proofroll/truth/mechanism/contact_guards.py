@@ -11,9 +11,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, across, heading_of
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
-from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth.mechanism.two_paths import CLOSE
 
 # Speeds [m/s, rad/s] below which nothing moves, and accelerations [m/s², rad/s²] below which nothing will: both routes
 # stop there, so that they integrate no round-off of a state at rest.
@@ -77,12 +77,17 @@ def _stopping(own: Acting, found: Touching) -> float:
     return -float(heading_of(own, found) @ found.slide)
 
 
-def striking(mode: ContactMode, touching: Sequence[Touching], hit: int) -> list[int]:
-    """Contacts that close at the same time as one does, with it."""
+def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: float) -> list[int]:
+    """Contacts that close at the same time [s] as one does, but for :data:`CLOSE` of that time, with it."""
+
+    def closes(found: Touching) -> bool:
+        closing = -float(found.normal @ found.slide)
+        return closing > 0 and found.gap <= closing * CLOSE * time
+
     return [
         k
         for k, (own, found) in enumerate(zip(mode, touching, strict=True))
-        if k == hit or (own.kind == "open" and found.gap <= TOUCHING and float(found.normal @ found.slide) < 0)
+        if k == hit or (own.kind == "open" and closes(found))
     ]
 
 

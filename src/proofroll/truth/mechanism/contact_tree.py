@@ -47,7 +47,7 @@ class ContactTree(ContactStretches):
         contacts, dynamics = self.contacts, self.dynamics
         q, v, time = dynamics.parts(leg.last)
         found = dynamics.at(q, v).touching
-        hits = striking(leg.mode, found, hit)
+        hits = striking(leg.mode, found, hit, leg.end)
         closed = [k for k, own in enumerate(leg.mode) if own.kind != "open" or k in hits]
         speed = -float(found[hit].normal @ found[hit].slide)
         fastest = self._fastest.setdefault(hit, speed)

@@ -17,6 +17,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, left_by
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.stretches import Stretches
+from proofroll.truth.mechanism.two_paths import CLOSE
 
 Motors = tuple[Actuator, ...]
 # Of the largest speed at which a joint hit its stop: of slower rebounds only the time is summed. They have 1e-12 of the
@@ -43,6 +44,10 @@ class JointStretches(Stretches[Mode]):
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
         """State, mode, margin, and time until rebounds are over [s], after a joint has hit a stop."""
 
+    @abstractmethod
+    def _along(self, state: Array) -> tuple[Array, Array]:
+        """Coordinates and rates of the switched joints."""
+
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
         if leg.guard is None:  # at a break
@@ -60,7 +65,10 @@ class JointStretches(Stretches[Mode]):
         if kind == "still":
             state, decided, margin = self._at_rest(leg, state, which)
             return Transition(state, decided, changes(self.joints, leg.mode, decided), margin)
+        q, before = self._along(state.copy())
         state, decided, margin, delay = self._hit(leg, state, which, joint.low if kind == "low" else joint.high)
+        if order_decides(self.joints, leg, q, before, self._along(state)[1], which):
+            return Transition(state, None, (), 0.0)
         settles = delay > 0 and decided[which] in HOLDING
         changed = [item for item in changes(self.joints, leg.mode, decided) if item[1] != joint.name]
         happened = ("settle" if settles else "impact", joint.name), *changed
@@ -132,6 +140,25 @@ def _guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float,
     if kind == "still":
         return -v if mode == "forward" else v
     return joint.low - q if kind == "low" else q - joint.high
+
+
+def order_decides(
+    joints: tuple[SwitchedJoint, ...], leg: Stretch[Mode], q: Array, before: Array, after: Array, hit: int
+) -> bool:
+    """True if less than parameters are known to decides which of two stops is hit first, and it matters.
+
+    Another joint would come to its stop within :data:`CLOSE` of the time that has passed, and the impact moves it.
+    ``q`` are coordinates at the impact, ``before`` and ``after`` rates beside it, of the switched joints.
+    """
+    speed, within = abs(float(before[hit])), CLOSE * leg.end
+    for k, kind in guards_of(joints, leg.mode):
+        if k >= len(joints) or k == hit or kind not in {"low", "high"}:
+            continue
+        closing = -float(before[k]) if kind == "low" else float(before[k])
+        gap = -_guard_value(joints[k], leg.mode[k], kind, float(q[k]), 0.0, 0.0)
+        if closing > 0 and gap <= closing * within and abs(after[k] - before[k]) > CLOSE * speed:
+            return True
+    return False
 
 
 def noise_of(

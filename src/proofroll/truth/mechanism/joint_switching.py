@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, Mode, held_by
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_by
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.joint_stretches import SETTLED, JointStretches, guard_values, noise_of
 from proofroll.truth.mechanism.stretches import StretchLaw
@@ -49,6 +49,11 @@ class SwitchedTree(JointStretches):
 
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
         joint, (q, v) = self.joints[which], self._parts(state)
+        for other, own in zip(self.joints, leg.mode, strict=False):  # what is held stands, but for round-off
+            if own in HOLDING:
+                v[other.velocity] = 0.0
+            if own in STOPPED:
+                q[other.coordinate] = other.low if own == "low" else other.high
         q[joint.coordinate] = stop
         speed = abs(float(v[joint.velocity]))
         fastest = self._fastest.setdefault(which, speed)
@@ -78,7 +83,10 @@ class SwitchedTree(JointStretches):
         q, v = self._parts(state)
         holds = any(own in HOLDING for own in mode)
         force = self.holding(state, mode) if holds else np.zeros(len(self.joints))
-        at_q, at_v = [joint.coordinate for joint in self.joints], [joint.velocity for joint in self.joints]
         return guard_values(
-            self.joints, self.motors, mode, q[at_q], v[at_v], force, self._wanted(float(state[-1]), q, v)
+            self.joints, self.motors, mode, *self._along(state), force, self._wanted(float(state[-1]), q, v)
         )
+
+    def _along(self, state: Array) -> tuple[Array, Array]:
+        q, v = self._parts(state)
+        return q[[joint.coordinate for joint in self.joints]], v[[joint.velocity for joint in self.joints]]

@@ -81,12 +81,25 @@ def two_route_motion(
 
 
 def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
-    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none."""
-    for a, b in zip(one.legs, two.legs, strict=False):
-        if kinds(a.mode) != kinds(b.mode):
-            return min(a.start, b.start)
-    last = min(len(one.legs), len(two.legs))
-    return np.inf if len(one.legs) == len(two.legs) else min(p.legs[last - 1].end for p in (one, two))
+    """Start of the first leg in which the two routes are in different modes [s]; inf: there is none.
+
+    What happens at one instant may come in either order; where that matters, the margin of a decision says it.
+    """
+    left = [list(path.legs) for path in (one, two)]
+    while all(left):
+        if kinds(left[0][0].mode) == kinds(left[1][0].mode):
+            del left[0][0], left[1][0]
+        elif passing := next((legs for legs in left if _instant(legs[0])), None):
+            del passing[0]
+        else:
+            return min(legs[0].start for legs in left)
+    rest = [leg for leg in (*left[0], *left[1]) if not _instant(leg)]
+    return rest[0].start if rest else np.inf
+
+
+def _instant(leg: Stretch[Any]) -> bool:
+    """True if a leg is shorter than times are known to."""
+    return bool(leg.end - leg.start <= CLOSE * leg.end)
 
 
 def _events(one: Path, two: Path) -> Sequence[Event]:
