@@ -48,7 +48,17 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
 
 @pytest.mark.parametrize(
     "fault",
-    ["RoughJoint", "PushingJoint", "MovedStop", "NoArmature", "NoClamp", "SwappedGains", "Undamped", "InverseGear"],
+    [
+        "RoughJoint",
+        "RoughAgain",
+        "PushingJoint",
+        "MovedStop",
+        "NoArmature",
+        "NoClamp",
+        "SwappedGains",
+        "Undamped",
+        "InverseGear",
+    ],
 )
 def test_a_law_of_joints_that_is_another_is_named(fault: str) -> None:
     """Friction, stops, armature, limits, gains and gears of joints that are not the scene's are named as such."""

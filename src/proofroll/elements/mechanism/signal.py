@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from simpleeval import InvalidExpression, SimpleEval
 
-from proofroll.core.errors import InputError, no_such_key
+from proofroll.core.errors import InputError, no_such_key, require_known
 from proofroll.core.expressions import LONGEST, evaluated, evaluator
 from proofroll.core.parameters import Parameters
 from proofroll.core.quantity import Quantity
@@ -130,6 +130,8 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
         if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
             used = _names(given[1:])
             if TIME in used:
+                for name in sorted(used - {TIME, "pi", *FUNCTIONS}):
+                    require_known(field, name, sorted(numbers.values), "there is no such parameter; choose from")
                 own = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
                 made = Formula(given[1:].strip(), own)
                 _check_unit(field, made.text, numbers, units)
@@ -141,7 +143,7 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
             filled = {key: numbers.filled(given.get(key, []), key, {}) for key in ("times", "values")}
             return Table(**filled)
     except InputError as error:
-        inside = "" if error.field == "formula" else f".{error.field}"
+        inside = "" if error.field in {"formula", field} else f".{error.field}"
         raise InputError(f"{field}{inside}", error.value, error.advice) from None
     return given
 

@@ -46,6 +46,14 @@ class RoughJoint(OfJoint):
     factor = 1.1
 
 
+class RoughAgain(RoughJoint):
+    """A tenth too much over half swings that each end at a switch, fifteen samples apart."""
+
+    fault = "dry friction 1.1 times, over many turns"
+    scene = ("spring_friction", {})
+    until = 1.0
+
+
 class PushingJoint(OfJoint):
     """Friction along the motion, as a drive of the same size: the pendulum swings one way in this time."""
 

@@ -27,7 +27,8 @@ from proofroll.elements.mechanism.rotations import skews
 from proofroll.elements.mechanism.signal import breaks, value_at
 from proofroll.elements.mechanism.switches import switched_joints
 
-_DEGREE, _ENDS, _SAMPLES = 7, 5, 16
+_FITS = ((7, 5), (5, 3))
+_SAMPLES = 16
 _DEPENDENT = 1e-7
 _GONE = 1e-9
 _TURNS = 0.1
@@ -284,7 +285,12 @@ def stretch(mechanism: Mechanism, *datasets: Any) -> slice | None:
     ends = [0, *(k for k in range(1, count) if each[k] != each[k - 1]), count]
     free = [slice(a, b) for a, b in itertools.pairwise(ends) if all(map(_moves, each[a]))]
     longest = max(free, key=lambda part: part.stop - part.start, default=slice(0, 0))
-    return longest if longest.stop - longest.start > _DEGREE + 2 * _ENDS else None
+    return longest if _fit(longest) else None
+
+
+def _fit(part: slice) -> tuple[int, int] | None:
+    """Degree of the splines through a stretch, and samples left out at each end; None: it is too short."""
+    return next(((degree, ends) for degree, ends in _FITS if part.stop - part.start > degree + 2 * ends), None)
 
 
 def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
@@ -292,9 +298,9 @@ def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
     acceleration = np.zeros_like(twists)
-    time = placed.time[part]
-    acceleration[part] = make_interp_spline(time, twists[part], k=_DEGREE).derivative()(time)
-    which = np.unique(np.linspace(part.start + _ENDS, part.stop - 1 - _ENDS, _SAMPLES).astype(int))
+    time, (degree, ends) = placed.time[part], _fit(part) or _FITS[-1]
+    acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(time)
+    which = np.unique(np.linspace(part.start + ends, part.stop - 1 - ends, _SAMPLES).astype(int))
     return MechanismStates(mechanism, placed, acceleration, which)
 
 
