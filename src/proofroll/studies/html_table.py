@@ -1,4 +1,4 @@
-"""A table of findings as a notebook shows it."""
+"""A table of results as a notebook shows it."""
 
 from __future__ import annotations
 

@@ -173,7 +173,7 @@ class ShownBand:
 
 @dataclass(frozen=True, kw_only=True)
 class ReportedComparison:
-    """A comparison's findings: ``rows`` summarise each engine with settings, ``runs`` say everything of each run.
+    """Content of a comparison: ``rows`` summarise each engine with settings, ``runs`` say everything of each run.
 
     ``group`` is that of its scene (:func:`proofroll.report.kinds.group_of`), ``shown_by`` the kind of element that
     shows more of it.

@@ -62,7 +62,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         if count:
             parts.append(f"{count} {one if count == 1 else many} {rest}")
     unexpected = len(content.contradictions)
-    expected = f"Not expected: {counted(unexpected, 'findings')}."
+    expected = f"Not expected: {counted(unexpected, 'results')}."
     if content.as_expected:
         expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
     text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"

@@ -118,7 +118,7 @@ def _row(runs: list[Run]) -> ReportedRow:
 
 
 def _why(runs: list[Run]) -> tuple[str, str]:
-    """Reason of the worst verdict, empty where everything agrees; and the finding of its ladder, ``limit``."""
+    """Reason of the worst verdict, empty where everything agrees; and the result of its ladder, ``limit``."""
     worst = max((run.verdict for run in runs), key=SEVERITY.index)
     guilty: list[tuple[Run, Judgement | None]] = []
     for run in runs:

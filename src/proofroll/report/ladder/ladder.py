@@ -86,7 +86,7 @@ class Absence:
 
 @dataclass(frozen=True)
 class LadderContent:
-    """The question, what was found, and ``findings`` in sentences; ``unplaced``: engines that tell no levels."""
+    """Question and results of a ladder, with conclusions (``findings``); ``unplaced``: engines that tell no levels."""
 
     scene: str
     parameters: dict[str, float]

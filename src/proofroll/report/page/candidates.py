@@ -10,7 +10,7 @@ from proofroll.report.labels import step
 from proofroll.report.long_table import TableLine
 
 # What a ladder of steps may say, from what leaves the most hope to what leaves none.
-_FINDINGS = (LimitResult.WITHIN, LimitResult.NO_LADDER, LimitResult.NOT_SHOWN, LimitResult.ANOTHER)
+_LIMITS = (LimitResult.WITHIN, LimitResult.NO_LADDER, LimitResult.NOT_SHOWN, LimitResult.ANOTHER)
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ class Candidate:
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
 
     def limit(self, forces: bool) -> LimitResult:
-        """Finding of its ladder about all that is asked for."""
+        """Result of its ladder for all that is asked for."""
         both = (self.motion_limit, self.forces_limit) if forces else (self.motion_limit,)
-        return max(both, key=_FINDINGS.index)
+        return max(both, key=_LIMITS.index)
 
 
 def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
@@ -123,8 +123,8 @@ def _shown(lines: Sequence[TableLine], role: str) -> list[TableLine]:
 
 def _limit(lines: Sequence[TableLine], role: str) -> LimitResult:
     """The worst that the ladder of a row says of a role."""
-    said = [item for line in _shown(lines, role) for item in _FINDINGS if line.limit == item]
-    return max(said, key=_FINDINGS.index, default=LimitResult.NO_LADDER)
+    said = [item for line in _shown(lines, role) for item in _LIMITS if line.limit == item]
+    return max(said, key=_LIMITS.index, default=LimitResult.NO_LADDER)
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:

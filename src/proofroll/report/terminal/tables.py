@@ -122,7 +122,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
     if content.contradictions:
         count = len(content.contradictions)
-        said = "1 finding contradicts" if count == 1 else f"{count} findings contradict"
+        said = "1 result contradicts" if count == 1 else f"{count} results contradict"
         lines.append(f"{said} what {content.name} expects (!! above){'; first' if count > 5 else ''}:")
         lines += [f"  {sentence}" for sentence in content.contradictions[:5]]
     elif any(len(row.expected) < len(Verdict) for row in rows):  # else nothing is claimed

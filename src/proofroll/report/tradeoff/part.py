@@ -144,7 +144,7 @@ class TradeoffPart(Part):
 
 
 def _limit(budget: CurveBudget) -> str:
-    """Finding of a curve about its limit of small steps: not shown, beyond both bars of the truth, or within them."""
+    """Limit of small steps of a curve: not shown, beyond both bars of the truth, or within them."""
     if budget.model_form is None:
         return LimitResult.NOT_SHOWN
     known = (budget.model_form_bar or 0.0) + (budget.truth or 0.0) + (budget.floor or 0.0)

@@ -34,7 +34,7 @@ class Axis:
         values: log-spaced as a rule.
         parameters: parameter -> its dependence on the value; the others keep their defaults.
         horizon: the value is the length of the run in natural times.
-        scale_free: the dimensionless problem is the same at every value, so that every dependence is a finding.
+        scale_free: the dimensionless problem is the same at every value, so that nothing may depend on it.
     """
 
     name: str

@@ -27,7 +27,7 @@ _SAME_ORDER = 0.3
 _STALLED = 0.25
 # Differences this many times larger than the scatter are more than scatter.
 _ABOVE = 3.0
-# How far a declared order may lie outside the interval of the observed one before it is a finding.
+# How far a declared order may lie outside the interval of the observed one before it counts as contradicted.
 _SLACK = 0.25
 _CONFIDENCE = 0.95
 
