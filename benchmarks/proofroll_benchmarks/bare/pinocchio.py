@@ -52,6 +52,8 @@ def prepare(scene: Scene, settings: Any) -> Bare:
 
 
 def _mechanism(scene: Scene, settings: Any) -> Bare:
+    if settings.formulation == "impulses":
+        raise Refused("there is no bare loop of contacts between bodies")
     mechanism_run = MechanismRun(mechanism_of(scene), settings)
     loop, frames = _loop_of(mechanism_run, settings), mechanism_run.tree.body
 

@@ -113,3 +113,10 @@ def test_bare_mechanisms_end_where_the_adapters_do(engine: str, formulation: str
     after = built.sample()
     assert np.abs(np.array(after.q_WB) - before).max() > 1e-4
     assert np.linalg.norm(bare.run(np.array([0.0, 0.02, 0.04])) - after.p_WB) <= bare.tolerance
+
+
+def test_a_formulation_without_a_bare_loop_is_refused() -> None:
+    """Steps of contacts between bodies have none, and say so."""
+    settings = resolve_settings(load_engine("pinocchio"), {"formulation": "impulses"})
+    with pytest.raises(Refused, match="no bare loop of contacts"):
+        load_bare_loop("pinocchio")(load_scene("pendulum"), settings)
