@@ -260,6 +260,8 @@ def test_a_budget_is_spent_briefly_first_and_grows(
 
     speeds, verdicts, said = made(most=3)
     assert (speeds, verdicts) == ([[4.0], [4.0]], ["agrees", "not-judged"])
+    assert "Left out for lack of processor time: reduced[formulation=closed_form] at speed=4." in said
+    assert "did not suffice" not in said
     assert "Runs left out for lack of processor time: 1. The same command goes on with them." in said
     assert "lack of processor time: 1" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     speeds, verdicts, said = made(most=3)

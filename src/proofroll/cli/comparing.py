@@ -143,7 +143,7 @@ def outcomes_of(
     grown = {at: item for at, item in enumerate(plans) if len(item.truths) > len(brief[at].truths)}
     parts = [*enumerate(brief), *grown.items()]
     if limit:
-        order = [[*truths, *runs] for truths, runs, _ in (item.stages for item in brief)]
+        order = [cases for item in brief for cases in item.stages[:-1]]
         order += [item.stages[-1] for item in brief]
         order += [item.cases for item in grown.values()]
     else:

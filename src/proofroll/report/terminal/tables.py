@@ -15,7 +15,7 @@ from proofroll.report.comparison.tables import observables, remarks, seconds_bef
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
-from proofroll.running.case import told_hosts
+from proofroll.running.case import Status, told_hosts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -117,7 +117,8 @@ def closing_lines(content: ReportedComparison) -> list[str]:
     said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
     lines = [f"{counted(len(rows), 'engine settings')}, {counted(len(content.runs), 'runs')} in all: {said}."]
     for name, row, _ in content.lines():
-        lines += [f"{SYMBOLS[row.verdict]} {name}: {row.reason}"] if row.reason else []
+        if row.reason and not row.reason.startswith(Status.LEFT_OUT):
+            lines.append(f"{SYMBOLS[row.verdict]} {name}: {row.reason}")
         lines += [f"  {told.cause.sentence}" for told in row.diagnosis]
     lines += [f"* {name}: {remark}" for name, remark in remarks(content)]
     if content.contradictions:
@@ -138,9 +139,11 @@ def closing_lines(content: ReportedComparison) -> list[str]:
 def budget_lines(content: ReportedComparison) -> list[str]:
     """Cases that the processor time did not suffice for, and the way to get them."""
     left = content.beyond_budget
-    if not left or content.budget is None:
+    if not left:
         return []
     more = f" and {len(left) - 1} more" if len(left) > 1 else ""
+    if content.budget is None:
+        return [f"Left out for lack of processor time: {left[0]}{more}."]
     seconds = f"{content.budget:g} s of processor time, building and compiling included,"
     said = f"Left out, for {seconds} did not suffice: {left[0]}{more}."
     again = "" if left[0].startswith("the truth") else "The same command goes on with what is left; "
