@@ -79,7 +79,7 @@ class EngineFacts:
         name: of the engine, with the place of another interpreter in which it runs, ``mujoco@3.8.1``.
         version: of the engine.
         code: hash of the adapter and of everything that it runs on, so that stored results never outlive a change.
-        settings: complete settings, by name.
+        settings: complete settings of the formulation, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
         lowered: what a scene may require -> the order with it, see
