@@ -50,7 +50,7 @@ class RoughAgain(RoughJoint):
     """A tenth too much over half swings that each end at a switch, fifteen samples apart."""
 
     fault = "dry friction 1.1 times, over many turns"
-    scene = ("spring_friction", {})
+    scene: ClassVar[Any] = ("spring_friction", {})
     until = 1.0
 
 
