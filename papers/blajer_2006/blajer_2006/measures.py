@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing
 from scipy.optimize import minimize_scalar
-from scipy.signal import find_peaks
 
 from proofroll.core.arrays import FloatArray
 
@@ -19,6 +18,8 @@ _FREQUENCY_BAND = (0.8, 1.25)  # around the guess from the extremes, which is of
 
 def _turns(values: FloatArray) -> np.typing.NDArray[np.intp]:
     """Samples at which the curve turns round, in the order of time."""
+    from scipy.signal import find_peaks  # half a second, which every report would pay
+
     prominence = _PROMINENCE * float(np.ptp(values))
     return np.sort(np.concatenate([find_peaks(sign * values, prominence=prominence)[0] for sign in (1, -1)]))
 
