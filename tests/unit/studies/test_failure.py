@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -19,22 +21,37 @@ from proofroll.studies.failure import LOST_PHASE, Yardstick, meanings, run_outco
 
 SCENE = load_scene("sphere_in_cylinder")
 TIMES = np.linspace(0.0, 3 * natural_time(rolling_ball(SCENE)), 25)
-TRUE = truth(SCENE, TIMES)
-YARDSTICK = Yardstick.of(SCENE, TRUE)
 DONE = Result(Status.DONE, "reached the end")
-P, V, W = (TRUE[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB"))
 LATE = (np.arange(len(TIMES)) >= 12)[:, None]
 
 
-def run(p: Any = P, v: Any = V, w: Any = W, upto: int = 25) -> Any:
-    """A trajectory of these states."""
-    return columns(rolling_ball(SCENE), TIMES[:upto], p[:upto], v[:upto], w[:upto]).dataset()
+@cache
+def true() -> Any:
+    """The truth, computed when the first test needs it."""
+    return truth(SCENE, TIMES)
+
+
+def p_WB() -> Any:
+    """Its places [m]."""
+    return true()["p_WB"].to_numpy()
+
+
+def v_WB() -> Any:
+    """Its velocities [m/s]."""
+    return true()["v_WB"].to_numpy()
+
+
+def run(p: Any = None, v: Any = None, w: Any = None, upto: int = 25) -> Any:
+    """A trajectory of these states, or of the truth's."""
+    given = {"p_WB": p, "v_WB": v, "w_WB": w}
+    states = (true()[name].to_numpy() if value is None else value for name, value in given.items())
+    return columns(rolling_ball(SCENE), TIMES[:upto], *(state[:upto] for state in states)).dataset()
 
 
 def drifting(speed: float) -> Any:
     """The truth with a slip along the wall on top."""
     slip = np.array([0.0, 0.0, speed])
-    return run(P + TIMES[:, None] * slip, V + slip)
+    return run(p_WB() + TIMES[:, None] * slip, v_WB() + slip)
 
 
 def slower(factor: float) -> Any:
@@ -45,33 +62,35 @@ def slower(factor: float) -> Any:
 
 def test_the_truth_is_accurate() -> None:
     """A run that is right is stable, accurate and has no failure."""
-    outcome = run_outcome(DONE, run(), YARDSTICK)
+    outcome = run_outcome(DONE, run(), Yardstick.of(SCENE, true()))
     assert (outcome.stable, outcome.accurate, outcome.failure, outcome.silent) == (True, True, None, False)
 
 
 @pytest.mark.parametrize(
     ("dataset", "failure", "stable"),
     [
-        (run(P + LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), "sank in", False),
-        (run(P - LATE * 0.005 * rolling_ball(SCENE).surface.normal(P)), "left the surface", False),
-        (run(v=V * (1 + 0.2 * LATE)), "energy gain", False),
-        (drifting(-0.01), "creep", True),
-        (drifting(-0.2), "creep", False),
-        (slower(0.97), "lost phase", True),
+        (lambda: run(p_WB() + LATE * 0.005 * rolling_ball(SCENE).surface.normal(p_WB())), "sank in", False),
+        (lambda: run(p_WB() - LATE * 0.005 * rolling_ball(SCENE).surface.normal(p_WB())), "left the surface", False),
+        (lambda: run(v=v_WB() * (1 + 0.2 * LATE)), "energy gain", False),
+        (lambda: drifting(-0.01), "creep", True),
+        (lambda: drifting(-0.2), "creep", False),
+        (lambda: slower(0.97), "lost phase", True),
     ],
     ids=["sank", "left", "gain", "creeps a little", "creeps far", "phase"],
 )
-def test_a_bad_run_that_says_it_is_done(dataset: Any, failure: str, stable: bool) -> None:
+def test_a_bad_run_that_says_it_is_done(dataset: Callable[[], Any], failure: str, stable: bool) -> None:
     """A run that reached the end and is wrong is a silent failure of the kind that was put into it."""
-    outcome = run_outcome(DONE, dataset, YARDSTICK)
+    outcome = run_outcome(DONE, dataset(), Yardstick.of(SCENE, true()))
     assert (outcome.failure, outcome.stable, outcome.accurate, outcome.silent) == (failure, stable, False, True)
 
 
 def test_what_came_first() -> None:
     """Of two failures the earlier one counts, for the later may be its consequence."""
     later = (np.arange(len(TIMES)) >= 18)[:, None]
-    normal = rolling_ball(SCENE).surface.normal(P)
-    outcome = run_outcome(DONE, run(P + later * 0.005 * normal, V * (1 + 0.2 * LATE)), YARDSTICK)
+    normal = rolling_ball(SCENE).surface.normal(p_WB())
+    outcome = run_outcome(
+        DONE, run(p_WB() + later * 0.005 * normal, v_WB() * (1 + 0.2 * LATE)), Yardstick.of(SCENE, true())
+    )
     assert outcome.failure == "energy gain"
     assert outcome.time == pytest.approx(TIMES[12])
 
@@ -91,14 +110,14 @@ def test_what_came_first() -> None:
 def test_runs_that_ended_early(status: Status, message: str, failure: str, silent: bool) -> None:
     """A run that ended early is never stable; only a NaN that the engine did not mention is silent."""
     dataset = run(upto=6) if status == Status.DIVERGED else None
-    outcome = run_outcome(Result(status, message), dataset, YARDSTICK)
+    outcome = run_outcome(Result(status, message), dataset, Yardstick.of(SCENE, true()))
     assert (outcome.failure, outcome.silent, outcome.stable, outcome.accurate) == (failure, silent, False, False)
 
 
 def test_a_lift_off_that_ends_a_run() -> None:
     """An engine that stops because the ball leaves the wall has said so, and that is what happened."""
     dataset = with_events(run(upto=6), [Event("lift_off", 0.3, 0.2, 0.3)])
-    outcome = run_outcome(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, YARDSTICK)
+    outcome = run_outcome(Result(Status.DIVERGED, "the ball leaves the wall"), dataset, Yardstick.of(SCENE, true()))
     assert (outcome.failure, outcome.silent) == ("left the surface", False)
 
 
@@ -106,7 +125,7 @@ def test_without_a_truth() -> None:
     """Without a truth a run is judged by what needs none: surface and energy."""
     alone = Yardstick.of(SCENE, None)
     assert run_outcome(DONE, slower(0.5), alone).stable
-    assert run_outcome(DONE, run(v=V * (1 + 0.2 * LATE)), alone).failure == "energy gain"
+    assert run_outcome(DONE, run(v=v_WB() * (1 + 0.2 * LATE)), alone).failure == "energy gain"
     assert run_outcome(DONE, slower(0.5), alone).error is None
 
 
