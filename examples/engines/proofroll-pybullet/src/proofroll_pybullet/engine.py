@@ -7,18 +7,29 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll_pybullet import ball, mechanism
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll_pybullet import ball, mechanism, spheres
 from proofroll_pybullet.ball import PybulletBall
 from proofroll_pybullet.mechanism import PybulletMechanism
 from proofroll_pybullet.settings import PRESETS, PybulletSettings
+from proofroll_pybullet.spheres import PybulletSpheres
 
 
 class Pybullet:
     """PyBullet through its Python module; semi-implicit Euler. See :class:`proofroll.core.engine.Engine`."""
 
     name: ClassVar[str] = "pybullet"
-    provides: ClassVar[Mapping[str, frozenset[str]]] = {"plane": ball.PROVIDES, "urdf": mechanism.PROVIDES}
-    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"plane": {}, "urdf": mechanism.LACKING}
+    provides: ClassVar[Mapping[str, frozenset[str]]] = {
+        "plane": ball.PROVIDES,
+        "urdf": mechanism.PROVIDES,
+        "spheres": spheres.PROVIDES,
+    }
+    lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {
+        "plane": {},
+        "urdf": mechanism.LACKING,
+        "spheres": spheres.LACKING,
+    }
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"spheres": frozenset({MechanismCapability.CONTACT})}
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"plane": ball.INHERENT}
     settings: ClassVar[type[PybulletSettings]] = PybulletSettings
     presets: ClassVar[Mapping[str, Mapping[str, PybulletSettings]]] = PRESETS
@@ -29,7 +40,12 @@ class Pybullet:
         return importlib.metadata.version("pybullet")
 
     @staticmethod
+    def family(settings: PybulletSettings) -> str:
+        """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
+        return spheres.FAMILY if settings.formulation == "spheres" else ""
+
+    @staticmethod
     def build(scene: Scene, settings: PybulletSettings) -> Any:
         """The model of the formulation."""
-        models = {"plane": PybulletBall, "urdf": PybulletMechanism}
+        models = {"plane": PybulletBall, "urdf": PybulletMechanism, "spheres": PybulletSpheres}
         return models[settings.formulation].build(scene, settings)

@@ -14,13 +14,14 @@ class PybulletSettings:
     """Settings of PyBullet.
 
     Attributes:
-        formulation: ``plane``, a ball against a plane posed anew in each step; ``urdf``, a mechanism as a URDF.
+        formulation: ``plane``, a ball against a plane posed anew in each step; ``urdf``, a mechanism as a URDF;
+            ``spheres``, free bodies with spheres that touch.
         preset: ``default``: PyBullet's own options and its own step; ``matched``: no damping, slack or bound on spin.
         dt: step [s].
         iterations: of the solver of contacts and loops.
     """
 
-    formulation: Literal["plane", "urdf"] = "plane"
+    formulation: Literal["plane", "urdf", "spheres"] = "plane"
     preset: Literal["default", "matched"] = "matched"
     dt: Annotated[float, Gt(0)] = 1e-3
     iterations: Annotated[int, Gt(0)] = 200
@@ -39,5 +40,5 @@ PRESETS: Mapping[str, Mapping[str, PybulletSettings]] = {
         "matched": PybulletSettings(name, "matched", iterations=iterations),
     }
     # A loop in space is closed to 0.6 % of its first acceleration after 200, to 1e-7 after 2000.
-    for name, iterations in (("plane", 200), ("urdf", 2000))
+    for name, iterations in (("plane", 200), ("urdf", 2000), ("spheres", 1000))
 }
