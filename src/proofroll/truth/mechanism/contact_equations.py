@@ -157,11 +157,14 @@ class ContactEquations:
         K, D = np.concatenate(rows), np.concatenate(along)
         nu, count = len(state.u), len(K)
         none = np.zeros((count, count))
-        system = np.block([[state.mass, -D.T], [K, none]])
-        answer = np.linalg.lstsq(system, np.concatenate([right, *aims]), rcond=1e-13)[0]
+        # In units of the inertia of each velocity and of what each row moves: a small body's moment is no zero.
+        by_velocity = 1 / np.sqrt(np.diag(state.mass))
+        units = np.concatenate([by_velocity, 1 / np.linalg.norm(K * by_velocity, axis=1)])
+        system = np.block([[state.mass, -D.T], [K, none]]) * units * units[:, None]
+        answer = units * np.linalg.lstsq(system, units * np.concatenate([right, *aims]), rcond=1e-13)[0]
         x, z = answer[:nu], answer[nu + len(state.C) :]
-        plain = np.block([[state.mass, -K.T], [K, none]])
-        loose = bool(np.linalg.matrix_rank(K, RANK) < count)
+        plain = np.block([[state.mass, -K.T], [K, none]]) * units * units[:, None]
+        loose = bool(np.linalg.matrix_rank(plain[nu:, :nu], RANK) < count)
         response = 1.0 if loose else float(np.linalg.det(system) / np.linalg.det(plain))
         force = np.zeros((len(mode), 3))
         for (k, direction), size in zip(owner, z, strict=True):

@@ -100,6 +100,14 @@ def test_a_falling_rod_sticks_slips_back_and_forward() -> None:
     times_of(found, 0.572316015251, 0.798506009982)
 
 
+def test_a_rod_of_ten_micrometres_falls_as_one_of_a_metre_does() -> None:
+    """Lengths scale a motion under gravity, and times by their root: no length of a metre is taken for granted."""
+    found = motion("falling_rod", [0.0, 0.9 * np.sqrt(1e-5)], half=0.5e-5, foot=0.02e-5)
+    assert happened(found) == [("slip", "contact"), ("turn", "contact")]
+    times = np.array([event.time for event in found.events]) / np.sqrt(1e-5)
+    assert times == pytest.approx([0.572316015251, 0.798506009982], abs=DIGITS)
+
+
 def test_a_ladder_leaves_its_wall() -> None:
     """With friction it leaves at the laboratory's time."""
     found = motion("ladder", [0.0, 1.0])
