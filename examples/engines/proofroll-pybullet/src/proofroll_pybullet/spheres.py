@@ -45,6 +45,8 @@ class PybulletSpheres:
         if kinds - {"sphere", "plane"} or any(each.kind == "plane" and each.body != WORLD for p in pairs for each in p):
             raise Refused("only spheres of bodies, and planes of the world, are built")
         laws = {(pair.friction, pair.restitution) for pair in mechanism.pairs}
+        if not laws:
+            raise Refused("only bodies that touch are built")
         if len(laws) > 1:
             raise Refused("PyBullet multiplies coefficients of two bodies; pairs with laws of their own are not built")
         self._law = [math.sqrt(value) for value in laws.pop()]  # of each of two bodies
