@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from proofroll.core.arrays import FloatArray
-from proofroll.truth.hybrid import between, walked
+from proofroll.core.errors import Diverged
+from proofroll.truth.hybrid import Stretch, Transition, between, follow, walked
 
 TOLERANCE = np.full(2, 1e-13)
 
@@ -41,3 +42,21 @@ def test_states_within_a_stretch_follow_from_its_steps() -> None:
     times = np.array([0.0, 0.4, 1.7, 3.0])
     found = between(swing, visited, times, TOLERANCE, kept)
     assert found[:, 0] == pytest.approx(np.sin(times), abs=1e-12)
+
+
+@pytest.mark.parametrize("length", [0.0, 1e-9])
+def test_a_route_that_alternates_without_progress_is_told(length: float) -> None:
+    """Stretches without end that are nothing beside the time that has passed end in words."""
+
+    class Alternating:
+        def begin(self) -> Transition[str]:
+            return Transition(np.zeros(1), "left", (), np.inf)
+
+        def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+            return Stretch(time, time + (length if time else 0.1), mode, state, state, 0)
+
+        def change(self, leg: Stretch[str]) -> Transition[str]:
+            return Transition(leg.last, "right" if leg.mode == "left" else "left", (), np.inf)
+
+    with pytest.raises(Diverged, match="no progress at 0.1 s"):
+        follow(Alternating(), 1.0)
