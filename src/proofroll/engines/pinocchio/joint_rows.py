@@ -60,7 +60,7 @@ class JointRows:
 
     @staticmethod
     def _friction(tree: JointTree, joint: SwitchedJoint) -> JointRow:
-        bound = np.array([joint.friction])
+        bound = np.full(tree.model.nv, joint.friction)  # of all coordinates, of which those of its joints count
         model = pin.JointFrictionConstraintModel(tree.model, [tree.joint[joint.number]], -bound, bound)
         return JointRow(joint, pin.ConstraintModel(model), 1.0, None)
 
