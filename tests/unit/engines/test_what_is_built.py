@@ -62,7 +62,7 @@ def test_projection(f: float) -> None:
     ):
         engine = build(scene(*asks, rolling_resistance=f), "projection", formulation=formulation)
         assert len(engine._motion.x) == length
-        assert engine._ball.rows.shape == (2, 6)
+        assert engine._ball.active == "contact"
         kin = engine._ball.kinematics(engine._motion.x)
         assert bool(np.any(engine._ball.resistance(kin, 1.0))) == (f > 0)
         # Nobody looks for a slip; with resistance, only for the place where the centre stands still.
