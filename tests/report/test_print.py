@@ -67,7 +67,7 @@ def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: V
     with visit(report_page, viewport=PAPER, before=UNDRAWN) as seen:
         matrices = seen.page.locator(".matrix:not(#choice)")
         assert matrices.count() == 2, "one is folded, and not built on the screen"
-        seen.page.evaluate("stored('folds').then(() => dispatchEvent(new Event('beforeprint')))")
+        seen.page.evaluate("folds.find('').then(() => dispatchEvent(new Event('beforeprint')))")
         seen.page.emulate_media(media="print")
         seen.wait("document.querySelectorAll('.matrix:not(#choice)').length === 3")  # a busy machine takes a moment
         assert all(matrices.nth(number).is_visible() for number in range(3))
