@@ -31,7 +31,8 @@ def test_a_crest_within_a_step_is_seen(below: float) -> None:
 
     time, _, guard = walked(swing, 0.0, np.array([0.0, 1.0]), 3.0, tolerance=TOLERANCE, guards=crest, corrected=kept)
     assert guard == 0
-    assert time == pytest.approx(np.arcsin(1.0 - below), abs=1e-6 * np.sqrt(below))
+    # what the guard is off by, over the rate at which it rises
+    assert time == pytest.approx(np.arcsin(1.0 - below), abs=20 * TOLERANCE[0] / np.sqrt(2 * below))
 
 
 def test_states_within_a_stretch_follow_from_its_steps() -> None:
