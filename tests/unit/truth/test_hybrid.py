@@ -22,6 +22,7 @@ def kept(y: FloatArray) -> FloatArray:
     return y
 
 
+@pytest.mark.arithmetic
 @pytest.mark.parametrize("below", [1e-3, 1e-6, 1e-9])
 def test_a_crest_within_a_step_is_seen(below: float) -> None:
     """A guard that rises above zero only under the crest of its swing ends the stretch there."""
