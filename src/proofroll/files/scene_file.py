@@ -189,12 +189,14 @@ def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: s
     """Tables of each kind of element; of a table that several read, each row goes where the names are that it says.
 
     Raises:
-        InputError: a row says no name that one of these kinds alone has.
+        InputError: the table is no list of rows, or a row says no name that one of these kinds alone has.
     """
     shared = {name for name in tables if sum(name in own for own in known) > 1}
     found = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]
     named = [{str(row["name"]) for rows in own.values() for row in _rows(rows) if "name" in row} for own in found]
     for table in shared:
+        if not isinstance(tables[table], list) or len(_rows(tables[table])) < len(tables[table]):
+            raise InputError(f"{where}: {table}", tables[table], f"write each row as a table [[{table}]]")
         for index, row in enumerate(_rows(tables[table])):
             said = [text for value in row.values() for text in (value if isinstance(value, list) else [value])]
             homes = [

@@ -39,6 +39,11 @@ class TimeBudget:
     @property
     def left(self) -> float:
         """Processor time that is left for cases [s]."""
+        with self._lock:
+            return self._left()
+
+    def _left(self) -> float:
+        """See :attr:`left`; under the lock."""
         now = time.monotonic()
         used = processor_seconds() - self._start + self._lost + sum(now - begun for begun in self._begun.values())
         return max(0.0, _OF_CASES * self.seconds - used)
@@ -51,7 +56,7 @@ class TimeBudget:
     def begin(self, case: str, abreast: int) -> float:
         """Seconds that a case may take beside at most ``abreast`` - 1 others; 0: it is not to be begun."""
         with self._lock:
-            share = self.left / max(1, min(abreast, self._unfinished))
+            share = self._left() / max(1, min(abreast, self._unfinished))
             self._begun[case] = time.monotonic()
             return share if share > _LEAST else 0.0
 

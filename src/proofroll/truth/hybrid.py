@@ -22,9 +22,9 @@ LegT = TypeVar("LegT", bound="Span")
 Rates = Callable[[float, State], FloatArray]
 # Stretches without any length, one after the other, after which a route is taken to make no progress.
 _STUCK = 50
-# Stretches shorter than this part of the time that has passed, one after the other, after which it makes none either:
-# rebounds whose lengths shrink by a twentieth each come to rest within fewer.
-_SHORT, _MANY = 1e-6, 400
+# Stretches shorter than this part of the time that has passed, after which it makes none either unless they have shrunk
+# to this part of what they were: rebounds shrink by e each, 400 by a tenth for every e up to 0.9997.
+_SHORT, _MANY, _SHRUNK = 1e-6, 400, 0.9
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,8 @@ def follow(
     Raises:
         Diverged, Refused: by the route, or it makes no progress.
     """
-    time, over, change, still, short = 0.0, 0.0, route.begin(), 0, 0
+    time, over, change, still = 0.0, 0.0, route.begin(), 0
+    short, longest = 0, 0.0
     legs: list[LegT] = []
     happenings: list[Happening] = []
     margins = []
@@ -170,7 +171,11 @@ def follow(
         if leg.guard is None and end == until:
             return HybridPath(tuple(legs), tuple(happenings), tuple(margins))
         still = still + 1 if leg.end <= leg.start else 0
-        short = short + 1 if leg.end - leg.start <= _SHORT * leg.end else 0
+        length = leg.end - leg.start
+        if length > 0.0:
+            if length > _SHORT * leg.end or length < _SHRUNK * longest:
+                short, longest = 0, length
+            short += 1
         try:
             if still > _STUCK or short > _MANY:
                 raise Diverged(f"the truth makes no progress at {leg.end:g} s, where its modes alternate at once")

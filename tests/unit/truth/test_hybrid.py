@@ -62,3 +62,27 @@ def test_a_route_that_alternates_without_progress_is_told(length: float) -> None
 
     with pytest.raises(Diverged, match=r"no progress at 0\.1 s"):
         follow(Alternating(), 1.0)
+
+
+def test_rebounds_that_shrink_by_a_hundredth_make_progress() -> None:
+    """Stretches that shrink are followed however many there are."""
+
+    class Rebounding:
+        count = 0
+
+        def begin(self) -> Transition[str]:
+            return Transition(np.zeros(1), "flight", (), np.inf)
+
+        def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+            self.count += 1
+            length = 1e-3 * 0.99**self.count
+            return Stretch(
+                time, until if length < 1e-12 else time + length, mode, state, state, None if length < 1e-12 else 0
+            )
+
+        def change(self, leg: Stretch[str]) -> Transition[str]:
+            return Transition(leg.last, "flight", (), np.inf)
+
+    route = Rebounding()
+    follow(route, 1.0)
+    assert route.count > 2000

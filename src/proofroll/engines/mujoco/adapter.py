@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 from proofroll.core.engine_abilities import Level, Term, require_provided
+from proofroll.core.errors import InputError
 from proofroll.core.events import Event
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
@@ -266,18 +267,20 @@ def _spec(scene: Scene, body: RollingBall, settings: MujocoSettings) -> Any:
 
 
 def mjspec(scene: Scene, **settings: Any) -> mujoco.MjSpec:
-    """MjSpec of a scene of one mechanism, as the formulation ``joints`` builds it; its keyframe ``start`` is time 0.
+    """MjSpec of a scene of one mechanism, as the formulation builds it; its keyframe ``start`` is time 0.
 
     Bodies and joints have the scene's names; of several MuJoCo joints that make up one, .0, .1 … follow. Reactions come
     from sensors ``FORCE0``, ``TORQUE0`` … of the joints in their order.
 
     Args:
         scene: holds one mechanism.
-        **settings: of the adapter, as ``dt`` and ``preset``.
+        **settings: of the adapter, as ``dt`` and ``preset``; without ``formulation`` it is ``joints``.
 
     Raises:
-        InputError: a setting that does not exist.
+        InputError: a setting or formulation of mechanisms that does not exist.
         Refused: MuJoCo cannot represent it, or only with something that is set from outside in every step.
     """
     resolved = resolve_settings(Mujoco, {"formulation": "joints", **settings}, scene.requires)
-    return MujocoMechanism(scene, resolved).spec()
+    if resolved.formulation not in _MECHANISMS:
+        raise InputError("formulation", resolved.formulation, f"take one of {', '.join(_MECHANISMS)}")
+    return _MECHANISMS[resolved.formulation](scene, resolved).spec()

@@ -23,6 +23,7 @@ from proofroll.elements.mechanism.contacts.family import Family, family_text
 from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
+from proofroll.elements.mechanism.signal import breaks
 from proofroll.engines.projection.alternating import SETTLED, AlternatingMotion, Excess
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
@@ -64,7 +65,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         step: float,
     ) -> None:
         """Takes the size of a fixed ``step`` [s]; 0: it adapts."""
-        super().__init__(equations, stepper, accept)
+        super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._faint = max(_STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))

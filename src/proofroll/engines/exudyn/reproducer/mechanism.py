@@ -26,7 +26,7 @@ integration = Integration(mbs, SETTINGS, dependent=DEPENDENT)
 
 
 def run(times):
-    """What is followed, at each time."""
+    """Followed quantities at each time."""
     for t in times:
         integration.advance(t)
         yield seen()

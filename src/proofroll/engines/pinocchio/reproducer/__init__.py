@@ -22,7 +22,7 @@ def seen(model, ball, q, v):
 
 
 def run(times):
-    """What is seen at each time."""
+    """Observed quantities at each time."""
 '''
 _ROWS = """    mechanism = {mechanism}(BODY, bool(SETTINGS.orientation))
     motion = {motion}(mechanism, SETTINGS)

@@ -34,7 +34,7 @@ def seen(motion):
 
 
 def run(times):
-    """What is seen at each time."""
+    """Observed quantities at each time."""
     motion = MechanismMotion(MECHANISM, SETTINGS)
     for t in times:
         motion.advance(t)
