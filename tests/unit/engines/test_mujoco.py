@@ -460,6 +460,9 @@ def test_a_mechanism_as_a_spec_and_as_a_file(name):
     assert np.array_equal(own.key_qpos[0], run._data.qpos)
     with pytest.raises(InputError, match="steps"):
         mjspec(scene, steps=3)
+    with pytest.raises(InputError, match="joints, geoms"):
+        mjspec(scene, formulation="free")
+    assert len(mjspec(load_scene("sled"), formulation="geoms").geoms) > len(mjspec(load_scene("pendulum")).geoms)
 
 
 def test_a_mechanism_lists_no_settings_of_contact():

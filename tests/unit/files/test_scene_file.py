@@ -332,3 +332,6 @@ def test_two_kinds_have_rows_of_one_table(monkeypatch: pytest.MonkeyPatch) -> No
     tables["contacts"].append({"of": ["another"]})
     with pytest.raises(InputError, match=r"scene.toml: contacts.2 = .*name a thing of one of them"):
         scene_file._elements(*given)
+    tables["contacts"] = ball
+    with pytest.raises(InputError, match=r"scene.toml: contacts = .*\[\[contacts\]\]"):
+        scene_file._elements(*given)
