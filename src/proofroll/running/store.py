@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import dataclasses
 import fcntl
@@ -10,7 +11,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from weakref import WeakValueDictionary
 
@@ -40,6 +41,9 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._held: WeakValueDictionary[str, StoredTrajectory] = WeakValueDictionary()
+        place = folder.absolute()
+        if made := [each for each in (place, *place.parents) if not each.exists()]:
+            atexit.register(_remove_empty, made)
         try:
             folder.mkdir(parents=True, exist_ok=True)
             probe, name = tempfile.mkstemp(dir=folder)
@@ -153,6 +157,13 @@ def _holding(folder: Path, how: int) -> Iterator[None]:
         yield
     finally:
         os.close(opened)
+
+
+def _remove_empty(folders: Sequence[Path]) -> None:
+    """Removes folders that were made for results, the innermost first, if a wrong name left them empty."""
+    with contextlib.suppress(OSError):
+        for folder in folders:
+            folder.rmdir()
 
 
 @contextlib.contextmanager

@@ -465,6 +465,14 @@ def test_a_mechanism_as_a_spec_and_as_a_file(name):
     assert len(mjspec(load_scene("sled"), formulation="geoms").geoms) > len(mjspec(load_scene("pendulum")).geoms)
 
 
+def test_six_digits_are_said(monkeypatch):
+    """A MuJoCo without the function that sets digits writes a model whose first line says how many it has."""
+    monkeypatch.setattr("proofroll.engines.mujoco.running._DIGITS", "_gone")
+    text = Mujoco.model_file(load_scene("heavy_top", mass=1 / 3), PRESETS["joints"]["default"])
+    assert text.startswith("<!-- 6 digits: MuJoCo")
+    assert mujoco.MjModel.from_xml_string(text).nbody == 2
+
+
 def test_a_mechanism_lists_no_settings_of_contact():
     """Settings of a run are those of its formulation; what is resolved from them again is the same."""
     settings = PRESETS["joints"]["matched"]

@@ -154,6 +154,17 @@ def test_a_folder_that_is_a_file(tmp_path: Path) -> None:
         Store(tmp_path / "cases")
 
 
+@pytest.mark.parametrize("there", [False, True])
+def test_a_wrong_name_leaves_no_folder(tmp_path: Path, there: bool) -> None:
+    """A command that ends before anything is stored takes the folders away that it made, and no others."""
+    out = tmp_path / "new"
+    if there:
+        out.mkdir()
+    command = [sys.executable, "-m", "proofroll.cli", "ladder", "nosuch", "--out", str(out / "results")]
+    assert subprocess.run(command, capture_output=True, check=False).returncode == 2
+    assert list(tmp_path.rglob("*")) == [out] * there
+
+
 def made(store: Store, case: Case, content: bytes) -> Result:
     """A trajectory that was made in a folder of its own, and put in place."""
     with store.incoming(case) as written:

@@ -41,13 +41,14 @@ def compiled(spec: Any) -> Any:
 def written(spec: Any) -> str:
     """MJCF of a compiled spec, with all digits of a double; MuJoCo by itself writes six.
 
-    Its number of digits is a function of its library that Python does not show; where it is gone, six are left.
+    Its number of digits is a function of its library that Python does not show; where it is gone, six are left and
+    the first line says so.
     """
     folder = Path(mujoco.__file__).parent
     library = next((file for file in folder.iterdir() if file.name.removeprefix("lib").startswith("mujoco.")), None)
     digits = getattr(ctypes.CDLL(str(library)), _DIGITS, None) if library else None
     if digits is None:
-        return str(spec.to_xml())
+        return f"<!-- {_USUAL} digits: MuJoCo {mujoco.__version__} has no function that sets them -->\n{spec.to_xml()}"
     digits(_ALL)
     try:
         return str(spec.to_xml())

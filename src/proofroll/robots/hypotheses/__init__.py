@@ -25,6 +25,10 @@ from proofroll.robots.robot_file import RobotFile
 _Part = TypeVar("_Part", RobotBody, RobotJoint)
 # The least mass and moment with which MuJoCo compiles a body that moves: it stands for none [kg], [kg m²].
 LEAST = 1e-14
+# The remedy where an engine computes inertia from shapes in its own way.
+WRITE_INERTIALS = (
+    "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML, six digits) to get one"
+)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)

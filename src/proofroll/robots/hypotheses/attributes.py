@@ -9,13 +9,13 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.mjcf_classes import with_classes
 from proofroll.robots.model import Array, Robot, RobotBody
 from proofroll.robots.two_formulations import skew
 
 _POSES = ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis")
-_REWRITE = "write it at each element, or compile once with MuJoCo and save (mj_saveLastXML)"
+_REWRITE = "write it at each element, or compile once with MuJoCo and save (mj_saveLastXML, six digits)"
 
 
 def _without(elements: Iterable[Element], *attributes: str) -> bool:
@@ -56,9 +56,7 @@ def euler_sequence_in_small_letters(evidence: RobotEvidence) -> Robot | None:
     return evidence.edited(edit)
 
 
-@hypothesis(
-    {"pinocchio": "3.9.0 to 4.1.0"}, "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML)"
-)
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, WRITE_INERTIALS)
 def inertia_groups_ignored(evidence: RobotEvidence) -> Robot | None:
     """Inertiagrouprange is ignored: shapes of all groups weigh."""
     return evidence.edited(lambda root: _without(root.iter("compiler"), "inertiagrouprange"))
@@ -135,9 +133,7 @@ def _unnormalised(axis: Array, angle: float) -> Array:
 _UNIT_BALL = 2.5**0.5
 
 
-@hypothesis(
-    {"pinocchio": "3.9.0 to 4.1.0"}, "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML)"
-)
+@hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, WRITE_INERTIALS)
 def meshes_weigh_one_kilogram(evidence: RobotEvidence) -> Robot | None:
     """Every mesh weighs 1 kg, with unit inertia about its origin."""
     collides = {name: list(source.get("collides", ())) for name, source in evidence.robot.sources.items()}

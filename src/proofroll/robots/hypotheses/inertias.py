@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from proofroll.robots.hypotheses import LEAST, RobotEvidence, hypothesis, with_weightless
+from proofroll.robots.hypotheses import LEAST, WRITE_INERTIALS, RobotEvidence, hypothesis, with_weightless
 from proofroll.robots.model import Array, Robot, RobotBody
 
 
@@ -100,7 +100,7 @@ def bounded_from_below(root: Element, *, replace: bool) -> None:
                 compiler.set(name, str(LEAST))
 
 
-@hypothesis({"pinocchio": "4.1.0"}, "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML)")
+@hypothesis({"pinocchio": "4.1.0"}, WRITE_INERTIALS)
 def bounds_ignored(evidence: RobotEvidence) -> Robot | None:
     """Bounds on masses and inertias (boundmass, boundinertia) are ignored where a body has no <inertial>."""
     root = copy.deepcopy(evidence.root)
@@ -130,7 +130,7 @@ def inertial_rotation_ignored(evidence: RobotEvidence) -> Robot | None:
 
 @hypothesis(
     {"pinocchio": "4.1.0", "drake": "1.51.1"},
-    "compile the file once with MuJoCo, save it (mj_saveLastXML), and give others the saved file",
+    "compile the file once with MuJoCo, save it (mj_saveLastXML, six digits), and give others the saved file",
 )
 def total_mass_ignored(evidence: RobotEvidence) -> Robot | None:
     """Settotalmass is ignored: masses are as written."""

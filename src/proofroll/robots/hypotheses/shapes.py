@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.hypotheses import RobotEvidence, hypothesis
+from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.hypotheses.inertias import bounded_from_below
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 
@@ -61,10 +61,7 @@ def inertia_from_collision(evidence: RobotEvidence) -> Robot | None:
     return robot.with_bodies(bodies) if bodies else None
 
 
-@hypothesis(
-    {"pinocchio": "4.1.0"},
-    "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML) to get one",
-)
+@hypothesis({"pinocchio": "4.1.0"}, WRITE_INERTIALS)
 def noncolliding_shapes_weightless(evidence: RobotEvidence) -> Robot | None:
     """Shapes that collide with nothing (contype 0, conaffinity 0) give no mass."""
     sources = evidence.robot.sources
