@@ -16,14 +16,16 @@ import yaml
 
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.files.trajectory_file import read
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
 from proofroll_drill.arithmetic import matrix as the_matrix
-from proofroll_drill.arithmetic.differences import beyond_bars, differences
+from proofroll_drill.arithmetic.differences import beyond_bars, differences, late
 from proofroll_drill.arithmetic.kinds import PYTHONS, REPOSITORY, Arithmetic, kinds, took_effect
 from proofroll_drill.arithmetic.matrix import Tried, comparison_files, matrix
 from proofroll_drill.arithmetic.record import WRONG, decided, until_wrong
+from proofroll_drill.table import arithmetic_lines
 
 # A ball that rolls, one that slips and sticks, one on a curved wall; a body in space, a tree, a loop.
 SCENES = ("sphere_in_cylinder", "inclined_plane", "bowl", "heavy_top", "four_bar")
@@ -96,6 +98,20 @@ def test_a_run_whose_package_is_missing_is_no_difference(tmp_path: Path) -> None
     )
 
 
+@pytest.mark.parametrize("changes", [{"status": "timeout", "verdict": "failed"}, {"limit": 1.0}])
+def test_a_run_out_of_time_is_no_difference(changes: dict[str, Any], tmp_path: Path) -> None:
+    """A run whose time was up in one kind, or a rung of its ladder, is named and compared with nothing."""
+    late_one = record(**changes)
+    late_one["claim"]["late"] = ["engine point 0 #0"]
+    for records in ((record(), late_one), (late_one, record())):
+        assert list(differences("no-heyoka", tmp_path, tmp_path, records)) == []
+        assert late(records) == ["claim: engine point 0 #0"]
+    tried = Tried("no-heyoka", "without heyoka", late=late((record(), late_one)))
+    assert list(arithmetic_lines([tried])) == [
+        "no-heyoka: claim: engine point 0 #0: ran out of time, so it is compared with nothing"
+    ]
+
+
 @pytest.mark.parametrize(
     ("found", "kept"),
     [
@@ -120,6 +136,11 @@ def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     runner = Runner(Store(tmp_path), jobs=1)
     outcome = compare(claim, runner)
     found = decided(outcome, runner.store)
+    assert found["late"] == []
+    (run,) = outcome.runs
+    slow = replace(run.rungs[0], result=replace(run.rungs[0].result, status=Status.TIMEOUT))
+    rungs = replace(run, rungs=[slow, *run.rungs[1:]])
+    assert decided(replace(outcome, runs=[rungs]), runner.store)["late"] == list(found["decisions"])
     ((place, run),) = found["decisions"].items()
     assert (run["status"], run["verdict"]) == ("done", outcome.runs[0].verdict)
     assert found["truths"]["point 0"]["decisions"]["events"] == {"ball": ["slip"]}

@@ -64,8 +64,9 @@ def arithmetic_table(found: Sequence[Tried]) -> Table:
 
 
 def arithmetic_lines(found: Sequence[Tried]) -> Iterator[str]:
-    """Each difference and each test that failed."""
+    """Each run that ran out of time, each difference and each test that failed."""
     for item in found:
+        yield from (f"{item.kind}: {run}: ran out of time, so it is compared with nothing" for run in item.late)
         for one in item.differences:
             yield f"{item.kind}: {one.comparison}: {one.what}: {one.found}, and in the reference {one.reference}"
         yield from (f"{item.kind}: {line}" for line in item.failed)

@@ -42,12 +42,29 @@ def differences(kind: str, reference: Path, other: Path, records: tuple[Any, Any
             yield Difference(kind, comparison, what, f"known to {allowed:.2g}", f"off by {gap:.2g}")
 
 
+def late(records: tuple[Any, Any]) -> list[str]:
+    """Runs that ran out of time in one of two records, with their comparison: a busy machine's, no decision."""
+    return [
+        f"{comparison}: {run}"
+        for comparison in records[0]
+        for run in dict.fromkeys(run for record in records for run in record.get(comparison, {}).get("late", ()))
+    ]
+
+
 def _in_both(one: Any, two: Any) -> tuple[Any, Any]:
-    """Records of the runs whose packages both kinds have."""
-    runs = [record.get("decisions", {}) for record in (one, two)]
-    gone = {name for record in runs for name, said in record.items() if said["status"] == Status.MISSING}
-    left = [{name: said for name, said in record.items() if name not in gone} for record in runs]
-    return {**one, "decisions": left[0]}, {**two, "decisions": left[1]}
+    """Records of the runs whose packages both kinds have and that ended in time in both."""
+    both = one, two
+    gone = {name for record in both for name in record.get("late", ())}
+    for record in both:
+        gone |= {name for name, said in record.get("decisions", {}).items() if said["status"] == Status.MISSING}
+    left = [
+        {
+            part: {name: said for name, said in record.get(part, {}).items() if name not in gone}
+            for part in ("decisions", "limits")
+        }
+        for record in both
+    ]
+    return {**one, **left[0]}, {**two, **left[1]}
 
 
 def _decisions(record: Any) -> dict[str, Any]:
@@ -69,7 +86,7 @@ def _limits(mine: Any, its: Any) -> Iterator[tuple[str, float, float]]:
     """Limits of small steps that are further apart than the error bars of both."""
     for run, limits in mine["limits"].items():
         for name, (limit, bar) in limits.items():
-            found = its.get("limits", {}).get(run, {}).get(name)
+            found = its["limits"].get(run, {}).get(name)
             if found is not None and abs(limit - found[0]) > bar + found[1]:
                 yield f"{run}: limit of {name}", abs(limit - found[0]), bar + found[1]
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from proofroll.files.data_folders import data_folder
 from proofroll.running.case import Status
-from proofroll_drill.arithmetic.differences import Difference, differences
+from proofroll_drill.arithmetic.differences import Difference, differences, late
 from proofroll_drill.arithmetic.kinds import REPOSITORY, Arithmetic, make_ready, took_effect
 
 _RECORD = "from proofroll_drill.arithmetic.record import main; import sys; main(*sys.argv[1:])"
@@ -33,6 +33,7 @@ class Tried:
         differences: what of them is not as in the reference.
         failed: tests that failed, by name; or the end of pytest's output where no test ran.
         passed: the last line of pytest; empty: no tests were asked for.
+        late: runs that ran out of time, here or in the reference: they are compared with nothing.
     """
 
     kind: str
@@ -42,6 +43,7 @@ class Tried:
     differences: list[Difference] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
     passed: str = ""
+    late: list[str] = field(default_factory=list)
 
     @property
     def same(self) -> bool:
@@ -93,11 +95,13 @@ def _matrix(
         record = _recorded(kind, comparisons, folder, jobs)
         if reference is None:
             reference = place / kind.name, record
-        parted = list(differences(kind.name, reference[0], folder, (reference[1], record)))
+        records = reference[1], record
+        parted = list(differences(kind.name, reference[0], folder, records))
         failed, passed = _tested(kind, tests, folder, jobs) if tests else ([], "")
         decisions = (said for item in record.values() for said in item["decisions"].values())
-        runs = sum(said["status"] != Status.MISSING for said in decisions)
-        found.append(Tried(kind.name, kind.says, "", runs, parted, failed, passed))
+        slow = late(records)
+        runs = sum(said["status"] != Status.MISSING for said in decisions) - len(slow)
+        found.append(Tried(kind.name, kind.says, "", runs, parted, failed, passed, slow))
     return found
 
 

@@ -45,7 +45,11 @@ def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
 
 
 def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
-    """``decisions`` and ``limits`` of each run; ``truths``: what they decide, and in which files their numbers lie."""
+    """``decisions`` and ``limits`` of each run; ``truths``: what they decide, and in which files their numbers lie.
+
+    ``late``: runs that ran out of time, themselves, a rung of their ladder or the truth that they are held against.
+    """
+    late = []
     points = {name: f"point {number}" for number, name in enumerate(outcome.points)}  # an edge is a found number
     decisions: dict[str, Any] = {}
     limits: dict[str, Any] = {}
@@ -54,6 +58,10 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
         number = sum(key.startswith(f"{run.row.engine} ") for key in decisions)
         key = f"{run.row.engine} {points[point_name(run.parameters)]} #{number}"
         decisions[key] = _decisions(run, outcome, store)
+        point = outcome.points.get(point_name(run.parameters))
+        ended = [run.result, *(rung.result for rung in run.rungs), *([point.result] if point else [])]
+        if any(result.status == Status.TIMEOUT for result in ended):
+            late.append(key)
         limits[key] = {
             item.observable: [item.limit_error, _bar(item)] for item in run.judgements if item.limit_error is not None
         }
@@ -62,7 +70,7 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
         if point.reference is not None:
             said = {"ill_posed": point.reference.ill_posed, "events": _events(point.scene, point.reference.dataset)}
             truths[points[name]] = {"decisions": said, "file": point.trajectory.file.name}
-    return {"decisions": decisions, "limits": limits, "truths": truths}
+    return {"decisions": decisions, "limits": limits, "truths": truths, "late": late}
 
 
 def _decisions(run: Run, outcome: Outcome, store: Store) -> dict[str, Any]:
