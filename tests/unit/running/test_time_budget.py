@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -52,6 +53,18 @@ def test_what_a_case_did_not_take_is_for_others(monkeypatch: pytest.MonkeyPatch)
         budget.end(name)
     budget.wait()
     assert 80 < budget.begin("c", 8) <= 88
+
+
+def test_what_is_left_is_read_between_two_changes() -> None:
+    """Who asks what is left waits until another thread has changed which cases run."""
+    budget, found = TimeBudget(100.0), list[float]()
+    reading = threading.Thread(target=lambda: found.append(budget.left), daemon=True)
+    with budget._lock:
+        reading.start()
+        reading.join(0.1)
+        assert not found
+    reading.join(10.0)
+    assert found
 
 
 @pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.drill), 2])

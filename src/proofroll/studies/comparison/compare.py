@@ -40,6 +40,7 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
         for name, case in planned.truths.items()
     }
     judged: list[Run] = []
+    unfinished = left_out(results)
     for run in planned.runs:
         point = points[point_name(run.parameters)]
         if isinstance(run.facts, ProofrollError):
@@ -69,7 +70,9 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             run,
             result,
             judgements=judgements,
-            contradictions=contradictions_of(comparison, run, judgements, missing),
+            contradictions=contradictions_of(
+                comparison, run, judgements, missing, bool(unfinished & run.keys(planned.truths))
+            ),
             missing=missing,
             shared=reference.shared(run.facts.shares),
             rungs=_rungs(run, results, errors),
@@ -79,11 +82,6 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             causes = diagnosed(reference.scene, result.certificate, main, true, run.facts.step, judgements)
             judged_run = replace(judged_run, diagnosis=causes)
         judged.append(judged_run)
-    unfinished = left_out(results)
-    judged = [
-        replace(judged_run, contradictions=[]) if unfinished & run.keys(planned.truths) else judged_run
-        for run, judged_run in zip(planned.runs, judged, strict=True)
-    ]
     judged = [run if run.result.trajectory is None else _with_trajectory(run, held) for run in judged]
     return Outcome(comparison, planned.scene, planned.file, judged, points, _beyond_budget(planned, results))
 
@@ -151,11 +149,11 @@ def _absent(run: Planned) -> Run:
 
 
 def _without_result(run: Planned, point: ComparedPoint, result: Result) -> Run:
-    """A row that was refused, or failed."""
+    """A row that was refused, failed, or was left out for lack of time, which contradicts nothing."""
     causes = diagnosed(point.scene, result.certificate, step=run.ladder[1.0].engine.step)
     failed = _run(run, result, diagnosis=causes)
     expected = run.row.expected(run.parameters)
-    if failed.verdict in expected:
+    if failed.verdict in expected or result.status is Status.LEFT_OUT:
         return failed
     where = f"{run.row.engine}{at_point(run.parameters)}"
     said = f"{where} {result.status}, expected: {' or '.join(expected)} ({result.message})"

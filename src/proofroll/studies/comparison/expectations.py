@@ -12,22 +12,43 @@ from proofroll.studies.comparison.planning import Planned, at_point
 
 # Where nobody can be judged; that contradicts no claim, and is expected of every engine.
 NOBODY = frozenset({Verdict.ILL_POSED, Verdict.NOT_JUDGED, Verdict.ANOTHER_SCENE})
+# Verdicts that the rest of a ladder may still make of one without it.
+_OPEN = {
+    Verdict.UNCONFIRMED: {Verdict.AGREES, Verdict.UNCONFIRMED, Verdict.DIFFERS},
+    Verdict.DIFFERS: {Verdict.CONVERGES, Verdict.DIFFERS},
+}
 
 
 def contradictions_of(
-    comparison: Comparison, run: Planned, judgements: list[Judgement], missing: Collection[str]
+    comparison: Comparison,
+    run: Planned,
+    judgements: list[Judgement],
+    missing: Collection[str],
+    unfinished: bool = False,
 ) -> list[str]:
-    """Contradictions of the claim, as sentences."""
+    """Contradictions of the claim, as sentences.
+
+    Args:
+        comparison: the claim.
+        run: its row.
+        judgements: of the row's observables.
+        missing: observables that are to be judged and that the run does not give.
+        unfinished: a part of the ladder was left out for lack of time; then only what no ladder can change counts.
+    """
     where = f"{run.row.engine}{at_point(run.parameters)}"
     sentences = []
     row, expected = run.row, run.row.expected(run.parameters)
+
+    def contradicts(verdict: Verdict, claim: Collection[Verdict]) -> bool:
+        return not {*claim} & (_OPEN.get(verdict, {verdict}) if unfinished else {verdict})
+
     known = [judgement for judgement in judgements if judgement.verdict not in NOBODY]
     overall = worst(known, missing)
     # Where something cannot be judged, the rest contradicts only by being worse than expected.
     whole = len(known) == len(judgements)
     worse = bool(known) and SEVERITY.index(overall) > max(map(SEVERITY.index, expected))
     # What is missing is said below, name by name.
-    if overall not in {*expected, Verdict.INCOMPLETE} and (whole or worse):
+    if contradicts(overall, {*expected, Verdict.INCOMPLETE}) and (whole or worse):
         # Which observables make it so; where it is better than expected, all of them do.
         guilty = [judgement for judgement in known if judgement.verdict == overall]
         guilty.sort(key=lambda item: item.error / item.tolerance, reverse=True)
@@ -37,12 +58,12 @@ def contradictions_of(
     for judgement in judgements:
         name, verdict = judgement.observable, judgement.verdict
         alone = row.expect_for.get(name)
-        if alone is not None and verdict not in {*alone, *NOBODY}:
+        if alone is not None and contradicts(verdict, {*alone, *NOBODY}):
             sentences.append(f"{where}: {name} {verdict}, expected: {' or '.join(alone)} ({judgement.reason})")
-        if name in row.order and not _within(judgement.order, row.order[name]):
+        if name in row.order and not unfinished and not _within(judgement.order, row.order[name]):
             (low, high), order = row.order[name], number(judgement.order, 3, "not known")
             sentences.append(f"{where}: order of {name} is {order}, expected {low:g} to {high:g}")
-        if name in row.limit:
+        if name in row.limit and not unfinished:
             allowed = row.limit[name].absolute(judgement.scale)
             if judgement.limit_error is None or judgement.limit_error > allowed:
                 off = number(judgement.limit_error, 3, "not known")

@@ -452,3 +452,30 @@ def test_a_point_where_the_truth_is_lost(tmp_path: Path, status: Status) -> None
     for said in outcome.contradictions:
         assert "at speed=4" in said
         assert said.endswith("expected: agrees (there is no truth here: the ball is back on the wall)")
+
+
+LEFT_OUT = Result(Status.LEFT_OUT, "the 60 s of processor time did not suffice")
+EXPECTED = {"agrees": [Verdict.AGREES], "converges": [Verdict.CONVERGES], "failed": [Verdict.FAILED]}
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (Result(Status.CRASHED, "no licence"), {"agrees": "crashed", "converges": "crashed"}),
+        (LEFT_OUT, {}),
+        (None, {"converges": "unconfirmed", "failed": "unconfirmed"}),
+        (1e-3, {"agrees": "differs", "failed": "differs"}),
+    ],
+    ids=["crashed", "left out", "right", "off"],
+)
+def test_what_a_budget_left_out_hides_no_contradiction(
+    tmp_path: Path, given: Result | float | None, said: Mapping[str, str]
+) -> None:
+    """A row without its finest run contradicts by what no finer run can change: failure, or error at its step."""
+    for name, expected in EXPECTED.items():
+        row = dataclasses.replace(ROW, ladder=[1.0, 0.5, 0.25], expect=expected)
+        answer: Answer = (lambda *_: given) if isinstance(given, Result) else higher(given or 0.0)
+        rungs: dict[float, Answer] = {0.5: answer, 0.25: lambda *_: LEFT_OUT}
+        found = judged(tmp_path / name, claim([row], [4.0]), answer, rungs=rungs).contradictions
+        heads = [f"alpha at speed=4 {said[name]}, expected: {name}"] if name in said else []
+        assert [sentence.partition(" (")[0] for sentence in found] == heads
