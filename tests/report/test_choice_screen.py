@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -88,6 +90,33 @@ def test_an_engine_is_hidden_on_the_whole_page(seen: Visit) -> None:
     assert seen.page.locator("[data-engine='beta']:visible").count() > 1
     box.check()
     assert rows.count() == before
+
+
+def test_the_answer_and_the_frames_are_of_the_chosen_engines(seen: Visit, matrix: ChoiceMatrix) -> None:
+    """Without the cheapest engine the next one is framed and named; with all the sentence is the matrix's own."""
+    decade = int(seen.page.locator("#tolerance").input_value())
+    forces = seen.page.locator("#forces").is_checked()
+    others = replace(matrix, rows=[row for row in matrix.rows if row.engine != "alpha"])
+    assert others.answer(10.0**-decade, forces) != matrix.answer(10.0**-decade, forces), "alpha was named"
+    box = seen.page.get_by_role("checkbox", name="alpha")
+    box.uncheck()
+    seen.wait("document.getElementById('answer').textContent.includes('This is of')")
+    text = seen.page.locator("#answer").inner_text()
+    assert text.startswith(others.answer(10.0**-decade, forces))
+    framed = seen.page.locator("#choice td.best")
+    wanted = [at for at in others.best(10.0**-decade, forces) if at is not None]
+    assert framed.count() == len(wanted)
+    assert framed.locator("xpath=..").evaluate_all("rows => rows.every((row) => row.dataset.engine !== 'alpha')")
+    box.check()
+    seen.wait("!document.getElementById('answer').textContent.includes('This is of')")
+    assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, forces)
+
+
+def test_one_tolerance_on_the_first_screen(report_page: Path) -> None:
+    """The answer, the slider and the sentences below speak of the same one."""
+    text = report_page.read_text(encoding="utf-8")
+    first = text[text.index("<header>") : text.index("</header>")]
+    assert set(re.findall(r"to (?:<span[^>]*>)?(1e-\d)", first)) == {"1e-4"}
 
 
 def test_cells_lead_to_their_evidence(seen: Visit) -> None:

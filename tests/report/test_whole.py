@@ -11,7 +11,7 @@ import pytest
 from invented import further, stability_study, tradeoff_study
 
 from proofroll.core.errors import ProofrollError
-from proofroll.report.page.choice_matrix import choice_matrix
+from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
 from proofroll.report.page.growing import Report, begun
 from proofroll.report.page.html import page
@@ -97,7 +97,7 @@ def test_exactly_three_sentences_from_the_data(report: Report) -> None:
     assert "closest is alpha fine matched" in found[0]
     assert found[1].startswith("1 differs from the truth and runs to the end without a word, worst alpha fine default")
     assert found[1].endswith("1 of 2 boundaries of stability and accuracy are passed without a word.")
-    assert found[2] == report.content.choice.answer(1e-3, forces=True)
+    assert found[2] == report.content.choice.answer(FIRST_TOLERANCE, forces=True)
     nothing = three_sentences([], {}, choice_matrix([], {}))
     assert len(nothing) == 3
     assert all(sentence.endswith(".") for sentence in nothing)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
 from proofroll.report.page.candidates import Candidate
-from proofroll.report.page.choice_matrix import EVERYDAY, NEEDS, ChoiceMatrix
+from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, NEEDS, ChoiceMatrix
 
 
 @dataclass(frozen=True)
@@ -68,9 +67,8 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
     for column in choice.columns:
         forces = not choice.unjudged[True].issuperset(column.studies)
-        _, cell = choice.cheapest(column, EVERYDAY, forces)
-        if math.isfinite(cell.cost):
-            text += f" For {NEEDS[forces]} to {100 * EVERYDAY:g} %, the cheapest is {cell.name}: {cell.text} s of "
+        for _, cell in choice.ranked(column, FIRST_TOLERANCE, forces)[:1]:
+            text += f" For {NEEDS[forces]} to {number(FIRST_TOLERANCE)}, the cheapest is {cell.name}: {cell.text} s of "
             text += "computing per simulated second."
     return text
 

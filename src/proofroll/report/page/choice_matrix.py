@@ -18,12 +18,14 @@ from proofroll.report.pages import packed
 
 # Tolerances among which a reader chooses: powers of ten, as parts of the path or of the largest force.
 DECADES = range(2, 9)
-# The one that a reader sees first, and the tolerance for which the first paragraphs name a setting.
+# The one that a reader sees first, and for which sentences name a setting.
 FIRST = 4
-EVERYDAY = 1e-3
+FIRST_TOLERANCE = 10.0**-FIRST
 # All that a reader can ask for: forces, too, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
 NEEDS = ("motion", "motion and forces")
+UNIT = "in seconds of computing per second of motion"
+NOTHING = "nothing that was run and timed holds it for"
 NOT_RUN = "none"
 SEVERITY = list(map(str, Verdict))
 _WHY = {
@@ -128,33 +130,42 @@ class ChoiceMatrix:
         """Rows of engines' models with all their settings, without solutions of the scenes' own equations."""
         return [row for row in self.rows if not row.setting and not row.own_equations]
 
-    def cheapest(self, column: ChoiceColumn, tolerance: float, forces: bool) -> tuple[str, ChoiceCell]:
-        """Name and cell of the formulation that holds a tolerance at the least cost, which is infinite if none does."""
-        cells = [(row.name, self.cell(row, column, tolerance, forces)) for row in self.models]
-        return min(cells, key=lambda item: item[1].cost, default=("", ChoiceCell(NOT_RUN, "", "")))
+    def ranked(self, column: ChoiceColumn, tolerance: float, forces: bool) -> list[tuple[int, ChoiceCell]]:
+        """Formulations that hold a tolerance: place of the row, and its cell; the cheapest first."""
+        rows = {id(row): place for place, row in enumerate(self.rows)}
+        cells = [(rows[id(row)], self.cell(row, column, tolerance, forces)) for row in self.models]
+        return sorted((item for item in cells if math.isfinite(item[1].cost)), key=lambda item: item[1].cost)
 
     def best(self, tolerance: float, forces: bool) -> list[int | None]:
         """Row of each column's cheapest formulation; None where none holds the tolerance."""
-        rows = {row.name: place for place, row in enumerate(self.rows) if not row.setting}
-        cheapest = [self.cheapest(column, tolerance, forces) for column in self.columns]
-        return [rows[name] if math.isfinite(cell.cost) else None for name, cell in cheapest]
+        ranks = (self.ranked(column, tolerance, forces) for column in self.columns)
+        return [found[0][0] if found else None for found in ranks]
 
     def answer(self, tolerance: float, forces: bool) -> str:
         """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
+        groups = [column for column in self.columns if column.whole]
+        ranks = [self.ranked(column, tolerance, forces) for column in groups]
+        held = [self._phrase(column, *found[0]) for column, found in zip(groups, ranks, strict=True) if found]
+        without = [
+            column.group
+            for column, found in zip(groups, ranks, strict=True)
+            if not found and column.group in self.judged_groups[forces]
+        ]
+        nothing = f"{NOTHING} {', '.join(without)}" if without else ""
         asked = f"{NEEDS[forces]} to {number(tolerance)}"
-        said: list[str] = []
-        without: list[str] = []
-        for column in (item for item in self.columns if item.whole):
-            name, cell = self.cheapest(column, tolerance, forces)
-            if math.isfinite(cell.cost):
-                unit = "" if said else " s of computing per second of motion"
-                said.append(f"{name} for {column.group} ({cell.text}{unit})")
-            elif not self.unjudged[forces].issuperset(column.studies):
-                without.append(column.group)
-        nothing = f"nothing that was run and timed holds it for {', '.join(without)}" if without else ""
-        if not said:
+        if not held:
             return f"To hold {asked}: {nothing or 'nothing was run'}."
-        return f"The cheapest to hold {asked}: {', '.join(said)}{f'; {nothing}' if nothing else ''}."
+        return f"The cheapest to hold {asked}, {UNIT}: {', '.join(held)}{f'; {nothing}' if nothing else ''}."
+
+    def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
+        return f"{self.rows[place].name} for {column.group} ({cell.text})"
+
+    @cached_property
+    def judged_groups(self) -> tuple[list[str], list[str]]:
+        """Groups in which motion is judged, and in which forces are, too."""
+        whole = [column for column in self.columns if column.whole]
+        motion, both = ([x.group for x in whole if not lacking.issuperset(x.studies)] for lacking in self.unjudged)
+        return motion, both
 
     @cached_property
     def data(self) -> str:
@@ -167,8 +178,16 @@ class ChoiceMatrix:
             ]
             for row in self.rows
         ]
-        best, answers = ([told(at, need) for need, at in ASKED] for told in (self.best, self.answer))
-        return json.dumps({"cells": list(pool), "grid": grid, "best": best, "answers": answers}, separators=(",", ":"))
+        ranks = [
+            [
+                [(place, self._phrase(column, place, cell)) for place, cell in self.ranked(column, at, need)]
+                for column in self.columns
+            ]
+            for need, at in ASKED
+        ]
+        groups = [column.group if column.whole else "" for column in self.columns]
+        told = {"cells": list(pool), "grid": grid, "ranks": ranks, "groups": groups, "judged": self.judged_groups}
+        return json.dumps(told, separators=(",", ":"))
 
     @property
     def packed(self) -> str:
@@ -200,7 +219,7 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
     keys = sorted(rows, key=lambda key: [known.index(key[: end + 1]) for end, known in enumerate(orders)])
     titles = {name: item.title for name, item in studies.items()}
     matrix = ChoiceMatrix(columns, [rows[key] for key in keys], titles)
-    best = {at for forces in (False, True) for at in matrix.best(10.0**-FIRST, forces) if at is not None}
+    best = {at for forces in (False, True) for at in matrix.best(FIRST_TOLERANCE, forces) if at is not None}
     useful = {matrix.rows[at].name for at in best}
     return ChoiceMatrix(columns, sorted(matrix.rows, key=lambda row: row.name not in useful), titles)
 

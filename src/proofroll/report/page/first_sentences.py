@@ -9,7 +9,7 @@ from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import closest, furthest_off
 from proofroll.report.labels import off_by, with_caveat
-from proofroll.report.page.choice_matrix import EVERYDAY, ChoiceMatrix
+from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 from proofroll.report.parts import PartEntry
 from proofroll.studies.stability.records import StabilityStudy
 
@@ -25,7 +25,7 @@ def three_sentences(
         choice: the matrix of the report.
     """
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
-    return [_agrees(comparisons, choice), _silent(comparisons, maps), choice.answer(EVERYDAY, forces=True)]
+    return [_agrees(comparisons, choice), _silent(comparisons, maps), choice.answer(FIRST_TOLERANCE, forces=True)]
 
 
 def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:

@@ -19,7 +19,7 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice_matrix import ASKED, DECADES, FIRST
+from proofroll.report.page.choice_matrix import ASKED, DECADES, FIRST, FIRST_TOLERANCE, NEEDS, NOTHING, UNIT
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -133,7 +133,13 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "outlines": OUTLINES,
         "decades": DECADES,
         "first_decade": FIRST,
-        "first_tolerance": 10.0**-FIRST,
+        "first_tolerance": FIRST_TOLERANCE,
+        "answer_words": {
+            "needs": NEEDS,
+            "unit": UNIT,
+            "nothing": NOTHING,
+            "tolerances": [number_format.number(10.0**-decade) for decade in DECADES],
+        },
         "again": _again,
         "told_hosts": told_hosts,
         "part_kinds": part_kinds(),

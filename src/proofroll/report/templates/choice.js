@@ -25,24 +25,36 @@
     link.append(sign, hidden(best ? "cheapest that agrees" : state), ` ${text}`);
     cell.append(link);
   }
+  const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
+  // The cheapest of the engines that are chosen, as `ChoiceMatrix.answer` says it of all.
+  function sentence(best, { groups, judged }, place) {
+    const { needs, unit, nothing, tolerances } = {{ answer_words|tojson }};
+    const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
+    const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
+    const lacking = without.length ? `${nothing} ${without.join(", ")}` : "";
+    const asked = `${needs[+forces.checked]} to ${tolerances[Number(slider.value) - first]}`;
+    const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || "nothing was run"}.`;
+    return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
+  }
   async function show() {
     const place = (forces.checked ? count : 0) + Number(slider.value) - first;
     told.textContent = `1e-${slider.value}`;
     slider.setAttribute("aria-valuetext", told.textContent);
-    const { cells, grid, best, answers } = JSON.parse(await unpack("choices"));
-    rows.forEach((row, i) => grid[i].forEach((numbers, j) => fill(row.cells[j + 1], cells[numbers[place]], best[place][j] === i)));
-    answer.textContent = answers[place];
+    const data = JSON.parse(await unpack("choices"));
+    const best = data.ranks[place].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
+    rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i)));
+    answer.textContent = sentence(best, data, place);
     const words = JSON.parse(await unpack("all-words"))[place];
     document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
     table.dataset.at = place;
   }
   slider.addEventListener("input", show);
   form.addEventListener("change", (event) => {
-    if (event.target === forces) show();
     if (event.target.name === "engine") hide(document);
+    if (event.target !== slider) show();
   });
   function hide(within) {
-    const off = new Set([...form.querySelectorAll("[name=engine]:not(:checked)")].map((box) => box.value));
+    const off = new Set(chosen(false));
     within.querySelectorAll("[data-engine]").forEach((part) => part.classList.toggle("off", off.has(part.dataset.engine)));
   }
   everywhere(hide);
