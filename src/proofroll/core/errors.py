@@ -43,6 +43,10 @@ class Refused(ProofrollError):  # noqa: N818 -- a refusal is an honest answer, n
     """The engine cannot represent this scene honestly; the text says why."""
 
 
+class NotUnique(Refused):
+    """The laws of the scene have no unique answer, by whatever method; the text says where."""
+
+
 class Missing(ProofrollError):  # noqa: N818 -- likewise: the engine is not installed
     """The engine cannot be loaded here; the text says why and how to get it."""
 

@@ -14,7 +14,7 @@ from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique
 from proofroll.core.events import events_of
 from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
@@ -127,12 +127,14 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts, and what these do at the start; None: none, or no law says."""
+        """Equations of contacts, and what these do at the start; None: none, no law says, or joints switch as well."""
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
-        with contextlib.suppress(Refused):
-            dynamics = ContactDynamics(self.mechanism) if self.mechanism.contacts else None
-            return (dynamics, dynamics.begin()[0]) if dynamics else None
+        if not self.mechanism.contacts or self._equations.switched:
+            return None
+        dynamics = ContactDynamics(self.mechanism)
+        with contextlib.suppress(NotUnique):
+            return dynamics, dynamics.begin()[0]
         return None
 
     @cached_property

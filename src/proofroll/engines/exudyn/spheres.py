@@ -15,7 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from proofroll.core.engine import Regularised
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.contacts.acting import OPEN
@@ -79,7 +79,7 @@ class Spheres(Redundant):
         dynamics = ContactDynamics(mechanism)
         try:
             start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
-        except Refused:  # no law says what presses
+        except NotUnique:  # no law says what presses
             start = dynamics.solve(*mechanism.start(), (OPEN,) * len(mechanism.contacts))
         lacking = 0.0
         for number, contact in enumerate(mechanism.contacts):

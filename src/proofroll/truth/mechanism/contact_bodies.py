@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, across, acting
 from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Touching
@@ -46,8 +46,8 @@ class ContactBodies(ContactStretches):
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)
 
-    def _torn(self, leg: Stretch[ContactMode]) -> Refused:
-        return Refused(f"friction leaves no unique motion from t = {leg.end:.6g} s on (Painlevé)")
+    def _torn(self, leg: Stretch[ContactMode]) -> NotUnique:
+        return NotUnique(f"friction leaves no unique motion from t = {leg.end:.6g} s on (Painlevé)")
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
         line = mode[k].along

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
@@ -31,9 +31,9 @@ class ContactTree(ContactStretches):
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 
-    def _torn(self, leg: Stretch[ContactMode]) -> Refused:
+    def _torn(self, leg: Stretch[ContactMode]) -> NotUnique:
         slipping = next(c.name for c, own in zip(self.contacts, leg.mode, strict=True) if own.kind == "slip")
-        return Refused(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
+        return NotUnique(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
         found = self._forces(state, mode)

@@ -23,7 +23,8 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     """The truth at growing times [s].
 
     Raises:
-        Refused: fewer than two routes cover the mechanism, or its motion is not unique; the text says why.
+        NotUnique: the laws of contact leave more than one motion, or none.
+        Refused: fewer than two routes cover the mechanism; the text says why.
         Diverged: a route stopped.
     """
     refuse_uncovered(mechanism)

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.element import Element
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique
 from proofroll.core.events import with_events
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES
@@ -44,7 +44,7 @@ class MechanismTruth:
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`; of contacts without one, their laws alone."""
+        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`; where none is unique, laws alone."""
         # a third of a second, which no ball needs
         from proofroll.truth.mechanism.singular_poses import branching
         from proofroll.truth.mechanism.switched_truth import truth_of
@@ -52,9 +52,7 @@ class MechanismTruth:
         assert isinstance(element, MechanismElement)  # it covers it
         try:
             found = truth_of(element.mechanism, times)
-        except Refused as error:
-            if not element.mechanism.contacts:
-                raise
+        except NotUnique as error:
             return _laws_alone(element, times, str(error))
         record = found.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)

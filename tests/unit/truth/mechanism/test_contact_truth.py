@@ -15,8 +15,10 @@ from proofroll.core.events import events_of
 from proofroll.core.observable import Role
 from proofroll.core.plugins import load_engine
 from proofroll.core.truth import truth
+from proofroll.elements.mechanism.contacts import coulomb
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
@@ -317,6 +319,26 @@ def test_what_has_no_truth_is_held_to_the_laws_of_contact_alone() -> None:
         run = plugin.build(scene, plugin.presets[formulation]["matched"])
         lines = element.certify(run.built(), run.sample())  # what contacts do first is asked of none
         assert [str(line) for line in lines if not line.holds] == []
+
+
+def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scene whose laws have one answer that is merely not found stays refused, with the reason."""
+    table = load_scene("free_turntable")
+    (element,) = table.elements
+    assert isinstance(element, MechanismElement)
+    axle = replace(element.mechanism.joints[0], friction=0.1)
+    rubs = replace(element, mechanism=replace(element.mechanism, joints=(axle, *element.mechanism.joints[1:])))
+    with pytest.raises(Refused, match="dry friction or stops of joints beside contacts"):
+        truth(replace(table, elements=(rubs,)), np.array([0.0, 0.1]))
+    assert np.isnan(rubs.first_motion.acceleration).all()  # so an engine that has both is asked for no first motion
+    monkeypatch.setattr(coulomb, "_SWEEPS", 0)
+    sled = load_scene("sled")
+    (element,) = sled.elements
+    assert isinstance(element, MechanismElement)
+    with pytest.raises(Refused, match="are not found in 0 sweeps"):
+        truth(sled, np.array([0.0, 0.1]))
+    with pytest.raises(Refused, match="are not found in 0 sweeps"):
+        _ = replace(element).first_motion
 
 
 def test_residuals_of_the_truth_are_within_their_bars() -> None:

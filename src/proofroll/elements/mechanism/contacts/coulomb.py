@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.rotations import Array
 
 Outcome = Literal["open", "stick", "slip"]
@@ -45,7 +45,8 @@ def solved(
         names: for messages.
 
     Raises:
-        Refused: a contact's force has no unique answer, or no answer is found.
+        NotUnique: a contact's force has no unique answer.
+        Refused: no answer is found.
     """
     f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
     for _ in range(_SWEEPS):
@@ -110,5 +111,5 @@ def _pressing(G: Array, c: Array, mu: float, t: Array, name: str) -> Array:
     along = np.array([1.0, *(-mu * t)])
     response = float(G[0] @ along)
     if response <= 0:
-        raise Refused(PAINLEVE.format(name=name))
+        raise NotUnique(PAINLEVE.format(name=name))
     return np.asarray(-c[0] / response * along)

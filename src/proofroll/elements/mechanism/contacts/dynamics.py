@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import OPEN, ContactMode, acting, heading_of, held_directions
 from proofroll.elements.mechanism.contacts.coulomb import sure
@@ -244,7 +244,7 @@ class ContactDynamics:
             The velocities, the impulses (closed, 3), and how far from another outcome it is, relative.
 
         Raises:
-            Refused: several contacts press each other, so that the outcome hangs on an order.
+            NotUnique: several contacts press each other, so that the outcome hangs on an order.
         """
         state = self.at(q, v)
         frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
@@ -257,7 +257,7 @@ class ContactDynamics:
         for a in pressed:
             for b in pressed:
                 if a < b and np.abs(G[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]).max() > RANK * np.abs(G).max():
-                    raise Refused(
+                    raise NotUnique(
                         f"an impact presses {names[a]} and {names[b]} at once: its outcome hangs on their order"
                     )
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
