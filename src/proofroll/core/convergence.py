@@ -180,18 +180,18 @@ def tightest(curves: Sequence[FloatArray]) -> Limit:
 def scatter_of(precision: str, size: float, steps: float) -> float:
     """Round-off that single precision scatters over a run of so many steps, a random walk; zero in doubles.
 
-    ``size`` is that of the curve.
+    ``size`` is that of the numbers, :meth:`proofroll.studies.judging.reference.Reference.magnitude`.
     """
     return EPSILON[precision] * size * steps**0.5 if precision == "single" else 0.0
 
 
-def is_floor(best: float, finest: float, scale: float) -> bool:
+def is_floor(best: float, finest: float, scale: float | None) -> bool:
     """True if the least error of a refinement is a floor of single precision.
 
-    It is small against the size of the observable, and the shortest step is clearly worse: before the order of a scheme
-    shows, errors may be as large as the motion and rise a little with shorter steps, too.
+    It is small against the scale of the observable, should it have one, and the shortest step is clearly worse: before
+    the order of a scheme shows, errors may be as large as the motion and rise a little with shorter steps, too.
     """
-    return best <= _LARGE * scale and finest > _WORSE * best
+    return (not scale or best <= _LARGE * scale) and finest > _WORSE * best
 
 
 def floor_text(step: float, error: float, unit: str) -> str:
@@ -205,12 +205,12 @@ def floor_text(step: float, error: float, unit: str) -> str:
     return f"best step {number(step)} s, floor {number(error)}{'' if unit == '1' else f' {unit}'}: single precision"
 
 
-def floor_of(errors: Mapping[float, float], scale: float, unit: str) -> str:
+def floor_of(errors: Mapping[float, float], scale: float | None, unit: str) -> str:
     """Clause about the floor of a refinement in single precision; empty if its errors are none.
 
     Args:
         errors: by step [s].
-        scale: size of the observable.
+        scale: of the observable; None: it has none.
         unit: of the errors; 1: none.
     """
     best, least = min(errors, key=lambda step: errors[step]), min(errors)

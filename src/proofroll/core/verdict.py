@@ -132,13 +132,13 @@ def judge_curve(
             an error that may come of this alone is no difference.
         sampled_bar: how far its samples leave that open; no run excuses itself by more.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
-        magnitude: of the numbers whose difference the curve is, as of positions for a gap: it has their round-off.
+        magnitude: of the numbers whose round-off the curve has, if more than ``scale``: positions for a gap.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
     """
     error = largest_difference(values, true)
     off_grid = 0.0 if between is None else largest_difference(*between)
     hidden = off_grid > max(tolerance, _BETWEEN * error)
-    round_off = round_off_of(precision, max(scale, magnitude, float(np.max(np.abs(true), initial=0.0))))
+    round_off = round_off_of(precision, max(scale, magnitude))
     shown_unit = "" if unit == "1" else f" {unit}"
     rungs = _Ladder(LimitResult.NOT_SHOWN if ladder else LimitResult.NO_LADDER, lost=lost)
     if limit is not None:

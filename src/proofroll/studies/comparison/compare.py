@@ -11,7 +11,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.beside_events import beside_events
 from proofroll.core.comparison import Band, Comparison
-from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, size, tightest
+from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
 from proofroll.core.observable import Role
@@ -193,7 +193,8 @@ def _judgements(
             continue
         true, bar = reference.true(name, curve)
         scale, unit = reference.sizes.get(name, 1.0), reference.scene.observables[name].unit
-        limit = _with_floor(run, name, _limit(run, name, curves, scale), curves, true, scale, unit)
+        magnitude = reference.magnitude(name)
+        limit = _with_floor(run, name, _limit(run, name, curves, magnitude), curves, true, reference.scale(name), unit)
         judgement = judge_curve(
             name,
             unit,
@@ -209,7 +210,7 @@ def _judgements(
             own_bar=reference.own_bar(name, trajectories[1.0]),
             sampled_bar=reference.sampled_bar,
             between=held_against.between(reference, name, trajectories[1.0]),
-            magnitude=reference.magnitude(name),
+            magnitude=magnitude,
             precision=run.facts.precision if isinstance(run.facts, EngineFacts) else "double",
         )
         if name not in given and judgement.verdict is not Verdict.DIFFERS:
@@ -233,8 +234,8 @@ def _rungs(run: Planned, results: dict[str, Result], errors: dict[float, dict[st
     return rungs
 
 
-def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], scale: float) -> Limit | None:
-    """Limit of small steps of an observable of some size, if every rung of the ladder gave it."""
+def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], magnitude: float) -> Limit | None:
+    """Limit of small steps of an observable whose numbers have some size, if every rung of the ladder gave it."""
     assert isinstance(run.facts, EngineFacts)  # there are curves
     stepped = run.facts.resolution == "dt"
     # of tolerances those that the engine takes
@@ -248,7 +249,7 @@ def _limit(run: Planned, name: str, curves: dict[float, dict[str, FloatArray]], 
         return tightest(values)
     finest = run.ladder[factors[-1]]
     steps = finest.until / (finest.engine.step or finest.until)
-    scatter = scatter_of(run.facts.precision, max(scale, size(values[-1])), steps)
+    scatter = scatter_of(run.facts.precision, magnitude, steps)
     return richardson(values, run.row.ladder, run.facts.order, scatter)
 
 
@@ -258,7 +259,7 @@ def _with_floor(
     limit: Limit | None,
     curves: dict[float, dict[str, FloatArray]],
     true: FloatArray,
-    scale: float,
+    scale: float | None,
     unit: str,
 ) -> Limit | None:
     """The limit, or in single precision without one what ended the refinement."""

@@ -100,12 +100,13 @@ class Reference:
         return np.zeros_like(values), float(np.max(np.abs(known), initial=0.0))
 
     def magnitude(self, name: str) -> float:
-        """Size of the numbers whose small difference an observable is; 0: it is none."""
+        """Size of the numbers whose round-off an observable has: its own, or those whose small difference it is."""
+        numbers = [self.curves.get(name, np.zeros(0))]
         for element in self.scene.elements:
             for item in element.observables:
                 if item.difference_of and self.scene.label(element, item.name) == name:
-                    return float(np.max(np.abs(part(self.scene, element, self.dataset)[item.difference_of].to_numpy())))
-        return 0.0
+                    numbers.append(part(self.scene, element, self.dataset)[item.difference_of].to_numpy())
+        return max(self.scale(name) or 0.0, *(float(np.max(np.abs(values), initial=0.0)) for values in numbers))
 
     def own_bar(self, name: str, dataset: xr.Dataset) -> float:
         """Error bar of a run for an observable: half the width of its widest event."""

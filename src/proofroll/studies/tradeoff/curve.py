@@ -88,7 +88,7 @@ class CurvePoint:
         curves: observables of its trajectory; empty if there is none.
         errors: largest distance of each from the truth; with an adaptive step also over few samples.
         bars: error bars of the truth, by observable.
-        scales: size of each observable on the scene.
+        scales: see :meth:`proofroll.studies.judging.reference.Reference.scale`, by observable.
         dense: ``errors`` over the many samples alone.
         sparse: the run over few samples, with its errors; None with a fixed step, which samples do not change.
         timing: of the run, wall seconds per simulated second; None where it is not measured.
@@ -100,7 +100,7 @@ class CurvePoint:
     curves: dict[str, FloatArray] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)
     bars: dict[str, float] = field(default_factory=dict)
-    scales: dict[str, float] = field(default_factory=dict)
+    scales: dict[str, float | None] = field(default_factory=dict)
     dense: dict[str, float] = field(default_factory=dict)
     sparse: CurvePoint | None = None
     timing: Timing | None = None
@@ -178,7 +178,7 @@ class Curve:
         best = done.index(used[least + 1])
         while best and errors[best - 1] <= errors[best]:  # an error that cancels at one step alone is not reached
             best -= 1
-        if not is_floor(errors[best], errors[-1], done[best].scales.get(quantity, np.inf)):
+        if not is_floor(errors[best], errors[-1], done[best].scales.get(quantity)):
             return None
         return Floor(done[best], errors[best], changes[least + 1])
 
@@ -216,9 +216,10 @@ def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurveP
     if point.result.status != Status.DONE:
         return point
     curves = held_against.observed(reference, read(runner.store.trajectory(point.case)))
-    errors, bars, scales = {}, {}, {}
+    errors, bars = {}, {}
     for name, curve in curves.items():
         true, bar = reference.true(name, curve)
         errors[name], bars[name] = largest_difference(curve, true), bar
-        scales[name] = reference.scale(name) or np.inf
-    return replace(point, curves=curves, errors=errors, bars=bars, scales=scales)
+    return replace(
+        point, curves=curves, errors=errors, bars=bars, scales={name: reference.scale(name) for name in curves}
+    )

@@ -56,8 +56,8 @@ class Order(NamedTuple):
     finest: float | None = None
 
 
-def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: str) -> CurveBudget:
-    """The budget of one quantity, with its true values and unit, along a curve.
+def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: str, magnitude: float) -> CurveBudget:
+    """The budget of one quantity, with its true values, unit and the size of its numbers, along a curve.
 
     Order and limit come from runs that are sampled at ``every`` [s]. One with a longer step has fewer samples, and only
     the coarsest of them counts, as the coarse end.
@@ -84,7 +84,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     steps = [point.step or 0.0 for point in used]
     differences = [size(a - b) for a, b in itertools.pairwise(values)]
     if curve.fixed_step:
-        scatter = scatter_of(curve.facts.precision, size(true), used[-1].case.until / steps[-1])
+        scatter = scatter_of(curve.facts.precision, magnitude, used[-1].case.until / steps[-1])
         limit = richardson(values[-3:], steps[-3:], curve.facts.order, scatter)
         stalled = not observed_order(differences[-2], differences[-1], steps[-3:]) > _STALLED
         seen = differences
@@ -102,7 +102,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
     if single:
         floor = single.error
     if curve.facts.precision == "single":
-        limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", size(true))))
+        limit = replace(limit, error_bar=max(limit.error_bar, floor or 0.0, round_off_of("single", magnitude)))
     model_form, error = size(limit.values - true), used[-1].errors[quantity]
     first, departure = _coarse_end(curve, quantity, every, limit) or (used[0], values[0] - limit.values)
     coarse, fine = (_dominant(away, limit, model_form, floor, bar) for away in (departure, values[-1] - limit.values))

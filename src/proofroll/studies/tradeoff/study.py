@@ -130,7 +130,7 @@ def _budgets(outcome: Tradeoff) -> list[CurveBudget]:
                 continue
             true = outcome.reference.true(quantity, shown[-1][1])[0]
             if all(values.shape == true.shape for point, values in shown if point.case.every == every):
-                made.append(budget(curve, quantity, every, true, declared.unit))
+                made.append(budget(curve, quantity, every, true, declared.unit, outcome.reference.magnitude(quantity)))
     return made
 
 

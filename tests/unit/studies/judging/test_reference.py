@@ -34,6 +34,14 @@ def test_a_percentage_of_the_first_slip_is_of_its_time() -> None:
     assert reference().scale("event_order") is None
 
 
+def test_round_off_is_that_of_the_largest_number() -> None:
+    """It grows with the curve where that exceeds its scale, with the scale elsewhere, and with the time of an event."""
+    assert reference(z=[3.0, -7.0]).magnitude("z") == 7.0
+    assert reference(z=[0.1]).magnitude("z") == 0.2
+    assert reference(first_slip=[1.7]).magnitude("first_slip") == 1.7
+    assert reference().magnitude("event_order") == 0.0
+
+
 def against(formulation: str, **parameters: float) -> str:
     """What is said of a formulation of the least model, held against the truth of a scene."""
     scene = load_scene("sphere_in_cylinder", **parameters)

@@ -33,7 +33,7 @@ def made(
         error = float(np.max(np.abs(values - TRUE)))
         case = Case("scene", {}, "0", own, 2.0, 0.05)
         curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": bar}))
-    return budget(curve, "z", 0.05, TRUE, "m")
+    return budget(curve, "z", 0.05, TRUE, "m", 1.0)
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -76,10 +76,10 @@ def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
         error = float(np.max(np.abs(values - np.sin(3 * t))))
         case = Case("scene", {}, "0", own, 2.0, every)
         curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": 1e-13}))
-    found = budget(curve, "z", 0.05, TRUE[start:], "m")
+    found = budget(curve, "z", 0.05, TRUE[start:], "m", 1.0)
     assert (found.coarse_step, found.coarse, found.fine) == (0.4, TIME_STEP, MODEL_FORM)
     curve.points[0].curves["z"] = curve.points[0].curves["z"][:-1]
-    assert budget(curve, "z", 0.05, TRUE[start:], "m").coarse_step == STEPS[0]
+    assert budget(curve, "z", 0.05, TRUE[start:], "m", 1.0).coarse_step == STEPS[0]
 
 
 def test_no_model_form_where_there_is_none() -> None:
@@ -123,7 +123,7 @@ def test_an_adaptive_curve_has_no_order() -> None:
 def test_too_few_runs() -> None:
     """From fewer than three runs nothing is concluded."""
     facts = EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2)
-    found = budget(Curve("made", facts, None), "z", 0.05, TRUE, "m")
+    found = budget(Curve("made", facts, None), "z", 0.05, TRUE, "m", 1.0)
     assert found.model_form is None
     assert "oo few runs" in found.sentence
 
