@@ -1,4 +1,4 @@
-"""Defaults of included files: one element where that means the same."""
+"""Defaults and worlds of included files: one element where that means the same."""
 
 from __future__ import annotations
 
@@ -29,3 +29,18 @@ def test_merged(included: str, own: str, count: int, tmp_path: Path) -> None:
         '<geom size="0.1"/></body></worldbody></mujoco>'
     )
     assert len(open_robot(path).root.findall("default")) == count
+
+
+@pytest.mark.parametrize(("included", "count"), [("<worldbody>{}</worldbody>", 1), ("", 2)], ids=["a world", "none"])
+def test_worlds(included: str, count: int, tmp_path: Path) -> None:
+    """Worlds of an included file and of the file are one; two that the file has by itself stay two."""
+    body = '<body><joint/><geom size="0.1"/></body>'
+    (tmp_path / "robot.xml").write_text(f"<mujoco>{included.format(body)}</mujoco>")
+    path = tmp_path / "scene.xml"
+    own = '<worldbody><geom type="plane" size="0 0 1"/></worldbody>'
+    own += "" if included else f"<worldbody>{body}</worldbody>"
+    path.write_text(f'<mujoco><include file="robot.xml"/>{own}</mujoco>')
+    root = open_robot(path).root
+    assert len(root.findall("worldbody")) == count
+    assert sum(1 for _ in root.iter("body")) == 1
+    assert sum(1 for _ in root.iter("geom")) == 2

@@ -83,8 +83,11 @@ def _add(
     root = copy.deepcopy(root)
     root.tag = "mujoco"
     if root.find(".//include") is not None:
+        own = len(root.findall("worldbody"))
         _include(root, path, place.parent, inside, (place,))
         _merge_defaults(root)
+        if len(root.findall("worldbody")) > own:
+            _merge_worlds(root)
     contained = names_files_inside(root, place.parent, inside)
     for part in ("actuator", "extension"):
         for element in [*root.iter(part)]:
@@ -150,6 +153,17 @@ def _merge_defaults(root: Element) -> None:
             else:
                 given.attrib |= each.attrib
         whole.extend(other.findall("default"))
+        root.remove(other)
+
+
+def _merge_worlds(root: Element) -> None:
+    """Puts the worlds of included files and that of the file into one, as they mean the same.
+
+    No engine gets a file with includes; from one file with two worlds Pinocchio reads a tree twice.
+    """
+    whole, *others = root.findall("worldbody")
+    for other in others:
+        whole.extend(other)
         root.remove(other)
 
 
