@@ -8,14 +8,14 @@ import pytest
 from proofroll.core.engine import EPSILON
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
-from proofroll.elements.mechanism import Body, Joint, Mechanism
+from proofroll.elements.mechanism import Body, Joint, Loop, Mechanism
 from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.files.scene_file import load_scene
 
-pytest.importorskip("mujoco")
+mujoco = pytest.importorskip("mujoco")
 
 MUJOCO = load_engine("mujoco")
 FLOOR = Geometry("floor", "world", "plane", (0, 0, 0.2), normal=(0.1, 0.0, 1.0))
@@ -100,6 +100,47 @@ def test_wrong_geometry_and_friction_are_told():
         run = MUJOCO.build(other, preset())
         lines = MechanismElement(mechanism).certify(run.built(), run.sample())
         assert quantity in [line.quantity for line in lines if not line.holds], quantity
+
+
+@pytest.mark.parametrize("name", ["sled", "ladder", "free_turntable", "rattleback", "tilted_disc", "flick"])
+@pytest.mark.parametrize("settings", ["default", "matched"])
+def test_the_delassus_matrix_is_read_back(name, settings):
+    """What forces on what touches do to its slides is, by MuJoCo's own rows and mass matrix, as in the scene."""
+    (element,) = load_scene(name).elements
+    run = MUJOCO.build(load_scene(name), preset(settings))
+    line = next(item for item in element.certify(run.built(), run.sample()) if item.quantity == "responses of contacts")
+    assert line.difference < 1e-10, line
+
+
+def test_loops_hold_what_contacts_push():
+    """The Delassus matrix is that of bodies which a loop holds together, for MuJoCo's soft loops, too."""
+    frame = Geometry("floor", "world", "plane", (0, 0, -0.8))
+    tip = Geometry("tip", "link", "sphere", (0.3, 0.0, -0.2), radius=0.1)
+    solid = {"mass": 1.0, "inertia": (0.02, 0.02, 0.02)}
+    arms = tuple(
+        Joint(f"j{k}", "revolute", "world", name, position=(k, 0, 0), axis=(0, 1, 0)) for k, name in enumerate("ab")
+    )
+    link = Joint("k", "revolute", "a", "link", position=(0, 0, -0.5), axis=(0, 1, 0))
+    ends = {"position_a": (0, 0, -0.5), "position_b": (1, 0, 0), "axis_a": (0, 1, 0), "axis_b": (0, 1, 0)}
+    loop = Loop("l", "revolute", "b", "link", **ends)
+    mechanism = Mechanism(
+        (Body("a", **solid), Body("b", **solid), Body("link", **solid)),
+        (*arms, link),
+        (loop,),
+        geometries=(frame, tip),
+        pairs=(Pair("p", ("tip", "floor"), 0.3),),
+    )
+    assert read_back(mechanism)["responses of contacts"] < 1e-9
+
+
+def test_coefficients_are_those_that_mujoco_uses():
+    """A global override of contacts leaves the pairs' own table as it was; the certificate has what is used."""
+    mechanism = on_floor(*SLED)
+    run = MUJOCO.build(mechanism, preset())
+    run._model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_OVERRIDE)
+    run._model.opt.o_friction[:2], run._model.opt.o_margin = 0.5, 1.0
+    assert run._model.pair_friction[:, 0].tolist() == [0.3, 0.3, 0.3]
+    assert run.built().contact_friction.tolist() == [0.5, 0.5, 0.5]
 
 
 def test_geoms_have_no_mass():

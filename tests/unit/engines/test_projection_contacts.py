@@ -60,7 +60,13 @@ def test_a_start_is_certified(name: str) -> None:
     lines = element.certify(run.built(), run.sample())
     assert [str(line) for line in lines if not line.holds] == []
     told = {line.quantity for line in lines if line.difference is not None}
-    assert {"gaps", "friction of contacts", "acceleration", "law of contact: hard contact by Coulomb's law"} <= told
+    assert {
+        "gaps",
+        "responses of contacts",
+        "friction of contacts",
+        "acceleration",
+        "law of contact: hard contact by Coulomb's law",
+    } <= told
     known = ~np.isnan(element.first_press)
     np.testing.assert_allclose(run.sample().contact_force[known], element.first_press[known], atol=1e-8)
 

@@ -11,7 +11,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
 from proofroll.core.errors import Diverged
-from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.dataset import along, reactions
 from proofroll.elements.mechanism.joint import WITH_AXIS, Joint
 from proofroll.elements.mechanism.named_forces import named_forces
@@ -44,6 +45,7 @@ _SHAPES = {
     "gravity": ((3,), (1, 3)),
     **dict.fromkeys(("contact_gap", "contact_friction", "contact_restitution"), ((-1,), ())),
     **dict.fromkeys(("contact_normal", "contact_place"), ((-1, 3), (3,))),
+    "contact_response": ((-1, 3, -1, 3),),
     **dict.fromkeys(("rows", "rank", "mobility", "mass_matrix_error"), ((), (1,))),
 }
 
@@ -136,6 +138,26 @@ def _compare_contacts(
     if built.contact_family:
         lines.append(Line(f"law of contact: {built.contact_family}", "", (), (), 0.0, COMPOSED))
     compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
+    _compare_response(element, built, compare)
+
+
+def _compare_response(
+    element: MechanismElement, built: MechanismBuilt, compare: Callable[[str, str, Any, Any, float], None]
+) -> None:
+    """Compares the Delassus matrix of what touches, along the directions in which the pairs have forces."""
+    mechanism = element.mechanism
+    dynamics = ContactDynamics(mechanism)
+    state = dynamics.at(*mechanism.start())
+    shut = [k for k, each in enumerate(state.touching) if each.gap <= TOUCHING]
+    if not shut:
+        return
+    normals = [np.outer(state.touching[k].normal, state.touching[k].normal) for k in shut]
+    along = np.array([np.eye(3) if mechanism.contacts[k].friction else nn for k, nn in zip(shut, normals, strict=True)])
+    J = along @ state.J[shut]
+    expected, given = np.einsum("kin,nm,ljm->kilj", J, state.W, J), built.contact_response
+    if given is not None and np.shape(given)[0] == np.shape(given)[2] == len(mechanism.contacts):
+        given = np.einsum("kai,kilj,lbj->kalb", along, given[np.ix_(shut, range(3), shut, range(3))], along)
+    compare("responses of contacts", "1/kg", expected, given, float(np.abs(expected).max()))
 
 
 def _compare_press(

@@ -6,6 +6,7 @@ MuJoCo refuses, the top of a wide box.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import mujoco
@@ -25,13 +26,14 @@ from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.contacts.touching import Moving
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, to_quaternion
+from proofroll.elements.mechanism.sampling import DEPENDENT
 from proofroll.engines.mujoco.friction import NEAR_CONE, SMALLEST_FRICTION
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, MujocoSettings
 
 # m; MuJoCo has no sphere of radius 0.
 _VERTEX = 1e-12
 # Part of its radius that a circle's cylinder is high, either way.
-_FLAT = 1e-9
+_FLAT = 1e-10
 # m: half the width and half the depth of the box whose top stands for a plane on a moving body. A sphere that goes
 # deeper than it is wide would be pushed out at its side.
 _WIDE, _DEEP = 1e3, 1.0
@@ -128,13 +130,17 @@ def _moving(mechanism: Mechanism) -> frozenset[str]:
 
 
 class ContactsRead(NamedTuple):
-    """Contacts as MuJoCo finds them: gaps [m], normals from b to a, places [m]; coefficients of pairs."""
+    """Contacts as MuJoCo finds them.
+
+    Gaps [m], normals from b to a, places [m], coefficients, and the Delassus matrix [1/kg].
+    """
 
     gap: Array
     normal: Array
     place: Array
     friction: Array
     restitution: Array
+    response: Array
 
 
 class Contacts:
@@ -210,31 +216,43 @@ class Contacts:
             if np.hypot(T1, T2) >= NEAR_CONE * mu * N:
                 data.efc_aref[row] -= mu * np.hypot(*missed[row + 1 : row + 3])
 
-    def read(self, data: Any) -> ContactsRead:
-        """All of them, by MuJoCo's own search with a margin so wide that it finds every one; ``data`` is spoiled."""
+    def read(self, data: Any, rows_of: Callable[[Any, int], Array]) -> ContactsRead:
+        """All of them, by MuJoCo's own search with a margin so wide that it finds every one; ``data`` is spoiled.
+
+        The coefficients are those of the contacts that it finds, after its own mixing. ``rows_of`` gives the first rows
+        of all constraints.
+        """
         model, count = self._model, len(self._geoms)
-        gap, normal, place = np.full(count, np.nan), np.full((count, 3), np.nan), np.full((count, 3), np.nan)
-        margin = model.pair_margin.copy()
-        model.pair_margin[:] = _FAR
+        gap, friction, restitution = np.full((3, count), np.nan)
+        normal, place = np.full((2, count, 3), np.nan)
+        rows = np.full((count, 3, model.nv), np.nan)
+        kept = int(model.opt.cone), model.pair_margin.copy()
+        model.opt.cone, model.pair_margin[:] = mujoco.mjtCone.mjCONE_ELLIPTIC, _FAR  # rows of slips, not of edges
         try:
             mujoco.mj_fwdPosition(model, data)
         finally:
-            model.pair_margin[:] = margin
+            model.opt.cone, model.pair_margin[:] = kept
+        all_rows = rows_of(data, data.nefc)
         for index in range(data.ncon):
             contact = data.contact[index]
             number, sign = self._of_geom[int(contact.geom[1])]
             if not contact.dist >= gap[number]:  # of a cylinder's several the nearest
                 gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
                 place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]
-        return ContactsRead(gap, normal, place, *self._laws())
+                row, dim, damping = int(contact.efc_address), int(contact.dim), float(contact.solref[1])
+                friction[number] = contact.friction[0] if dim > 1 else 0.0
+                restitution[number] = -damping * model.opt.timestep - 1.0 if damping < 0 else 0.0
+                rows[number] = contact.frame.reshape(3, 3)[:dim].T @ all_rows[row : row + dim]
+        held = all_rows[: data.ne]
+        whole_rows = np.concatenate([rows.reshape(-1, model.nv), held])
+        to_joints = np.zeros_like(whole_rows)
+        mujoco.mj_solveM(model, data, to_joints, whole_rows)
+        whole = whole_rows @ to_joints.T
+        of, by = slice(0, 3 * count), slice(3 * count, None)
+        through_loops = np.linalg.pinv(whole[by, by], DEPENDENT, hermitian=True) @ whole[by, of]
+        response = (whole[of, of] - whole[of, by] @ through_loops).reshape(count, 3, count, 3)
+        return ContactsRead(gap, normal, place, friction, restitution, response)
 
     def _to_surface(self, number: int) -> float:
         """Part of the gap from its middle, where MuJoCo has the place, to a shape that is no plane."""
         return -0.5 if isinstance(self._mechanism.contacts[number].shape_a, HalfSpace) else 0.5
-
-    def _laws(self) -> tuple[Array, Array]:
-        """Coefficients of friction and restitution that the pairs have."""
-        model, dt = self._model, self._model.opt.timestep
-        friction = np.where(model.pair_dim > 1, model.pair_friction[:, 0], 0.0)
-        direct = model.pair_solref[:, 1] < 0
-        return friction, np.where(direct, -model.pair_solref[:, 1] * dt - 1.0, 0.0)

@@ -97,7 +97,7 @@ class MujocoGeoms(MujocoMechanism):
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         found = super().built()
-        read = self._contacts.read(self._evaluated())
+        read = self._contacts.read(self._evaluated(), self._rows)
         told = {f"contact_{name}": value for name, value in read._asdict().items()}
         told["contact_family"] = family(self._settings)
         if not self._evaluated().ncon:

@@ -160,7 +160,8 @@ class ImpulseSteps:
 
     def read(self) -> dict[str, Any]:
         """Normals, places and friction of the contacts' points as Pinocchio holds them; gaps of shapes at its poses."""
-        found = self.terms(self.q, self.v, self._dt)[-1]
+        J, _, inverse, found = self.terms(self.q, self.v, self._dt)
+        world = np.array([frame_of_axis(each.normal) for each in found]) @ J
         solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
         normal, place = np.zeros((2, len(found), 3))
         for k, point in enumerate(solver.points):
@@ -172,6 +173,7 @@ class ImpulseSteps:
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
+            "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
             "contact_family": family(self._settings),
         }
 

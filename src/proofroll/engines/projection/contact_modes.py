@@ -175,13 +175,15 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`proofroll.elements.mechanism.sampling.MechanismBuilt`."""
-        found = self.solve()[2]
+        now = self.at(self._stepper.y)
+        found = now.touching
         return {
             "contact_gap": np.array([each.gap for each in found]),
             "contact_normal": np.array([each.normal for each in found]),
             "contact_place": np.array([each.place for each in found]),
             "contact_friction": self.friction.copy(),
             "contact_restitution": np.array([contact.restitution for contact in self.contacts]),
+            "contact_response": np.einsum("kin,nlj->kilj", now.J, now.response),
             "contact_family": family_text(Family.HARD),
         }
 

@@ -11,6 +11,7 @@ from proofroll.core.engine import Regularised
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.observable import Role
 from proofroll.elements.mechanism.certificate import CAPS
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
 from proofroll.elements.mechanism.report.drawing import drawn
@@ -137,6 +138,24 @@ def test_what_is_built_of_another_shape_is_named(name: str, wrong: object) -> No
     element = element_of("slider_crank")
     with pytest.raises(Diverged, match=rf"^the engine's built\(\) gave {name} (with shape|that is no array)"):
         noticed(element, dataclasses.replace(right(element), **{name: wrong}))
+
+
+def test_a_wrong_delassus_matrix_is_noticed() -> None:
+    """One entry off by a thousandth is noticed; across the normals of pairs without friction nothing is asked."""
+    element = element_of("sled")
+    mechanism = element.mechanism
+    state = ContactDynamics(mechanism).at(*mechanism.start())
+    response = np.einsum("kin,nm,ljm->kilj", state.J, state.W, state.J)
+    assert not noticed(element, dataclasses.replace(right(element), contact_response=response))
+    response[0, 0, 1, 0] *= 1.001
+    wrong = dataclasses.replace(right(element), contact_response=response)
+    assert noticed(element, wrong) == {"responses of contacts"}
+    pairs = tuple(dataclasses.replace(pair, friction=0.0) for pair in mechanism.pairs)
+    smooth = MechanismElement(dataclasses.replace(mechanism, pairs=pairs))
+    built = dataclasses.replace(right(smooth), contact_response=response)
+    assert not noticed(smooth, built)
+    response[0, 2, 1, 2] *= 1.001
+    assert noticed(smooth, built) == {"responses of contacts"}
 
 
 def test_a_family_of_contact_is_a_text() -> None:
