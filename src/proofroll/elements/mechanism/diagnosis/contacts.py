@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.model import Mechanism
 # Parts of a mechanism's weight and size by which forces and gaps have to differ to be another law's.
 _FORCE, _SUNK = 1e-4, 1e-3
 _OFF = 1e-3  # factor of friction that is none
-_TURNS = 0.3  # rad: a slip that turns less tells no shape of a cone
+_TURNS = 0.3  # rad: slip and friction that turn less tell no shape of a cone
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _HELD = 1e-6  # part of a mechanism's speed below which the truth sticks
 _DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
@@ -186,9 +186,7 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
         yield Cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy, 0, _COVERS)
 
 
-@hypothesis(
-    "friction pyramid", "friction of a slip that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample"
-)
+@hypothesis("friction pyramid", "friction that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample")
 def pyramid(evidence: Evidence) -> Iterator[Cause]:
     """A pyramid in place of the cone, about axes that one angle tells."""
     for touch in touch_of(evidence):
@@ -200,9 +198,9 @@ def pyramid(evidence: Evidence) -> Iterator[Cause]:
         e1 = np.cross(n[0], e1) / np.linalg.norm(np.cross(n[0], e1))
         e2 = np.cross(n[0], e1)
         plane = np.array([e1, e2])
-        heading = np.unwrap(np.arctan2(*(u @ plane.T).T[::-1]))
+        turned_by = max(np.ptp(np.unwrap(np.arctan2(*(each @ plane.T).T[::-1]))) for each in (u, T))
         against = np.abs(T - touch.against[at]).max()
-        if np.ptp(heading) < _TURNS or against <= _FORCE * evidence.element.force:
+        if turned_by < _TURNS or against <= _FORCE * evidence.element.force:
             continue
         turned = np.array([[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in _ANGLES])
         sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)

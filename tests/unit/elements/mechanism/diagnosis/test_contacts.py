@@ -18,17 +18,19 @@ STEPS = {"default": 2e-3, "matched": 1e-3, "tuned": 1e-3}
 
 
 @functools.cache
-def sled() -> tuple[Scene, xr.Dataset]:
-    """A sled that slides and turns, and its truth."""
-    scene = load_scene("sled")
-    true = truth(scene, simulate(scene, "mujoco", until=0.1, every=EVERY, formulation="geoms")["time"].to_numpy())
-    return scene, true
+def followed(name: str, until: float, every: float) -> tuple[Scene, xr.Dataset]:
+    """A scene and its truth."""
+    scene = load_scene(name)
+    grid = simulate(scene, "mujoco", until=until, every=every, formulation="geoms")["time"].to_numpy()
+    return scene, truth(scene, grid)
 
 
-def said(engine: str, formulation: str, preset: str) -> list[str]:
-    """Causes of an engine's sled."""
-    scene, true = sled()
-    run = simulate(scene, engine, until=0.1, every=EVERY, formulation=formulation, preset=preset)
+def said(
+    engine: str, formulation: str, preset: str, name: str = "sled", until: float = 0.1, every: float = EVERY
+) -> list[str]:
+    """Causes of an engine's run."""
+    scene, true = followed(name, until, every)
+    run = simulate(scene, engine, until=until, every=every, formulation=formulation, preset=preset)
     element = scene.elements[0]
     return [cause.says for cause in diagnose(Evidence(element, [], run, true, STEPS[preset]), hypotheses_of(element))]
 
@@ -42,6 +44,14 @@ def test_mujocos_laws_of_friction_are_named(preset: str, words: str) -> None:
     """The pyramid and the convex cone are each the one cause, proven by the run's own forces and flights."""
     (only,) = said("mujoco", "geoms", preset)
     assert only.startswith(words)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("until", "every"), [(2.0, 0.05), (0.6, 0.01)])
+def test_a_pyramid_whose_slip_hardly_turns_is_named(until: float, every: float) -> None:
+    """An eccentric sphere slips along the diagonal of MuJoCo's pyramid, while its friction turns by half a radian."""
+    (only,) = said("mujoco", "geoms", "default", "eccentric_sphere", until, every)
+    assert only.startswith("friction pyramid")
 
 
 @pytest.mark.slow
