@@ -163,6 +163,18 @@ def test_a_joint_holds_without_creep_and_tells_its_friction() -> None:
         assert found.v_WB[0, 2] == pytest.approx(speed, abs=1e-9)
 
 
+def test_an_impulse_of_a_stop_is_no_friction() -> None:
+    """A mass that rubs and falls on a stop has its friction up to the step in which it hits, and no more."""
+    run = PINOCCHIO.build(_on_a_guide(q0=(0.1,), limits=(0.0, 2.0), friction=5.0), PRESETS["matched"])
+    hit = np.sqrt(2 * 0.1 / (9.81 - 5.0))
+    found = []
+    for t in np.arange(1, 1000 * hit) / 1000:
+        run.advance(float(t))
+        found.append(run.sample().friction[0])
+    np.testing.assert_allclose(found, 5.0, atol=1e-6)
+    assert run.sample().stop[0] == 0.0
+
+
 @pytest.mark.parametrize("restitution", [0.0, 0.5])
 def test_a_mass_falls_on_a_stop_of_pinocchio(restitution: float) -> None:
     """It rests there with its weight on it, or rebounds with the restitution; without being thrown."""

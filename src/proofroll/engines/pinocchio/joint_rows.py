@@ -73,12 +73,16 @@ class JointRows:
         return JointRow(joint, pin.ConstraintModel(model), sign, limit)
 
     def along_joints(self, q: Array, force: Array) -> dict[str, Array]:
-        """Forces of friction and stops along the coordinates of all joints, from those of the rows [N, N m]."""
+        """Forces of friction and stops along the coordinates of all joints, from those of the rows [N, N m].
+
+        A stop whose gap is open has none: what it does in a step that closes the gap is an impulse.
+        """
         found = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
         closed = {item.joint.number for item in self.stops if item.gap(q) <= _AT_STOP}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
-            total[item.joint.number] += item.sign * float(size)
+            if item.limit is None or item.joint.number in closed:
+                total[item.joint.number] += item.sign * float(size)
         for joint in self.switched:
             on = on_joint(joint.number in closed, joint.friction, total[joint.number])
             found["friction"][joint.number], found["stop"][joint.number] = on
