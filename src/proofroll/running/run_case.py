@@ -60,10 +60,10 @@ def _run(case: Case, out: Path, spent: _TimeAccounts) -> Result:
     scene = scene_of(case)
     times = time_grid(case.until, case.every)
     if case.engine.name == "truth":
-        spent.on("loading")
         counting = samples_between(scene, times) if case.turns else times[:0]
         between = np.array(case.between)
-        return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version))
+        spent.on("loading")
+        return _run_truth(scene, times, (counting, between), out, made_with("truth", case.engine.version), spent)
     kind, settings = loaded(case)
     versions = made_with(plain_name(case.engine.name), kind.version())
     spent.on("loading")
@@ -118,7 +118,9 @@ def _answer(error: Refused | Diverged, versions: dict[str, str]) -> Result:
     return Result(status, str(error), versions=versions)
 
 
-def _run_truth(scene: Any, times: Any, besides: tuple[Any, Any], out: Path, versions: dict[str, str]) -> Result:
+def _run_truth(
+    scene: Any, times: Any, besides: tuple[Any, Any], out: Path, versions: dict[str, str], spent: _TimeAccounts
+) -> Result:
     from proofroll.core.truth import truth
     from proofroll.files.trajectory_file import import_xarray, write
 
@@ -129,10 +131,13 @@ def _run_truth(scene: Any, times: Any, besides: tuple[Any, Any], out: Path, vers
         dataset = truth(scene, times, *besides)
     except (Refused, Diverged) as error:
         return _answer(error, versions)
+    finally:
+        spent.on("truth")
     wall = time.perf_counter() - start
     message = dataset.attrs.get("ill_posed") or f"{dataset.attrs['route']}, checked by {dataset.attrs['second_route']}"
     said = {"status": "done", "message": message, "wall_seconds": wall}
     write(dataset.assign_attrs(said | manifest("truth", {}, scene, versions)), out)
+    spent.on("writing")
     return Result(Status.DONE, message, wall_seconds=wall, versions=versions, trajectory=out.name)
 
 

@@ -236,6 +236,15 @@ def test_manifest_of_the_truth(tmp_path: Path, make_case: MakeCase) -> None:
     assert dataset["gamma"].attrs["error_bar"] > 0
 
 
+def test_the_time_of_the_truth_has_an_account(tmp_path: Path, make_case: MakeCase) -> None:
+    """The truth's time is its own; clean-up, loading and writing are what they are of any run."""
+    (facts,) = resolve([("truth", {})])
+    assert isinstance(facts, EngineFacts)
+    result = run_one(dataclasses.replace(make_case("oracle"), engine=facts), tmp_path / "run.npz")
+    assert {"loading", "truth", "writing", "clean-up"} < set(result.spent)
+    assert result.processor["truth"] > result.processor["clean-up"]
+
+
 def test_capabilities_are_checked_before_anything_is_built(tmp_path: Path, make_case: MakeCase) -> None:
     """A scene that needs what the engine does not provide is refused by the words of what is lacking."""
     case = make_case("oracle", parameters={"rolling_resistance": 1e-4, "mu_static": 0.3})
