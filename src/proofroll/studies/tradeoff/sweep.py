@@ -11,6 +11,7 @@ from proofroll.core.engine import whole_steps
 from proofroll.core.engine_abilities import offered
 from proofroll.core.errors import InputError, ProofrollError
 from proofroll.core.plugins import EngineSpec, engine_names, parse_engine
+from proofroll.core.verdict import round_off_of
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
@@ -140,7 +141,10 @@ def _further(
     finer_steps: Sequence[float] = FINER,
     gain: float = GAIN,
 ) -> list[float]:
-    """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays."""
+    """One coarser step or looser tolerance if the coarsest is not broken yet, one of ``finer_steps`` if that pays.
+
+    Nothing is seen of an error below the truth's own error bar, or below the round-off of doubles.
+    """
     if curve.facts.resolution is None or not curve.points:
         return []
     values = []
@@ -156,7 +160,8 @@ def _further(
     finer = next((step for step in map(question.step, finer_steps) if step not in curve.tried), None)
     if finer is not None and len(curve.points) > 1:
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
-        if now < (1 - gain) * before:
+        known = max(finest.bars.get(question.quantity, 0.0), round_off_of("double", scale))
+        if known < now < (1 - gain) * before:
             values.append(finer)
     return values
 

@@ -109,6 +109,23 @@ def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None
     assert found[0] == found[1] != []
 
 
+@pytest.mark.parametrize(("bar", "error"), [(1e-6, 5e-7), (1e-15, 2e-13)])
+def test_a_curve_ends_where_the_truth_or_round_off_shows_no_more(bar: float, error: float) -> None:
+    """An error below the truth's bar, or of the size of round-off, is followed by no finer step."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=default]"])
+
+    def point(step: float, error: float) -> CurvePoint:
+        facts = replace(curve.facts, settings=curve.facts.settings | {"dt": step})
+        case = Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
+        return CurvePoint(case, Result(Status.DONE, "reached"), errors={"z": error}, bars={"z": bar})
+
+    reference, found = SimpleNamespace(scale=lambda _: 1.0), []
+    for last in (error, 100 * error):
+        curve.points = [point(8 * QUESTION.every, 1.0), point(2e-4, 1600 * error), point(1e-4, last)]
+        found.append(_further(QUESTION, curve, {QUESTION.every: reference}))  # type: ignore[dict-item]
+    assert found == [[], [QUESTION.step(1 / 500)]]
+
+
 def test_a_curve_has_each_tolerance_once() -> None:
     """An engine's own tolerance that is among those of every curve is no second point."""
     (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=matched,rtol=1e-8]"])
