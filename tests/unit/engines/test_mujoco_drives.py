@@ -13,6 +13,7 @@ from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
 
 pytest.importorskip("mujoco")
@@ -92,6 +93,17 @@ def test_a_coupling_has_its_ratio_and_its_offset() -> None:
     assert found.p_WB[:, 2] == pytest.approx(truth.q[1], abs=1e-6)
     assert found.coupling == pytest.approx(truth.named[1], rel=1e-6)
     assert truth.named[1] == pytest.approx([2.0 * -2.0 * 3.0 / 9.0])
+
+
+@pytest.mark.parametrize("ratio", [-0.5, 0.01, 100.0])
+@pytest.mark.parametrize("preset", ["default", "matched"])
+def test_a_soft_gear_is_no_wrong_model_and_another_ratio_is(ratio: float, preset: str) -> None:
+    """Forces of a soft gear are granted what softness changes; where that is little, a ratio off by 1 % is found."""
+    scene, kind = load_scene("gear_pair", ratio=ratio), load_engine("mujoco")
+    (element,), settings = scene.elements, replace(PRESETS["joints"][preset], dt=1e-3)
+    one, other = (kind.build(each, settings) for each in (scene, load_scene("gear_pair", ratio=1.01 * ratio)))
+    assert [line for line in element.certify(one.built(), one.sample()) if not line.holds] == []
+    assert any(not line.holds for line in element.certify(other.built(), other.sample())) or preset == "default"
 
 
 def test_friction_and_stops_are_told_apart() -> None:

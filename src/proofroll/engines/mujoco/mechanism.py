@@ -267,19 +267,38 @@ class MujocoMechanism(SteppedModel):
         """Tolerances for MuJoCo's soft loops: its answer against that of its own matrices with hard loops.
 
         Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus
-        what softness explains and no more: rows that are wrong or missing are so in both answers.
+        what softness explains and no more: rows that are wrong or missing are so in both answers. Forces of couplings
+        have tolerances of their own, for a light wheel hardly changes the largest acceleration.
         """
+        forces = self._forces(data)
         into = np.linalg.solve(mass_matrix(self._model, data), rows.T)
         without = data.qacc - into @ data.efc_force[: data.ne]
         missing = data.efc_aref[: data.ne] - rows @ without
-        data.qacc[:] = without + into @ np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing
+        data.efc_force[: data.ne] = np.linalg.pinv(rows @ into, DEPENDENT, hermitian=True) @ missing
+        data.qacc[:] = without + into @ data.efc_force[: data.ne]
         at_rest = self._settings.impedances[0]
         because = f"loops are soft, of impedance {at_rest:g} at rest; hard ones would change that much"
         regularised = {}
         for name, hard in self._accelerations(data).items():
             difference = float(np.abs(hard - soft[name]).max() / max(np.abs(hard).max(), np.finfo(float).tiny))
             regularised[name] = Regularised(_MARGIN * difference + DEPENDENT, because)
+        if self._mechanism.couplings:
+            hard_forces = self._forces(data)
+            least = DEPENDENT * float(np.abs(hard_forces["couplings"]).max()) or 1.0
+            for name, hard in hard_forces.items():
+                difference = float(np.nanmax(np.abs(hard - forces[name])))
+                size = max(float(np.nanmax(np.abs(hard))), least)
+                regularised[name] = Regularised(_MARGIN * difference / size + DEPENDENT, because)
         return regularised
+
+    def _forces(self, data: Any) -> dict[str, Array]:
+        """Reactions of joints and forces of couplings, from accelerations and forces of rows."""
+        mujoco.mj_rnePostConstraint(self._model, data)
+        self._model.opt.disableflags &= ~_NO_SENSORS
+        mujoco.mj_sensorAcc(self._model, data)
+        self._model.opt.disableflags |= _NO_SENSORS
+        force, torque = self._reactions(data)
+        return {"forces": force, "torques": torque, "couplings": self._along(data)["coupling"]}
 
     def _evaluate(self, data: Any) -> None:
         self._drive(self._model, data)
