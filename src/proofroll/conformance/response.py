@@ -114,16 +114,18 @@ def _beside_events(scene: Scene, step: float, true: xr.Dataset) -> dict[str, flo
     """
     distances: dict[str, float] = {}
     for element in scene.elements:
-        at = [event.time for event in events_of(part(scene, element, true)) if event.time > _MOMENT]
-        if not at or not step:
+        at = np.array([event.time for event in events_of(part(scene, element, true)) if event.time > _MOMENT])
+        if not at.size or not step:
             continue
-        around = sorted({0.0, *(time + moment for time in at for moment in (-_MOMENT, _MOMENT))})
-        own = part(scene, element, _trajectory(scene.digest, tuple(around)))
-        changes = {name: np.abs(np.diff(own[name].to_numpy(), axis=0))[1::2] for name in ("v_WB", "w_WB")}
-        jumps = {name: float(np.max(change)) for name, change in changes.items()}
-        turn = step * float(np.max(np.abs(own["v_WB"].to_numpy()))) / element.length
-        errors = {"p_WB": step * jumps["v_WB"], **{name: turn * jump for name, jump in jumps.items()}}
-        distances |= {scene.label(element, name): error for name, error in errors.items()}
+        around = np.unique([0.0, *(at - _MOMENT), *(at + _MOMENT)])
+        own = part(scene, element, _trajectory(scene.digest, tuple(around.tolist())))
+        before, after = (np.searchsorted(around, at + moment) for moment in (-_MOMENT, _MOMENT))
+        rates = {name: own[name].to_numpy() for name in ("v_WB", "w_WB") if name in own}
+        jumps = {name: float(np.max(np.abs(values[after] - values[before]))) for name, values in rates.items()}
+        if "v_WB" in rates:
+            turn = step * float(np.max(np.abs(rates["v_WB"]))) / element.length
+            errors = {"p_WB": step * jumps["v_WB"], **{name: turn * jump for name, jump in jumps.items()}}
+            distances |= {scene.label(element, name): error for name, error in errors.items()}
     return distances
 
 

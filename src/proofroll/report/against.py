@@ -18,7 +18,8 @@ from proofroll.report.long_table import COLUMNS, TableLine
 # Round-off of another build may change an error by this part of the quantity's size, and by this part of itself.
 _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
 # Intervals of costs that do not meet are news where the costs differ by this factor, too: hundreds are compared, and a
-# machine is slower at one time than at another. It is more where all costs scatter: so many times their usual scatter.
+# machine is slower at one time than at another. It is more where all costs scatter: so many median deviations, which
+# are four standard ones of a normal scatter; one in 20,000 exceeds them.
 _COST, _SCATTERS = 1.5, 6.0
 # So many costs tell how much slower the machine was.
 _ENOUGH = 5

@@ -118,7 +118,7 @@ class RowSign:
         """
         U, S, Vt = np.linalg.svd(C, full_matrices=False)
         self._usual = max(self._usual, float(S[self._rank - 1]))
-        self.least = float(S[self._rank - 1]) / self._usual
+        self.least = float(S[self._rank - 1]) / self._usual if self._usual else 0.0
         left, right = U[:, : self._rank], Vt[: self._rank].T
         (left_before, right_before), self._before = self._before, (left, right)
         if not left_before.size:

@@ -67,12 +67,12 @@ class SwitchedMotion(AlternatingMotion[Mode]):
 
     def _holding(self, solved: SolvedState) -> dict[int, float]:
         """Forces that hold joints, by their numbers among the switched ones."""
-        return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=False))
+        return dict(zip(held_by(self.mode), solved.multipliers[self._equations.coupled :].tolist(), strict=True))
 
     def _load(self, mode: Mode) -> Array:
         """Kinetic friction along the velocities ν."""
         load = np.zeros(self._equations.nv)
-        for joint, own in zip(self._joints, mode, strict=False):
+        for joint, own in zip(self._joints, mode[: len(self._joints)], strict=True):
             load[joint.velocity] = joint.push(own)
         return load
 
@@ -127,7 +127,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         rests = [k for k, joint in enumerate(self._joints) if not v[k] and joint.resting(q[k]) in STOPPED]
         at_stop = sorted({hit, *rests})
         at = [self._joints[k].velocity for k in at_stop]
-        _, response = self._equations.responses(self._at(y), self._load(()), at)
+        _, response = self._equations.responses(self._at(y), np.zeros(self._equations.nv), at)
         elastic = np.array([self._joints[k].restitution for k in at_stop])
         below = np.array([q[k] <= self._joints[k].low for k in at_stop])
         low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)

@@ -44,6 +44,15 @@ def test_the_sign_of_rows_changes_where_they_lose_rank(sizes):
     assert [sign.changes(C) for C in rows] == [False, False, sizes[0] < 0, False]
 
 
+def test_rows_that_begin_without_rank_are_as_small_as_can_be():
+    """A motion that begins where the rows vanish is at a singular pose, until larger rows tell how large they are."""
+    sign, found = RowSign(1), []
+    for size in (0.0, 2.0, 1.0):
+        sign.changes(np.array([[size, 0.0]]))
+        found.append(sign.least)
+    assert found == [0.0, 1.0, 0.5]
+
+
 def parallelogram(damping):
     """Rods of 1 m, 2 m, 1 m on joints 2 m apart, that turn at 3 rad/s towards the pose in which all are in line."""
     rods = {name: Body(name, 1.0, (size / 2, 0, 0), (0.01, 0.1, 0.1)) for name, size in (("a", 1), ("b", 2), ("c", 1))}

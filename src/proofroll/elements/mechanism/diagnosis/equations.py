@@ -298,7 +298,9 @@ def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
     acceleration = np.zeros_like(twists)
-    time, (degree, ends) = placed.time[part], _fit(part) or _FITS[-1]
+    time, fit = placed.time[part], _fit(part)
+    assert fit is not None  # a stretch has one
+    degree, ends = fit
     acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(time)
     which = np.unique(np.linspace(part.start + ends, part.stop - 1 - ends, _SAMPLES).astype(int))
     return MechanismStates(mechanism, placed, acceleration, which)
