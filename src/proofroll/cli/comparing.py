@@ -17,8 +17,10 @@ if TYPE_CHECKING:
     from proofroll.core.comparison import Comparison
     from proofroll.running.case import Case, Result
     from proofroll.running.runner import Runner
+    from proofroll.running.time_budget import TimeBudget
     from proofroll.running.worker_pool import Workers
     from proofroll.studies.comparison.outcome import Outcome
+    from proofroll.studies.comparison.planning import Plan
 
 
 def compare(
@@ -130,65 +132,128 @@ def outcomes_of(
         runner: runs their cases.
         stage: is put before what the bar says.
         finished: called when one has ended, briefly or whole, with all that have by their numbers; True: the last.
-        budget: processor time of all of them [s]; all runs then come before the first ladder.
+        budget: processor time of all of them [s]; all runs then come before the first ladder, and each comparison has
+            an equal share of what is left, which those after it have if it takes less.
     """
+    from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
-    from proofroll.studies.comparison.compare import evaluate, left_out, run_plan
+    from proofroll.studies.comparison.compare import run_plan
     from proofroll.studies.comparison.planning import plan
 
-    limit = TimeBudget(budget) if budget else None
+    before = processor_seconds()
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     brief = [item.brief for item in plans]
-    grown = {at: item for at, item in enumerate(plans) if len(item.truths) > len(brief[at].truths)}
-    parts = [*enumerate(brief), *grown.items()]
-    if limit:
-        order = [cases for item in brief for cases in item.stages[:-1]]
-        order += [item.stages[-1] for item in brief]
-        order += [item.cases for item in grown.values()]
+    grown = [(at, item.cases) for at, item in enumerate(plans) if len(item.truths) > len(brief[at].truths)]
+    if budget:
+        runs = [(at, [case for cases in item.stages[:-1] for case in cases]) for at, item in enumerate(brief)]
+        ladders = [(at, item.stages[-1]) for at, item in enumerate(brief)]
+        phases = [phase for phase in (runs, ladders, grown) if phase]
     else:
-        order = [item.cases for _, item in parts]
-    place = {case.key: at for at, items in reversed([*enumerate(order)]) for case in items}
-    cases = {case.key: case for items in order for case in items}
-    missing = {number: {case.key for case in item.cases} for number, (_, item) in enumerate(parts)}
-    results: dict[str, Result] = {}
-    ended: dict[int, Outcome] = {}
-    start, reused = time.monotonic(), runner.reused
-
-    def end(key: str = "") -> None:
-        """Judges each comparison, brief or whole, whose last case this was."""
-        for number in [number for number, keys in missing.items() if keys <= {key}]:
-            del missing[number]
-            at, part = parts[number]
-            if part is plans[at] or at not in grown:
-                part = plans[at].ended(left_out(results))
-            elif not finished:
-                continue
-            ended[at] = evaluate(part, results, runner)
-            if finished:
-                finished(ended, not missing)
-
-    with options.progress_bar(f"{stage}cases", total=len(cases)) as advance:
-
-        def told(case: Case, result: Result) -> None:
-            results[case.key] = result
-            ran = len(results) - (runner.reused - reused)
-            seconds = (time.monotonic() - start) / ran * (len(cases) - len(results)) if ran else 0.0
-            seconds = min(seconds, limit.left / runner.jobs) if limit else seconds
-            of = f"{min(len(ended) + 1, len(plans))} of {len(plans)} comparisons, " if len(plans) > 1 else ""
-            advance(f"{stage}{of}{f'about {written(seconds, 1)} s left, ' if ran else ''}{case.engine.name}")
-            end(case.key)
-            for keys in missing.values():
-                keys.discard(case.key)
-
+        phases = [[*((at, item.cases) for at, item in enumerate(brief)), *grown]]
+    owner = {case.key: at for at, item in reversed([*enumerate(plans)]) for case in item.cases}
+    limit = TimeBudget(budget, processor_seconds() - before, owner) if budget else None
+    with options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
+        running = _Comparing(plans, runner, limit, finished, lambda text: advance(f"{stage}{text}"))
         for item in plans:
             if item.comparison.budget:
-                run_plan(item, runner, told)
-        runner.run((case for key, case in cases.items() if key not in results), told, limit, place)
-        end()
+                running.results |= run_plan(item, runner, lambda case, _: advance(f"{stage}{case.engine.name}"))
+        for phase in phases:
+            running.run(phase, last=phase is phases[-1])
+    if not finished:
+        for at in range(len(plans)):
+            running.judge(at)
     if runner.damaged:
         options.complain(f"{len(runner.damaged)} stored results were damaged and have been run again")
-    return [ended[at] for at in range(len(plans))]
+    return [running.ended[at] for at in range(len(plans))]
+
+
+class _Comparing:
+    """Comparisons whose cases are being run, a phase after the other.
+
+    Args:
+        plans: of the comparisons.
+        runner: runs their cases.
+        limit: processor time of all of them, or None.
+        finished: as for :func:`outcomes_of`.
+        tell: takes what a bar says after each case.
+    """
+
+    def __init__(
+        self,
+        plans: list[Plan],
+        runner: Runner,
+        limit: TimeBudget | None,
+        finished: Callable[[dict[int, Outcome], bool], None] | None,
+        tell: Callable[[str], None],
+    ) -> None:
+        self.plans, self.runner, self.limit, self.finished, self.tell = plans, runner, limit, finished, tell
+        self.results: dict[str, Result] = {}
+        self.ended: dict[int, Outcome] = {}
+        self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
+        self._truths = {case.key for item in plans for case in item.truths.values()}
+        self._start, self._reused = time.monotonic(), runner.reused
+
+    def judge(self, at: int) -> None:
+        """Judges a comparison by what has been run of it so far."""
+        from proofroll.running.case import Result, Status
+        from proofroll.studies.comparison.compare import evaluate, left_out
+
+        so_far = dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
+        self.ended[at] = evaluate(self.plans[at].ended(left_out(so_far)), so_far, self.runner)
+
+    def run(self, phase: list[tuple[int, list[Case]]], *, last: bool) -> None:
+        """Runs cases of comparisons in their order, and judges each comparison once its cases have ended.
+
+        Args:
+            phase: comparisons, by their number, with cases.
+            last: no phase comes after it.
+        """
+        from proofroll.running.case import Status
+
+        place = {
+            case.key: 2 * number + (case.key not in self._truths)
+            for number, (_, items) in reversed([*enumerate(phase)])
+            for case in items
+        }
+        cases = {case.key: case for _, items in phase for case in items if case.key not in self.results}
+        missing = {number: {case.key for case in items} & cases.keys() for number, (_, items) in enumerate(phase)}
+        missing = {number: keys for number, keys in missing.items() if keys or phase[number][0] not in self.ended}
+
+        def end(key: str = "") -> None:
+            for number in [number for number, keys in missing.items() if keys <= {key}]:
+                del missing[number]
+                if self.finished:
+                    self.judge(phase[number][0])
+                    self.finished(self.ended, last and not missing)
+            for keys in missing.values():
+                keys.discard(key)
+
+        def told(case: Case, result: Result) -> None:
+            self.results[case.key] = result
+            self._tell(case)
+            end(case.key)
+
+        postponed: list[Case] = []
+
+        def told_first(case: Case, result: Result) -> None:
+            if result.status is Status.LEFT_OUT:
+                postponed.append(case)
+            else:
+                told(case, result)
+
+        # What a comparison's share did not suffice for has a share of what the others left.
+        self.runner.run(cases.values(), told_first if self.limit else told, self.limit, place)
+        self.runner.run(postponed, told, self.limit, place)
+        end()
+
+    def _tell(self, case: Case) -> None:
+        """Says how many comparisons have ended, about how long the rest takes, and which engine ran."""
+        many, ran = len(self.plans), len(self.results) - (self.runner.reused - self._reused)
+        left = (time.monotonic() - self._start) / ran * (len(self._keys) - len(self.results)) if ran else 0.0
+        left = min(left, self.limit.left / self.runner.jobs) if self.limit else left
+        of = f"{min(len(self.ended) + 1, many)} of {many} comparisons, " if many > 1 else ""
+        self.tell(f"{of}{f'about {written(left, 1)} s left, ' if ran else ''}{case.engine.name}")
 
 
 def exit_code(outcomes: list[Outcome]) -> int:

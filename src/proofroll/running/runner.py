@@ -279,7 +279,7 @@ def _counted(budget: TimeBudget | None, worker: Worker, case: Case, limit: float
             raise WorkerDied(Status.LEFT_OUT, budget.sentence) from None
         raise
     finally:
-        budget.end(case.key, lost=worker.used == before)
+        budget.end(case.key, worker.used - before, lost=worker.used == before)
 
 
 def ended(case: Case, status: Status, error: ProofrollError) -> Result:

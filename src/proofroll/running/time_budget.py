@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections import Counter
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from proofroll.running.process import processor_seconds
 
@@ -16,19 +19,23 @@ _LEAST = 0.5
 class TimeBudget:
     """Processor time of the cases of one study; what it does not suffice for is left out.
 
-    Each case may take an equal share of what is left, among those that run side by side, so that all together never
-    take more, however long each of them does.
+    Cases belong to groups, as the comparisons of a report. A group that begins may take an equal share of what is left
+    among the groups that wait; what it does not take is for those after it. No case takes more than is left divided by
+    the cases that run side by side, so that all together never take more, however long each of them does.
 
     Args:
         seconds: of processor time, that of this process included [s].
         spent: those of them that asking the engines has taken already [s].
+        group: of cases by key; all others are one.
     """
 
-    def __init__(self, seconds: float, spent: float = 0.0) -> None:
+    def __init__(self, seconds: float, spent: float = 0.0, group: Mapping[str, int] = MappingProxyType({})) -> None:
         self.seconds = seconds
         self._start, self._lost = processor_seconds() - spent, 0.0
+        self._group = group
         self._begun: dict[str, float] = {}
-        self._unfinished = 0
+        self._unfinished: Counter[int] = Counter()
+        self._shares: dict[int, float] = {}
         self._lock = threading.Lock()
 
     @property
@@ -48,21 +55,34 @@ class TimeBudget:
         used = processor_seconds() - self._start + self._lost + sum(now - begun for begun in self._begun.values())
         return max(0.0, _OF_CASES * self.seconds - used)
 
-    def wait(self) -> None:
+    def wait(self, case: str) -> None:
         """Counts one more case that waits for a worker."""
         with self._lock:
-            self._unfinished += 1
+            self._unfinished[self._group.get(case, 0)] += 1
 
     def begin(self, case: str, abreast: int) -> float:
         """Seconds that a case may take beside at most ``abreast`` - 1 others; 0: it is not to be begun."""
+        group = self._group.get(case, 0)
         with self._lock:
-            share = self._left() / max(1, min(abreast, self._unfinished))
+            left = self._left()
+            share = self._shares.setdefault(group, left / len(self._unfinished))
+            seconds = min(left / max(1, min(abreast, self._unfinished.total())), share)
             self._begun[case] = time.monotonic()
-            return share if share > _LEAST else 0.0
+            return seconds if seconds > _LEAST else 0.0
 
-    def end(self, case: str, *, lost: bool = False) -> None:
-        """Counts a case that has ended; one that was lost has no processor time, and counts by its wall time."""
+    def end(self, case: str, used: float = 0.0, *, lost: bool = False) -> None:
+        """Counts a case that has ended.
+
+        Args:
+            case: its key.
+            used: its processor time [s].
+            lost: it has none, and counts by its wall time.
+        """
+        group = self._group.get(case, 0)
         with self._lock:
-            begun = self._begun.pop(case)
-            self._lost += time.monotonic() - begun if lost else 0.0
-            self._unfinished -= 1
+            passed = time.monotonic() - self._begun.pop(case)
+            self._lost += passed if lost else 0.0
+            self._shares[group] -= passed if lost else used
+            self._unfinished[group] -= 1
+            if not self._unfinished[group]:
+                del self._unfinished[group], self._shares[group]

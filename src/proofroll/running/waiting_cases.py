@@ -30,7 +30,7 @@ class WaitingCases:
     def add(self, case: Case) -> None:
         """Puts a case at the end."""
         if self.budget:
-            self.budget.wait()
+            self.budget.wait(case.key)
         with self._changed:
             groups = self._by_engine.setdefault(self._place.get(case.key, 0), {})
             groups.setdefault(case.engine.name, deque()).append(case)

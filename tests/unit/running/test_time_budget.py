@@ -24,8 +24,8 @@ def test_shares_are_never_more_than_is_left(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("proofroll.running.time_budget.time.monotonic", lambda: now)
     monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: 0.0)
     budget = TimeBudget(100.0)
-    for _ in range(9):
-        budget.wait()
+    for name in "abcdefghi":
+        budget.wait(name)
     first = budget.begin("a", 3)
     now, used = 20.0, 0.0
     second = budget.begin("b", 3)
@@ -47,12 +47,30 @@ def test_what_a_case_did_not_take_is_for_others(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: used)
     budget = TimeBudget(100.0)
     for name in ("a", "b"):
-        budget.wait()
+        budget.wait(name)
         assert budget.begin(name, 1) > 85
         used += 1.0
         budget.end(name)
-    budget.wait()
+    budget.wait("c")
     assert 80 < budget.begin("c", 8) <= 88
+
+
+def test_each_group_has_an_equal_share(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A group that takes all that it may leaves as much to each of the others, and one that takes less leaves more."""
+    used = 0.0
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: used)
+    budget = TimeBudget(100.0, group={f"{name}{number}": number for number in range(3) for name in "ab"})
+    for number in range(3):
+        for name in "ab":
+            budget.wait(f"{name}{number}")
+    for number, spent in enumerate((30.0, 1.0, 1.0)):
+        first = budget.begin(f"a{number}", 1)
+        assert first == pytest.approx((90.0 - used) / (3 - number))
+        used += min(first, spent)
+        budget.end(f"a{number}", min(first, spent))
+        second = budget.begin(f"b{number}", 1)
+        assert second == pytest.approx(first - spent if spent < 20.0 else 0.0)
+        budget.end(f"b{number}")
 
 
 def test_what_is_left_is_read_between_two_changes() -> None:
@@ -90,5 +108,5 @@ def test_asking_the_engines_counts(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(f"proofroll.studies.comparison.{module}.processor_seconds", lambda: float(next(clock)))
     assert plan(compared("inclined_plane", {})).comparison.spent == 2.0
     budget = TimeBudget(100.0, 50.0)
-    budget.wait()
+    budget.wait("a")
     assert budget.begin("a", 1) <= 40
