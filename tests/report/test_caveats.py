@@ -12,8 +12,9 @@ from invented import stability_study, tradeoff_study
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.plugins import engine_names, load_engine
+from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.report.labels import caveat_lines, with_caveat
+from proofroll.report.labels import aside, caveat_lines, with_caveat
 from proofroll.report.stability.tables import silent_lines
 from proofroll.report.tradeoff.tables import answer_lines
 from proofroll.running.asking import resolve
@@ -21,6 +22,7 @@ from proofroll.running.case import EngineFacts
 from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.requirements import Requirements
 
+CONTACT, SLIP = MechanismCapability.CONTACT, BallCapability.BOUNDED_FRICTION
 OURS = "proofroll's own integrator"
 
 
@@ -59,35 +61,54 @@ def test_a_caveat_is_one_clause() -> None:
 
 
 @pytest.mark.parametrize(
-    ("engine", "words"),
+    ("engine", "need", "words"),
     [
-        ("mujoco[formulation=geoms,preset=default]", "contact by a pyramid of friction, time constant = 0.02 s"),
-        ("mujoco[formulation=geoms,preset=matched]", "contact by a convex cone, whose sliding parts"),
-        ("mujoco[formulation=geoms,preset=tuned]", "hard contact by Coulomb's law"),
-        ("pinocchio[formulation=impulses,preset=tuned]", "hard contact by Coulomb's law"),
-        ("pinocchio[formulation=impulses,convex=true]", "contact by a convex cone, whose sliding parts"),
-        ("exudyn[formulation=spheres]", "softened contact, k = 1e+06 N/m, v_reg = 0.0001 m/s"),
-        ("mujoco[formulation=joints]", ""),
+        (
+            "mujoco[formulation=geoms,preset=default]",
+            CONTACT,
+            "contact by a pyramid of friction, time constant = 0.02 s",
+        ),
+        ("mujoco[formulation=geoms,preset=matched]", CONTACT, "contact by a convex cone, whose sliding parts"),
+        ("mujoco[formulation=geoms,preset=tuned]", CONTACT, "hard contact by Coulomb's law"),
+        ("pinocchio[formulation=impulses,preset=tuned]", CONTACT, "hard contact by Coulomb's law"),
+        ("pinocchio[formulation=impulses,convex=true]", CONTACT, "contact by a convex cone, whose sliding parts"),
+        ("projection[formulation=dependent]", CONTACT, "hard contact by Coulomb's law"),
+        ("exudyn[formulation=spheres]", CONTACT, "softened contact, k = 1e+06 N/m, v_reg = 0.0001 m/s"),
+        ("mujoco[formulation=free,preset=default]", SLIP, "contact by a pyramid of friction, time constant = 0.02 s"),
+        ("mujoco[formulation=chart,preset=matched]", SLIP, "contact by a convex cone, whose sliding parts"),
+        ("pinocchio[formulation=contact]", SLIP, "hard contact by Coulomb's law"),
+        ("exudyn[formulation=contact,preset=default]", SLIP, "softened contact, k = 1e+06 N/m, v_reg = 0.001 m/s"),
+        ("projection[formulation=rotating_frame]", SLIP, "hard contact by Coulomb's law"),
+        ("mujoco[formulation=joints]", CONTACT, ""),
+        ("projection[formulation=dependent]", "revolute joints", ""),
+        ("mujoco[formulation=chart,preset=matched]", "rolling without slip", ""),
     ],
 )
-def test_an_engine_says_which_law_of_contact_it_has(engine: str, words: str) -> None:
-    """The family of a row's law is in its facts, with the numbers that soften it; without contact there is none."""
+def test_an_engine_says_which_law_of_contact_it_has(engine: str, need: str, words: str) -> None:
+    """The family of a row's law is in its facts, with what softens it, where a scene asks for such a law."""
     name, _, options = engine.rstrip("]").partition("[")
     (facts,) = resolve([(name, dict(option.split("=") for option in options.split(",")))])
     assert isinstance(facts, EngineFacts)
-    assert facts.family == words
+    assert facts.on({need}).family == words
 
 
 def test_formulations_of_contact_say_which_law_they_have() -> None:
-    """No formulation that is made for bodies that touch is silent about its law, in any preset."""
+    """No formulation that holds bodies which touch, or a ball that slips, is silent about its law, in any preset."""
     for name in engine_names():
         kind = load_engine(name)
-        for formulation, needs in getattr(kind, "made_for", {}).items():
-            if MechanismCapability.CONTACT in needs:
-                assert all(kind.family(settings) for settings in kind.presets[formulation].values()), (
+        for formulation, provided in kind.provides.items():
+            for need in {CONTACT, SLIP} & set(provided):
+                assert all(kind.family(settings)[need] for settings in kind.presets[formulation].values()), (
                     name,
                     formulation,
                 )
+
+
+def test_a_recommendation_says_which_law_a_choice_has() -> None:
+    """Family and caveat of a measured point are one clause beside it."""
+    point: Any = SimpleNamespace(family="hard contact", caveat="somebody else's steps")
+    assert aside(point) == "hard contact; somebody else's steps"
+    assert aside(SimpleNamespace(family="", caveat="")) == ""
 
 
 def test_families_stand_under_the_rows() -> None:

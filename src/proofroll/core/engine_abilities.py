@@ -92,8 +92,8 @@ class TellsFamily(Protocol):
     """
 
     @staticmethod
-    def family(settings: Any) -> str:
-        """Clause on the laws that a model with these settings follows; empty: the engine has one family only."""
+    def family(settings: Any) -> Mapping[str, str]:
+        """Clause on the law that a model with these settings follows, by the capability that it is of."""
 
 
 @runtime_checkable

@@ -137,6 +137,11 @@ def with_caveat(name: str, caveat: str) -> str:
     return f"{name} ({caveat})" if caveat else name
 
 
+def aside(point: Any) -> str:
+    """Family and caveat of a measured point, in one clause; empty: none."""
+    return "; ".join(filter(None, (point.family, point.caveat)))
+
+
 def caveat_lines(rows: Sequence[Setting]) -> list[str]:
     """Families and caveats of settings: one sentence for each, with the settings that have it."""
     settings: dict[str, list[str]] = {}

@@ -86,7 +86,8 @@ class EngineFacts:
             :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
         caveat: what of these settings is not the engine's own, shown beside its verdicts; empty: nothing.
-        family: of the laws that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`; empty: none.
+        families: of the laws that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
+        family: those of them that a scene asks for; empty: none.
         precision: in which it computes, see :func:`proofroll.core.engine.precision_of`.
         libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
             hash of all its packages.
@@ -101,6 +102,7 @@ class EngineFacts:
     lowered: dict[str, int] = field(default_factory=dict)
     shares: list[str] = field(default_factory=list)
     caveat: str = ""
+    families: dict[str, str] = field(default_factory=dict)
     family: str = ""
     precision: str = "double"
     libraries: dict[str, str] = field(default_factory=dict)
@@ -111,8 +113,10 @@ class EngineFacts:
         return float(self.settings["dt"]) if self.resolution == "dt" else None
 
     def on(self, requires: Collection[str]) -> EngineFacts:
-        """Facts with the order of convergence for a scene with these requirements."""
-        return replace(self, order=lowest(self.order, self.lowered, requires), lowered={})
+        """Facts with the order of convergence and the laws for a scene with these requirements."""
+        laws = dict.fromkeys(clause for need, clause in self.families.items() if need in requires)
+        order = lowest(self.order, self.lowered, requires)
+        return replace(self, order=order, lowered={}, family="; ".join(laws), families={})
 
 
 @dataclass(frozen=True)

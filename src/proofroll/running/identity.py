@@ -90,11 +90,17 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
-        family=kind.family(settings) if isinstance(kind, TellsFamily) else "",
+        families=_families(kind, settings) if isinstance(kind, TellsFamily) else {},
         precision=precision_of(settings),
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)
+
+
+def _families(kind: Any, settings: Any) -> dict[str, str]:
+    """Laws of what the formulation provides."""
+    provided = kind.provides[settings.formulation]
+    return {need: clause for need, clause in kind.family(settings).items() if need in provided}
 
 
 def used(settings: Any) -> dict[str, Any]:

@@ -31,6 +31,7 @@ from proofroll.elements.mechanism.joint import TURNING
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
+from proofroll.elements.mechanism.optional_terms import optional_terms
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.sampling import MechanismSample
 from proofroll.elements.mechanism.start_words import start_facts
@@ -54,11 +55,6 @@ ENERGY_GAIN, OPENED = "energy gain", "joints opened"
 # An engine without a step is looked at first after this part of the natural time.
 _PART = 1e-4
 _AXES = "xyz"
-
-
-# Laws of joints that the ladder of models can leave out, by their key.
-_OPTIONAL = {"armature": "armature of joints", "friction": "dry friction of joints", "damping": "damping of joints"}
-_FAR = 1000.0  # limits of efforts times this bound nothing
 
 
 @dataclass(frozen=True)
@@ -382,17 +378,8 @@ class MechanismElement:
         return program(self, failed, engine, gain, OPEN * self.length)
 
     def optional_terms(self, parameters: Mapping[str, float], truth: xr.Dataset) -> list[OptionalTerm]:  # noqa: ARG002 -- the protocol's
-        """Laws of joints and limits of efforts whose parameter has the name of their key."""
-        joints, because = self.mechanism.joints, "the scene has it"
-        terms = [
-            OptionalTerm(name, because, {}, {key: 0.0})
-            for key, name in _OPTIONAL.items()
-            if parameters.get(key) and any(getattr(joint, key) for joint in joints)
-        ]
-        if "limit" in parameters and any(item.limit is not None for item in self.mechanism.actuators):
-            because = f"the scene has them; here without, as {_FAR:g} times what they are"
-            terms.append(OptionalTerm("limits of efforts", because, {}, {"limit": _FAR * parameters["limit"]}))
-        return terms
+        """See the protocol."""
+        return optional_terms(self.mechanism, parameters)
 
 
 def the_mechanism(scene: Scene) -> MechanismElement:

@@ -20,7 +20,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.contacts.acting import OPEN
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.family import Family, family_text
+from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.shapes import HalfSpace, SphereShape
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -46,11 +46,11 @@ _DIFFERENCED = 1e-5
 _CORNERS = ((-1.0, -1.0, 0.0), (2.0, -1.0, 0.0), (-1.0, 2.0, 0.0))
 
 
-def family(settings: ExudynSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; of balls there is none."""
-    if settings.formulation != "spheres":
-        return ""
-    return family_text(Family.SOFTENED, stiffness=settings.stiffness, zone=settings.friction_zone)
+def family(settings: ExudynSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; balls and bodies have the same."""
+    if settings.formulation not in {"spheres", "contact"}:
+        return of_contact(Family.HARD)
+    return of_contact(Family.SOFTENED, stiffness=settings.stiffness, zone=settings.friction_zone)
 
 
 class _Made(NamedTuple):
@@ -157,7 +157,7 @@ class Spheres(Redundant):
             contact_place=np.array(places),
             contact_friction=np.array([self.system.GetObject(made.item)["dynamicFriction"] for made in self._contacts]),
             contact_restitution=np.zeros(len(self._contacts)),
-            contact_family=family(self._contact_settings),
+            contact_family=family(self._contact_settings)[_CAPABILITY.CONTACT],
         )
         larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by as much as it is pressed in")
         if self._builds_up:  # then the first accelerations tell nothing of what holds

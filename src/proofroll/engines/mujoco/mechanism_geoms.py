@@ -13,7 +13,7 @@ from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.certificate import CAPS
-from proofroll.elements.mechanism.contacts.family import Family, family_text
+from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.engines.mujoco import mechanism
@@ -35,13 +35,11 @@ PROVIDES = mechanism.PROVIDES | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTI
 LACKING: Mapping[str, str] = mechanism.LACKING
 
 
-def family(settings: MujocoSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; of balls there is none."""
-    if settings.formulation != "geoms":
-        return ""
+def family(settings: MujocoSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; balls and bodies have the same."""
     elliptic = Family.HARD if settings.cone_correction else Family.CONVEX
     kind = Family.PYRAMID if settings.cone == "pyramidal" else elliptic
-    return family_text(kind, time=settings.contact_time if settings.time_constant is None else None)
+    return of_contact(kind, time=settings.contact_time if settings.time_constant is None else None)
 
 
 class MujocoGeoms(MujocoMechanism):
@@ -99,7 +97,7 @@ class MujocoGeoms(MujocoMechanism):
         found = super().built()
         read = self._contacts.read(self._evaluated(), self._rows)
         told = {f"contact_{name}": value for name, value in read._asdict().items()}
-        told["contact_family"] = family(self._settings)
+        told["contact_family"] = family(self._settings)[_CAPABILITY.CONTACT]
         if not self._evaluated().ncon:
             return replace(found, **told)
         softened, unsaid = dict(found.regularised), dict[str, None]()

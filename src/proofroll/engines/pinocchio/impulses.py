@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
-from proofroll.elements.mechanism.contacts.family import Family, family_text
+from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -42,11 +42,9 @@ _CLOSED = 0.1
 _UNEQUAL = 2.0
 
 
-def family(settings: PinocchioSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; of balls there is none."""
-    if settings.formulation != "impulses":
-        return ""
-    return family_text(Family.CONVEX if settings.convex else Family.HARD)
+def family(settings: PinocchioSettings) -> Mapping[str, str]:
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; balls and bodies have the same."""
+    return of_contact(Family.CONVEX if settings.convex else Family.HARD)
 
 
 class Impulses(NamedTuple):
@@ -174,7 +172,7 @@ class ImpulseSteps:
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
-            "contact_family": family(self._settings),
+            "contact_family": family(self._settings)[_CAPABILITY.CONTACT],
         }
 
     def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:

@@ -20,6 +20,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapability, RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
+from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.engines.projection import mechanism
 from proofroll.engines.projection.geometry import geometry_of, matrix
 from proofroll.engines.projection.mechanism import ProjectionMechanism
@@ -63,6 +64,11 @@ class Projection:
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {
         "euler": {BallCapability.ORIENTATION: "the Euler angles are coordinates of the equations of motion"}
     }
+
+    @staticmethod
+    def family(_: ProjectionSettings) -> Mapping[str, str]:
+        """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
+        return of_contact(Family.HARD)
 
     @staticmethod
     def version() -> str:

@@ -19,7 +19,7 @@ from proofroll.core.integrators import Accept
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
-from proofroll.elements.mechanism.contacts.family import Family, family_text
+from proofroll.elements.mechanism.contacts.family import Family
 from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -184,7 +184,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             "contact_friction": self.friction.copy(),
             "contact_restitution": np.array([contact.restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nlj->kilj", now.J, now.response),
-            "contact_family": family_text(Family.HARD),
+            "contact_family": Family.HARD.value,
         }
 
     def _rates(self, y: Array) -> Array:

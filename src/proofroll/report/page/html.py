@@ -117,6 +117,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "values": labels.values,
         "settings": labels.settings_text,
         "name_of": labels.name_of,
+        "aside": labels.aside,
         "unbroken": _unbroken,
         "plain": plain,
     }

@@ -50,7 +50,7 @@ class BoundaryPoint:
     """One engine with its settings at one value of an axis.
 
     Attributes:
-        engine, settings, curve, level, caveat, precision, resolution: which.
+        engine, settings, curve, level, caveat, family, precision, resolution: which.
         axis, value, parameters: where.
         until: length of every run [s].
         period: natural time of the scene there [s].
@@ -73,6 +73,7 @@ class BoundaryPoint:
     curve: str
     level: str | None
     caveat: str
+    family: str
     resolution: str | None
     axis: str
     value: FloatOrInf

@@ -103,6 +103,7 @@ def _point(point: MapPoint) -> BoundaryPoint:
         curve=point.curve.engine,
         level=point.curve.level,
         caveat=facts.caveat,
+        family=facts.family,
         precision=facts.precision,
         resolution=facts.resolution,
         axis=place.axis,

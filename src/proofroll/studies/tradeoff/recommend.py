@@ -39,7 +39,12 @@ class Choice:
     def as_dict(self) -> dict[str, Any]:
         """Point, error and reason for JSON."""
         told = {name: getattr(self.point, name) for name in _OF_A_POINT}
-        return told | {"caveat": self.point.caveat, "error": self.error, "reason": self.reason}
+        return told | {
+            "caveat": self.point.caveat,
+            "family": self.point.family,
+            "error": self.error,
+            "reason": self.reason,
+        }
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,7 @@ class MeasuredPoint(MeasuredCost):
 
     Attributes:
         id: number of the point in its study.
-        engine, curve, level, settings, resolution, step, order, caveat, precision: which, and what it says of
+        engine, curve, level, settings, resolution, step, order, caveat, family, precision: which, and what it says of
             itself.
         status, message, host: how the run ended, and on which machine of a cluster.
         error: largest distance from the truth, by observable; None: not finite.
@@ -98,6 +98,7 @@ class MeasuredPoint(MeasuredCost):
     step: float | None
     order: int | None
     caveat: str = ""
+    family: str = ""
     precision: str = "double"
     status: Status
     message: str

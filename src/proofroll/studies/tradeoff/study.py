@@ -163,6 +163,7 @@ def _point(curve: Curve, point: CurvePoint, number: int, envelope: dict[str, flo
         step=point.step,
         order=facts.order,
         caveat=facts.caveat,
+        family=facts.family,
         precision=facts.precision,
         status=point.result.status,
         message=point.result.message,

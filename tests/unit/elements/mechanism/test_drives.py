@@ -242,6 +242,22 @@ def test_a_step_is_measured_by_dampers_and_servos(scene: str, damper: float | No
         ("spring_friction", {"dry friction of joints": {"friction": 0.0}}),
         ("saturated_servo", {"limits of efforts": {"limit": 20000.0}}),
         ("double_pendulum", {}),
+        ("cradle", {"restitution of contacts": {"restitution": 0.0}}),
+        (
+            "ladder",
+            {
+                "friction of contacts": {"floor_friction": 0.0, "wall_friction": 0.0},
+                "slip of contacts": {"floor_friction": 1.5, "wall_friction": 1.0},
+            },
+        ),
+        (
+            "spinning_bounce",
+            {
+                "friction of contacts": {"friction": 0.0},
+                "restitution of contacts": {"restitution": 0.0},
+                "slip of contacts": {"friction": 1.0},
+            },
+        ),
     ],
 )
 def test_the_ladder_of_models_can_leave_a_law_out(scene: str, taken: dict[str, dict[str, float]]) -> None:

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll_pybullet import ball, mechanism, spheres
 from proofroll_pybullet.ball import PybulletBall
 from proofroll_pybullet.mechanism import PybulletMechanism
@@ -40,9 +41,9 @@ class Pybullet:
         return importlib.metadata.version("pybullet")
 
     @staticmethod
-    def family(settings: PybulletSettings) -> str:
+    def family(_: PybulletSettings) -> Mapping[str, str]:
         """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
-        return spheres.FAMILY if settings.formulation == "spheres" else ""
+        return of_contact(Family.ANISOTROPIC)
 
     @staticmethod
     def build(scene: Scene, settings: PybulletSettings) -> Any:

@@ -13,6 +13,7 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.contacts.family import Family
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll_pybullet.settings import PybulletSettings
@@ -26,7 +27,6 @@ _ALONE = "its bodies are free ones, each with its spheres"
 LACKING: Mapping[str, str] = {
     str(name): _ALONE for name in (_CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.PLANAR)
 }
-FAMILY = "contact by an anisotropic cone of friction"
 # Of accelerations where three feet slide: their friction is some ten degrees off the slip.
 _ASIDE, _TURNED = 0.1, "each row of friction is found by its own response, so that it is not against the slip"
 _LARGE = 1e6  # rad/s: a bound of spin that is none
@@ -159,6 +159,6 @@ class PybulletSpheres:
         return MechanismBuilt(
             np.array(mass), np.array(com), np.array(inertia), gravity=self._world.gravity(),
             contact_friction=np.full(count, told[1] ** 2), contact_restitution=np.full(count, told[5] ** 2),
-            contact_family=FAMILY,
+            contact_family=Family.ANISOTROPIC.value,
             regularised={name: Regularised(_ASIDE, _TURNED) for name in ("acceleration", "angular_acceleration")},
         )  # fmt: skip

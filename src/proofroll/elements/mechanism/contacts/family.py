@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from enum import StrEnum
 
+from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+
 
 class Family(StrEnum):
     """Law of contact that a model has, which steps that get shorter do not change."""
@@ -15,10 +18,18 @@ class Family(StrEnum):
     SOFTENED = "softened contact"
 
 
-def family_text(
+def of_contact(
     family: Family, *, stiffness: float | None = None, zone: float | None = None, time: float | None = None
-) -> str:
-    """A family with what softens it: stiffness [N/m], slip below which friction is less [m/s], time constant [s]."""
+) -> dict[str, str]:
+    """A family with what softens it, by the capabilities that it is of.
+
+    Args:
+        family: whose.
+        stiffness: [N/m].
+        zone: speed of slip below which friction is less [m/s].
+        time: time constant [s].
+    """
     parts = (("k", stiffness, "N/m"), ("v_reg", zone, "m/s"), ("time constant", time, "s"))
     said = [f"{name} = {value:g} {unit}" for name, value, unit in parts if value is not None]
-    return f"{family.value}, {', '.join(said)}" if said else family.value
+    text = f"{family.value}, {', '.join(said)}" if said else family.value
+    return dict.fromkeys((MechanismCapability.CONTACT, BallCapability.BOUNDED_FRICTION), text)
