@@ -39,8 +39,10 @@ def test_worlds(included: str, count: int, tmp_path: Path) -> None:
     path = tmp_path / "scene.xml"
     own = '<worldbody><geom type="plane" size="0 0 1"/></worldbody>'
     own += "" if included else f"<worldbody>{body}</worldbody>"
-    path.write_text(f'<mujoco><include file="robot.xml"/>{own}</mujoco>')
+    path.write_text(f'<mujoco><include file="robot.xml"/><default/>{own}</mujoco>')
     root = open_robot(path).root
     assert len(root.findall("worldbody")) == count
+    tags = [part.tag for part in root]
+    assert tags.index("default") < tags.index("worldbody")  # engines read a class before its use
     assert sum(1 for _ in root.iter("body")) == 1
     assert sum(1 for _ in root.iter("geom")) == 2

@@ -97,12 +97,18 @@ def test_plugin_of_an_actuator(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "head", ["\n<?xml version='1.0'?>\n", "<!-- a -- b --->", "  \n<!-- <link/> -->\n<?xml version='1.0'?>"]
+    ("head", "tail"),
+    [
+        ("\n<?xml version='1.0'?>\n", ""),
+        ("<!-- a -- b --->", ""),
+        ("  \n<!-- <link/> -->\n<?xml version='1.0'?>", ""),
+        ("", "\r\n\0"),
+    ],
 )
-def test_loose_xml(head: str, tmp_path: Path) -> None:
-    """XML that engines read although it is not well-formed is read: blanks before its head, dashes in comments."""
+def test_loose_xml(head: str, tail: str, tmp_path: Path) -> None:
+    """XML that engines read although it is not well-formed is read: blanks before its head, a null character after it."""
     path = tmp_path / "robot.urdf"
-    path.write_text(head + urdf())
+    path.write_text(head + urdf() + tail)
     assert len(read_urdf(open_robot(path)).moving) == 3
 
 

@@ -157,14 +157,14 @@ def _merge_defaults(root: Element) -> None:
 
 
 def _merge_worlds(root: Element) -> None:
-    """Puts the worlds of included files and that of the file into one, as they mean the same.
+    """Puts the worlds of included files and that of the file into the last of them, as they mean the same.
 
-    No engine gets a file with includes; from one file with two worlds Pinocchio reads a tree twice.
+    No engine gets a file with includes; Pinocchio reads a tree twice from two worlds, and refuses a class after its use.
     """
-    whole, *others = root.findall("worldbody")
-    for other in others:
-        whole.extend(other)
-        root.remove(other)
+    worlds = root.findall("worldbody")
+    worlds[-1][:] = [child for world in worlds for child in world]
+    for world in worlds[:-1]:
+        root.remove(world)
 
 
 def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
