@@ -28,9 +28,8 @@ def broken(tmp_path: Path) -> dict[str, str]:
     for name, text in _WRONG.items():
         (tmp_path / f"bad_{name}.py").write_text(text)
     lines = [f"[proofroll.commands]\n{name} = bad_{name}:thing" for name in _WRONG]
-    lines += [
-        f"[proofroll.{group}]\n{name} = bad_{name}:thing" for group in _GROUPS[1:] for name in ("raises", "quits")
-    ]
+    named = ("raises", "quits", "number")
+    lines += [f"[proofroll.{group}]\n{name} = bad_{name}:thing" for group in _GROUPS for name in named]
     (info / "entry_points.txt").write_text("\n".join(lines))
     return os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])}
 
@@ -42,6 +41,7 @@ def broken(tmp_path: Path) -> dict[str, str]:
         (["--help"], "stability"),
         (["run", "inclined_plane", "--engine", "reduced", "--until", "0.1"], "omega1"),
         (["check", "inclined_plane"], "is sound"),
+        (["check", "stick_slip"], "is sound"),
     ],
 )
 def test_every_command_works(words: list[str], shown: str, broken: dict[str, str]) -> None:
@@ -55,3 +55,6 @@ def test_every_command_works(words: list[str], shown: str, broken: dict[str, str
     assert len([line for line in told if "(proofroll.commands)" in line]) == len(_WRONG)
     for name, why in (("raises", "(ValueError: ouch)"), ("quits", "(SystemExit: 3)"), ("number", "is no command")):
         assert any(f"bad_{name}:thing" in line and why in line for line in told)
+    for group in {line.partition("(proofroll.")[2].partition(")")[0] for line in told} & set(_GROUPS):
+        wrong = "is no module" if group == "study_folders" else "is no class"
+        assert any(f"(proofroll.{group})" in line and wrong in line for line in told)

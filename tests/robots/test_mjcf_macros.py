@@ -106,7 +106,7 @@ def test_plugin_of_an_actuator(tmp_path: Path) -> None:
     ],
 )
 def test_loose_xml(head: str, tail: str, tmp_path: Path) -> None:
-    """XML that engines read although it is not well-formed is read: blanks before its head, a null character after it."""
+    """XML that engines read, although not well-formed, is read: blanks before its head, a null character at the end."""
     path = tmp_path / "robot.urdf"
     path.write_text(head + urdf() + tail)
     assert len(read_urdf(open_robot(path)).moving) == 3

@@ -51,7 +51,7 @@ app.add_typer(engines, name="engines")
 def _add_announced() -> None:
     """Adds the commands of other packages, and of parts of this one; what is none is left out."""
     with warnings.catch_warnings(action="ignore"):  # they are told at the end, a line each
-        for point, added in loaded("proofroll.commands"):
+        for point, added in loaded("proofroll.commands", object):
             if isinstance(added, typer.Typer):
                 app.add_typer(added, name=point.name)
             else:

@@ -16,14 +16,22 @@ def announced(group: str) -> tuple[EntryPoint, ...]:
     return tuple(sorted(_everything().select(group=group), key=lambda point: point.name))
 
 
-def loaded(group: str) -> list[tuple[EntryPoint, Any]]:
-    """The entry points of a group with what they name; one that cannot be loaded is left out, with a warning."""
+def loaded(group: str, of: type = type) -> list[tuple[EntryPoint, Any]]:
+    """The entry points of a group with what they name.
+
+    One that cannot be loaded, or names no instance of ``of`` (by default a class), is left out, with a warning.
+    """
     loaded_points = []
     for point in announced(group):
         try:
-            loaded_points.append((point, point.load()))
+            named = point.load()
         except (Exception, SystemExit) as error:  # whatever a package does when it is imported
             leave_out(point, f"cannot be loaded ({type(error).__name__}: {error})")
+        else:
+            if isinstance(named, of):
+                loaded_points.append((point, named))
+            else:
+                leave_out(point, f"is no {'class' if of is type else of.__name__}")
     return loaded_points
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 
 from proofroll.core.announced import loaded
 from proofroll.core.errors import ProofrollError
@@ -27,4 +28,5 @@ def data_folder(kind: str) -> Path:
 @cache
 def study_folders() -> tuple[Path, ...]:
     """The folders of comparisons and other studies: ``comparisons``, and those of modules that packages announce."""
-    return (data_folder("comparisons"), *(Path(module.__file__).parent for _, module in loaded(STUDY_FOLDERS)))
+    modules = (module for _, module in loaded(STUDY_FOLDERS, ModuleType))
+    return (data_folder("comparisons"), *(Path(module.__file__).parent for module in modules))

@@ -159,7 +159,7 @@ def _merge_defaults(root: Element) -> None:
 def _merge_worlds(root: Element) -> None:
     """Puts the worlds of included files and that of the file into the last of them, as they mean the same.
 
-    No engine gets a file with includes; Pinocchio reads a tree twice from two worlds, and refuses a class after its use.
+    No engine gets a file with includes. Pinocchio reads a tree twice from two worlds, refuses a class after its use.
     """
     worlds = root.findall("worldbody")
     worlds[-1][:] = [child for world in worlds for child in world]
