@@ -21,6 +21,7 @@ from proofroll.truth.mechanism.maximal_coordinates import RANK
 
 _MOST = 6  # contacts that are closed at once: each has up to four candidates
 _SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
+_SAME = 1e-6  # of the largest speed: outcomes of an impact that differ by less are one
 _SIDES = 180  # of the pyramid inside a cone of friction, by which balance at rest is tried
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
@@ -29,7 +30,7 @@ class ContactBodies(ContactStretches):
     """The stretches of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
     def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
-        super().__init__(equations, equations.mechanism, len(equations.equations.equations.start()), tolerance, size)
+        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
         self.equations = equations
 
     def begin(self) -> Transition[ContactMode]:
@@ -62,7 +63,8 @@ class ContactBodies(ContactStretches):
         speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
         fastest = self._fastest.setdefault(hit, speed)
         hits = striking(leg.mode, found.touching, hit, leg.end)
-        closed = [own.kind != "open" or k in hits for k, own in enumerate(leg.mode)]
+        rubs = self.equations.bounds > 0  # dry friction of joints is no impulse
+        closed = [(own.kind != "open" or k in hits) and not rubs[k] for k, own in enumerate(leg.mode)]
         laws = [self.contacts[k].restitution if k in hits else 0.0 for k in range(len(closed))]
         delay = 0.0
         after, solution, margin = self._struck(state, found, closed, laws)
@@ -75,6 +77,7 @@ class ContactBodies(ContactStretches):
         for k, (shut, each) in enumerate(zip(closed, found.touching, strict=True)):
             parts = float(each.normal @ solution.slide[k]) > STOPPED
             stays.append(shut and not parts)
+        stays = [stay or bool(rub) for stay, rub in zip(stays, rubs, strict=True)]
         first = ("settle" if delay else "impact", self.contacts[hit].name)
         return self._after(leg, after, stays, (first,), margin, delay)
 
@@ -88,26 +91,36 @@ class ContactBodies(ContactStretches):
             ]
             return self.equations.accelerated(found, tuple(given))
 
-        if all(still) and self._balanced(found):
-            own = self._own(found, closed)
-            return tuple(Acting("stick", each.along) for each in own), np.inf
-        return self._tried(found, closed, still, trial)[1:]
+        if any(closed) and list(still) == list(closed) and self._balanced(found, closed):
+            rubs = self.equations.friction + self.equations.bounds > 0
+            own = zip(self._own(found, closed), rubs, strict=True)
+            return tuple(
+                each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
+            ), np.inf
+        kept, _, mode = self._tried(found, closed, still, trial)[0]
+        return mode, kept
 
-    def _balanced(self, found: BodiesState) -> bool:
-        """True if nothing moves and forces within the cones of friction hold everything in place."""
+    def _balanced(self, found: BodiesState, closed: Sequence[bool]) -> bool:
+        """True if nothing moves and forces within the cones and bounds of friction hold everything in place."""
         from scipy.optimize import nnls
 
         if np.abs(found.u).max() > AT_REST:
             return False
         angles = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False)
-        columns = [found.C.T, -found.C.T]
-        for each, J, mu in zip(found.touching, found.J, self.equations.friction, strict=True):
+        columns, bounds = [found.C.T, -found.C.T], self.equations.bounds
+        for each, J, mu, shut in zip(found.touching, found.J, self.equations.friction, closed, strict=True):
+            if not shut:
+                continue
             frame = frame_of_axis(each.normal)
             sides = np.outer(np.cos(angles), frame[:, 0]) + np.outer(np.sin(angles), frame[:, 1])
             columns.append(J.T @ (each.normal + mu * sides).T)
-        matrix = np.concatenate(columns, axis=1)
-        size = float(np.linalg.norm(found.force))
-        return bool(nnls(matrix, -found.force, maxiter=100 * matrix.shape[1])[1] <= _SLACK * size)
+        size, count = float(np.linalg.norm(found.force)), sum(each.shape[1] for each in columns)
+        rubs = found.J[bounds > 0].sum(axis=1)  # their slide has one component
+        # a friction with a bound of its own has a part each way, and what is left of the bound: their sum is the bound
+        parts = np.kron([1.0, 1.0, 1.0], np.eye(len(rubs))) * size
+        matrix = np.block([[*columns, rubs.T, -rubs.T, 0 * rubs.T], [np.zeros((len(rubs), count)), parts]])
+        aims = np.concatenate([-found.force, size * bounds[bounds > 0]])
+        return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= _SLACK * size)
 
     def _struck(
         self, state: Array, found: BodiesState, closed: Sequence[bool], laws: Sequence[float]
@@ -119,11 +132,12 @@ class ContactBodies(ContactStretches):
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
             return self.equations.struck(found, mode, headings, after.tolist())
 
-        solution, _, kept = self._tried(found, closed, [True] * len(closed), trial)
+        (_, solution, _), *others = self._tried(found, closed, [True] * len(closed), trial)
         e = self.equations.equations.equations
         state = state.copy()
         state[e.nx : e.nx + e.nu] = solution.moved
-        return state, solution, kept
+        apart = max((float(np.abs(other.moved - solution.moved).max()) for _, other, _ in others), default=0.0)
+        return state, solution, 0.0 if apart > _SAME * float(np.abs(found.u).max()) else np.inf
 
     def _own(self, found: BodiesState, closed: Sequence[bool]) -> list[Acting]:
         """Mode of each contact, closed ones with their line if they can slide along a line only."""
@@ -144,38 +158,37 @@ class ContactBodies(ContactStretches):
         closed: Sequence[bool],
         still: Sequence[bool],
         trial: Trial,
-    ) -> tuple[BodiesSolution, ContactMode, float]:
-        """The best candidate: its solution, its mode, and how far it is from breaking an inequality, relative.
+    ) -> list[tuple[float, BodiesSolution, ContactMode]]:
+        """Candidates that break no inequality, the best first: how far from one, relative; solution, and mode.
 
         Raises:
-            Refused: none keeps them all, or there are too many.
+            Refused: there is none, or there are too many.
         """
         count = sum(closed)
         if count > _MOST:
             raise Refused(f"{count} contacts are closed at once; at most {_MOST} are tried")
         choices = [list(self._candidates(k, own, still[k], found)) for k, own in enumerate(self._own(found, closed))]
-        best: tuple[float, int, BodiesSolution | None, ContactMode] = (-np.inf, 0, None, ())
-        for number, mode in enumerate(itertools.product(*choices)):
+        kept: list[tuple[float, BodiesSolution, ContactMode]] = []
+        for mode in itertools.product(*choices):
             made = self._headed(found, mode, trial)
             if made is None or made[0].loose:
                 continue
             solution, headed = made
-            kept = min(
-                (self._kept(k, headed[k], still[k], found, solution) for k in range(len(mode)) if closed[k]),
-                default=np.inf,
-            )
-            best = max(best, (kept, number, solution, headed), key=lambda one: one[:2])
-        if best[2] is None or best[0] < -_SLACK:
+            apart = (self._kept(k, headed[k], still[k], found, solution) for k in range(len(mode)) if closed[k])
+            if (least := min(apart, default=np.inf)) >= -_SLACK:
+                kept.insert(0, (max(least, 0.0), solution, headed))
+        if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
-        return best[2], best[3], max(best[0], 0.0)
+        return sorted(kept, key=lambda one: -one[0])
 
     def _candidates(self, k: int, own: Acting, still: bool, found: BodiesState) -> Iterator[Acting]:
         """Modes that a contact may have next."""
-        yield OPEN
+        mu, bound = self.equations.friction[k], self.equations.bounds[k]
+        if own.kind == "open" or not bound:
+            yield OPEN
         if own.kind == "open":
             return
-        mu = self.equations.friction[k]
-        if not still or not mu:
+        if not still or not (mu or bound):
             u = across(found.touching[k])
             x, y, z = (u / (float(np.linalg.norm(u)) or 1.0)).tolist()
             yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
@@ -231,17 +244,18 @@ class ContactBodies(ContactStretches):
 
     def _kept(self, k: int, own: Acting, still: bool, found: BodiesState, solution: BodiesSolution) -> float:
         """Relative margin of a contact's inequalities; negative: one is broken."""
-        each, mu = found.touching[k], float(self.equations.friction[k])
+        each, mu, bound = found.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), float(np.abs(solution.slide).max()) or 1.0
         if own.kind == "open":
             return float(solution.parting[k]) / size_s
-        normal = float(each.normal @ solution.force[k])
+        normal = np.inf if bound else float(each.normal @ solution.force[k])
         if not size_f:
             return np.inf
         if own.kind == "stick":
-            held = float(np.linalg.norm(solution.force[k] - normal * each.normal))
-            return min(normal, mu * normal - held) / size_f
-        if not still or not mu:
+            force = solution.force[k]
+            held = float(np.linalg.norm(force - each.normal * (each.normal @ force)))
+            return min(normal, (bound or mu * normal) - held) / size_f
+        if not still or not (mu or bound):
             return normal / size_f
         assert own.heading is not None  # it is found by now
         return min(normal / size_f, float(np.dot(own.heading, solution.slide[k])) / size_s)

@@ -8,9 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.acting import ContactMode, heading_of, held_directions
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, switched_joints
 from proofroll.truth.mechanism.maximal_coordinates import RANK, NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 
@@ -67,10 +70,13 @@ class ContactEquations:
     """The equations of a mechanism's bodies with its contacts."""
 
     def __init__(self, mechanism: Mechanism, equations: NumericEquations) -> None:
-        self.mechanism, self.contacts, self.equations = mechanism, mechanism.contacts, equations
+        self.mechanism, self.equations, self._switched = mechanism, equations, switched_joints(mechanism)
+        self._of_joints = joint_contacts(self._switched)
+        self.contacts: tuple[BodyContact | JointContact, ...] = (*mechanism.contacts, *self._of_joints)
         self.friction = np.array([contact.friction for contact in self.contacts])
+        self.bounds = np.array([contact.bound for contact in self.contacts])
         index = mechanism.body_index
-        self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in self.contacts]
+        self._pairs = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
         self._com = [np.array(body.com) for body in mechanism.bodies] + [np.zeros(3)]
         self._limited = {k: motor for k, motor in enumerate(mechanism.actuators) if motor.limit is not None}
         self._driven = [mechanism.joint_index[motor.joint] for motor in self._limited.values()]
@@ -84,8 +90,9 @@ class ContactEquations:
             R, v, w = (np.array(part, dtype=float) for part in (view.R, view.v, view.w))
             arm = R @ com
             bodies.append(Moving(np.array(view.r) - arm, R, v - cross(w, arm), w))
-        touching = tuple(touch(c, bodies[a], bodies[b]) for c, (a, b) in zip(self.contacts, self._pairs, strict=True))
-        J, rates = np.zeros((len(touching), 3, e.nu)), np.zeros((len(touching), 3))
+        pairs = zip(self.mechanism.contacts, self._pairs, strict=True)
+        touching = tuple(touch(c, bodies[a], bodies[b]) for c, (a, b) in pairs)
+        J, rates = np.zeros((len(self.contacts), 3, e.nu)), np.zeros((len(self.contacts), 3))
         for k, (pair, each) in enumerate(zip(self._pairs, touching, strict=True)):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
                 if body < 0:
@@ -97,6 +104,14 @@ class ContactEquations:
                     row[e.u_slices[body]] += sign * np.array(entries, dtype=float)
                 # ω × (ω × arm) of the material, and ω × its way under the place of contact
                 rates[k] += sign * cross(view.w, each.place_rate - np.array(view.v))
+        numbers = [contact.joint.number for contact in self._of_joints]
+        coordinates = zip(*self.equations.along(state[:-1], numbers), strict=True) if numbers else ()
+        moves = e.rate_rows(state[:-1].tolist(), numbers)
+        for contact, (q, v), row in zip(self._of_joints, coordinates, moves, strict=True):
+            k = len(touching)
+            touching += (contact.touching(float(q), float(v)),)
+            J[k][:, list(row.coefficients)] = np.outer(contact.direction, list(row.coefficients.values()))
+            rates[k] = contact.direction * float(row.bias)
         mass = np.asarray(np.linalg.inv(half @ half.T), dtype=np.float64)
         C, bias = _independent(C, bias)
         centres = np.array([view.r for view in found.views], dtype=float)
@@ -105,23 +120,29 @@ class ContactEquations:
     def accelerated(self, state: BodiesState, mode: ContactMode) -> BodiesSolution:
         """Accelerations and forces while each contact does what the mode says."""
         wanted = [
-            -np.array([found.normal @ bias + found.normal_rate @ found.slide])
-            if own.kind == "slip"
-            else -held_directions(own, found) @ bias
-            for own, found, bias in zip(mode, state.touching, state.bias, strict=True)
+            -held @ bias - (found.normal_rate @ found.slide if own.kind == "slip" else 0.0)
+            for held, own, found, bias in zip(self._held(state, mode), mode, state.touching, state.bias, strict=True)
         ]
-        headings = [heading_of(own, found) if own.kind == "slip" and mu else None
-                    for own, found, mu in zip(mode, state.touching, self.friction, strict=True)]  # fmt: skip
+        rubs = self.friction + self.bounds > 0
+        headings = [heading_of(own, found) if own.kind == "slip" and rub else None
+                    for own, found, rub in zip(mode, state.touching, rubs, strict=True)]  # fmt: skip
         turning = np.array([found.normal_rate @ found.slide for found in state.touching])
         return self._solved(state, mode, headings, wanted, state.force, -state.of_joints, state.bias, turning)
+
+    def _held(self, state: BodiesState, mode: ContactMode) -> list[Array]:
+        """Directions that each contact holds."""
+        return [
+            held_directions(own, found, presses=not bound)
+            for own, found, bound in zip(mode, state.touching, self.bounds, strict=True)
+        ]
 
     def struck(
         self, state: BodiesState, mode: ContactMode, headings: Sequence[Array | None], after: Sequence[float]
     ) -> BodiesSolution:
         """Velocities after an impact in which contacts do so; ``after``: normal speeds of those that do not open."""
         wanted = [
-            np.array([speed]) if own.kind == "slip" else held_directions(own, found) @ found.normal * speed
-            for own, found, speed in zip(mode, state.touching, after, strict=True)
+            held @ found.normal * speed
+            for held, found, speed in zip(self._held(state, mode), state.touching, after, strict=True)
         ]
         still = np.zeros(len(state.of_joints))
         bias = np.zeros((len(mode), 3))
@@ -140,20 +161,17 @@ class ContactEquations:
     ) -> BodiesSolution:
         """The linear system M x − Cᵀλ − Dᵀz = right, C x = of_joints, K x = wanted."""
         rows, along, aims, owner = [state.C], [state.C], [of_joints], list[tuple[int, Array]]()
-        for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
-            if own.kind == "open":
-                continue
-            n, heading = found.normal, headings[k]
-            if own.kind == "stick":
-                directions = list(held_directions(own, found))
-                rows_k = np.array(directions) @ state.J[k]
-            else:
-                directions = [n if heading is None else n - self.friction[k] * heading]
-                rows_k = n[None] @ state.J[k]
-            rows.append(rows_k)
-            along.append(np.array(directions) @ state.J[k])
+        force = np.zeros((len(mode), 3))
+        for k, held in enumerate(self._held(state, mode)):
+            rows.append(held @ state.J[k])
             aims.append(wanted[k])
+            heading = headings[k] if mode[k].kind == "slip" else None
+            rubs = np.zeros(3) if heading is None else heading
+            force[k] = -self.bounds[k] * rubs
+            directions = held - self.friction[k] * rubs
+            along.append(directions @ state.J[k])
             owner += [(k, direction) for direction in directions]
+        right = right + np.einsum("kin,ki->n", state.J, force)
         K, D = np.concatenate(rows), np.concatenate(along)
         nu, count = len(state.u), len(K)
         none = np.zeros((count, count))
@@ -166,7 +184,6 @@ class ContactEquations:
         plain = np.block([[state.mass, -K.T], [K, none]]) * units * units[:, None]
         loose = bool(np.linalg.matrix_rank(plain[nu:, :nu], RANK) < count)
         response = 1.0 if loose else float(np.linalg.det(system) / np.linalg.det(plain))
-        force = np.zeros((len(mode), 3))
         for (k, direction), size in zip(owner, z, strict=True):
             force[k] += size * direction
         slide = state.J @ x + bias
@@ -174,9 +191,9 @@ class ContactEquations:
         return BodiesSolution(x, force, slide, parting, response, loose)
 
     def applied(self, state: BodiesState, force: Array) -> tuple[Array, Array]:
-        """Forces of contact, and what they do to the bodies about their centres of mass, (bodies, 6)."""
-        wrenches = np.zeros((len(self.mechanism.bodies) + 1, 6))
-        for pair, each, push in zip(self._pairs, state.touching, force, strict=True):
+        """Forces of bodies' contacts, and what they do to the bodies about their centres of mass, (bodies, 6)."""
+        wrenches, force = np.zeros((len(self.mechanism.bodies) + 1, 6)), force[: len(self._pairs)]
+        for pair, each, push in zip(self._pairs, state.touching, force, strict=False):
             for body, sign in zip(pair, (1.0, -1.0), strict=True):
                 wrenches[body] += sign * np.concatenate([push, cross(each.place - state.centres[body], push)])
         return force, wrenches[:-1]
@@ -204,6 +221,16 @@ class ContactEquations:
         """Efforts that are at their limits."""
         wanted = zip(self._limited.items(), self._wanted(state), strict=True)
         return Switched(clamped={k: float(np.clip(w, -m.bound, m.bound)) for (k, m), w in wanted if abs(w) > m.bound})
+
+    def switched(self, state: Array, mode: ContactMode) -> Switched:
+        """Joints that are held or rub in a mode, and efforts that are at their limits."""
+        own = mode_of_joints(self._switched, self.contacts, mode)
+        pairs = list(zip(self._switched, own, strict=True))
+        return self.clamped(state)._replace(
+            held=tuple(joint.number for joint, now in pairs if now in HOLDING),
+            stopped=tuple(joint.number for joint, now in pairs if now in STOPPED),
+            push={joint.number: joint.push(now) for joint, now in pairs if joint.push(now)},
+        )
 
     def _moving(self, x: Array, u: Array) -> list[float]:
         """Rates of the coordinates."""

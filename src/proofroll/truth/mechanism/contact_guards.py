@@ -11,6 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.acting import FAINT, Acting, ContactMode, across, heading_of
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.two_paths import CLOSE
@@ -22,6 +23,9 @@ STOPPED = 1e-11  # m/s: what is left of a slip that has come to rest, in a strai
 # Part of a normal force's answer without friction below which Painlevé's measure is taken to come to zero.
 _LEAST_RESPONSE = 1e-3
 _DIGITS = 1e-14  # m, times the size of the mechanism: round-off of a gap that has just opened
+
+
+Touchable = BodyContact | JointContact
 
 
 class ContactGuard(NamedTuple):
@@ -37,15 +41,16 @@ class ContactGuard(NamedTuple):
     kind: Literal["close", "lift", "still", "break", "tear"]
 
 
-def guards_of(contacts: Sequence[BodyContact], mode: ContactMode) -> list[ContactGuard]:
+def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
     """The guards of a mode, in an order that both routes keep."""
     found: list[ContactGuard] = []
     for k, (contact, own) in enumerate(zip(contacts, mode, strict=True)):
         if own.kind == "open":
             found.append(ContactGuard(k, "close"))
             continue
-        found.append(ContactGuard(k, "lift"))
-        if contact.friction:
+        if not contact.bound:
+            found.append(ContactGuard(k, "lift"))
+        if contact.friction or contact.bound:
             found.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
     if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
         found.append(ContactGuard(-1, "tear"))
@@ -53,7 +58,12 @@ def guards_of(contacts: Sequence[BodyContact], mode: ContactMode) -> list[Contac
 
 
 def guard_value(
-    guard: ContactGuard, mode: ContactMode, friction: Array, touching: Sequence[Touching], force: Array, response: float
+    guard: ContactGuard,
+    mode: ContactMode,
+    contacts: Sequence[Touchable],
+    touching: Sequence[Touching],
+    force: Array,
+    response: float,
 ) -> float:
     """The value of a guard; ``force`` on body a of each contact [N], ``response`` as in Painlevé's measure."""
     if guard.kind == "tear":
@@ -67,7 +77,8 @@ def guard_value(
     if guard.kind == "still":
         return _stopping(own, found)
     held = float(np.linalg.norm(force[guard.contact] - normal * found.normal))
-    return held - float(friction[guard.contact]) * normal
+    contact = contacts[guard.contact]
+    return held - (contact.bound or contact.friction * normal)
 
 
 def _stopping(own: Acting, found: Touching) -> float:
@@ -104,7 +115,7 @@ def faint_time(own: Acting, found: Touching, slide_rate: Array) -> float:
     return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
 
 
-def refuse_turning_onset(contact: BodyContact, own: Acting) -> None:
+def refuse_turning_onset(contact: Touchable, own: Acting) -> None:
     """Refuses a slip that begins from rest in two dimensions, at the bound of friction.
 
     Raises:
@@ -118,13 +129,13 @@ def refuse_turning_onset(contact: BodyContact, own: Acting) -> None:
 
 
 def events(
-    contacts: Sequence[BodyContact], before: ContactMode, after: ContactMode, stands: bool
+    contacts: Sequence[Touchable], before: ContactMode, after: ContactMode, stands: bool
 ) -> tuple[tuple[str, str], ...]:
     """Events of a change of mode; ``stands``: nothing moves any more."""
     found: list[tuple[str, str]] = []
     for contact, was, now in zip(contacts, before, after, strict=True):
         if now.kind == "stick" and was.kind != "stick":
-            found.append(("rest" if stands else "stick", contact.name))
+            found.append(("rest" if stands and not contact.bound else "stick", contact.name))
         elif was.kind == "stick" and now.kind == "slip":
             found.append(("slip", contact.name))
         elif was.kind != "open" and now.kind == "open":

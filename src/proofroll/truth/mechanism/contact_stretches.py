@@ -11,7 +11,6 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across
-from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -22,6 +21,7 @@ from proofroll.truth.mechanism.contact_guards import (
     STANDS,
     STOPPED,
     ContactGuard,
+    Touchable,
     events,
     faint_time,
     guard_value,
@@ -55,8 +55,8 @@ class SolvedContacts(NamedTuple):
 
 
 class _Equations(Protocol):
-    contacts: tuple[BodyContact, ...]
-    friction: Array
+    mechanism: Mechanism
+    contacts: tuple[Touchable, ...]
 
     def rate(self, state: Array, mode: ContactMode, /) -> Array: ...
 
@@ -71,11 +71,11 @@ class ContactStretches(Stretches[ContactMode]):
     See :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
-    def __init__(self, equations: _Equations, mechanism: Mechanism, length: int, tolerance: float, size: float) -> None:
+    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
         """Takes the length of a state without time, the tolerance of each step, and the size of the mechanism [m]."""
         super().__init__(length + 1, tolerance)
-        self._given, self.contacts, self._size = equations, mechanism.contacts, size
-        self._timed = any(map(varies, mechanism.signals))
+        self._given, self.contacts, self._size = equations, equations.contacts, size
+        self._timed = any(map(varies, equations.mechanism.signals))
 
     @abstractmethod
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
@@ -114,9 +114,9 @@ class ContactStretches(Stretches[ContactMode]):
         )
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
-        found, friction = self._solved(state, mode), self._given.friction
+        found, contacts = self._solved(state, mode), self.contacts
         return np.array(
-            [guard_value(one, mode, friction, found.touching, found.force, found.response) for one in guards]
+            [guard_value(one, mode, contacts, found.touching, found.force, found.response) for one in guards]
         )
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
@@ -139,7 +139,7 @@ class ContactStretches(Stretches[ContactMode]):
         """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
         found, wait = self._solved(state, mode), 0.0
         for k, own in enumerate(mode):
-            begins = own.kind == "slip" and own.along is None and self._given.friction[k]
+            begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
             if begins and np.linalg.norm(across(found.touching[k])) < FAINT:
                 wait = max(wait, 2 * FAINT / float(np.linalg.norm(found.slide_rate[k])))
         return (state, time) if not wait else (state + wait * self._given.rate(state, mode), time + wait)

@@ -23,7 +23,7 @@ class ContactTree(ContactStretches):
 
     def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
         self.dynamics = dynamics
-        super().__init__(dynamics, dynamics.mechanism, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
+        super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
@@ -48,7 +48,8 @@ class ContactTree(ContactStretches):
         q, v, time = dynamics.parts(leg.last)
         found = dynamics.at(q, v).touching
         hits = striking(leg.mode, found, hit, leg.end)
-        closed = [k for k, own in enumerate(leg.mode) if own.kind != "open" or k in hits]
+        # dry friction of joints is no impulse
+        closed = [k for k, own in enumerate(leg.mode) if (own.kind != "open" or k in hits) and not contacts[k].bound]
         speed = -float(found[hit].normal @ found[hit].slide)
         fastest = self._fastest.setdefault(hit, speed)
         law = np.array([contacts[k].restitution if k in hits else 0.0 for k in closed])
@@ -60,7 +61,7 @@ class ContactTree(ContactStretches):
             delay = 2 * speed * contacts[hit].restitution / (pull * (1 - contacts[hit].restitution))
             after, impulse, margin = dynamics.struck(q, v, closed, np.zeros(len(closed)))
         state = np.concatenate([q, after, [time]])
-        stays = [False] * len(contacts)
+        stays = [bool(contact.bound) for contact in contacts]
         for place, k in enumerate(closed):
             e = contacts[k].restitution if k in hits and not delay else 0.0
             stays[k] = impulse[place, 0] > 0 and not e

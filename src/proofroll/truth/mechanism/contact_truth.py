@@ -45,8 +45,11 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     one, pressed = gathered(times, [record for record, _ in samples]), np.array([force for _, force in samples])
     states = states_of(bodies, paths[1], times, others)
     applied = [bodies.forces(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)]
-    wrenches, clamped = [wrench for _, wrench in applied], [equations.clamped(state) for state in states]
-    two = matched(mechanism, one, second.recorded(times, states[:, :-1], clamped, wrenches))
+    wrenches = [wrench for _, wrench in applied]
+    switched = [
+        equations.switched(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)
+    ]
+    two = matched(mechanism, one, second.recorded(times, states[:, :-1], switched, wrenches))
     routes = (
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",

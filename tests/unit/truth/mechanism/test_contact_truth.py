@@ -6,6 +6,7 @@ The laboratory integrated other equations, in other coordinates, and gave twelve
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -252,12 +253,62 @@ def test_a_plank_that_falls_flat_is_refused(tilt: float) -> None:
         truth_of(replace(block, joints=(flat,)), np.array([0.0, 0.3]))
 
 
-def test_friction_of_joints_beside_contact_is_refused() -> None:
-    """No route follows both yet, and says so."""
-    table = mechanism_of("free_turntable")
-    axle = replace(table.joints[0], friction=0.1)
-    with pytest.raises(Refused, match="dry friction or stops of joints beside contacts"):
-        truth_of(replace(table, joints=(axle, *table.joints[1:])), np.array([0.0, 0.1]))
+def test_stops_with_friction_beside_contact_are_refused() -> None:
+    """One joint with both is refused: what each holds at a stop is not determinate."""
+    with pytest.raises(Refused, match="rail has stops and dry friction beside contacts"):
+        truth_of(dragged(friction=1.0, limits=(-1.0, 0.1)), np.array([0.0, 0.1]))
+
+
+def test_friction_of_a_joint_and_of_a_contact_stop_a_foot() -> None:
+    """A rail and a floor that rub together stop what moves after v/a, and then hold it."""
+    found = truth_of(dragged(friction=2.0), np.array([0.0, 0.1, 0.5]))
+    slowed = (2.0 + 0.2 * 1.5 * 9.81) / 2.0
+    assert happened(found) == [("rest", "sole"), ("stick", "rail")]
+    times_of(found, 1 / slowed, 1 / slowed)
+    assert found.record.q[1:, 0] == pytest.approx([0.1 - slowed * 0.1**2 / 2, 1 / slowed / 2], abs=1e-13)
+    assert found.record.named[:2, 0] == pytest.approx([-2.0, -2.0], abs=1e-13)
+    assert np.isnan(found.record.named[2, 0])  # what rail and floor hold together is anybody's
+    assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
+    assert np.isinf(found.horizon)
+
+
+def test_a_foot_that_slides_rebounds_from_a_stop() -> None:
+    """A stop returns half of the speed, and friction at the foot turns with it."""
+    found = truth_of(dragged(limits=(-1.0, 0.1), restitution=0.5), np.array([0.0, 0.05, 0.3]))
+    slowed = 0.2 * 1.5 * 9.81 / 2.0
+    hit = (1 - np.sqrt(1 - 2 * slowed * 0.1)) / slowed
+    back = 0.5 * (1 - slowed * hit)
+    assert happened(found) == [("impact", "rail"), ("turn", "sole")]
+    times_of(found, hit, hit)
+    left = 0.3 - hit
+    assert found.record.q[2, 0] == pytest.approx(0.1 - back * left + slowed * left**2 / 2, abs=1e-13)
+    assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
+    assert np.isinf(found.horizon)
+
+
+def test_a_smooth_foot_is_pressed_against_a_stop() -> None:
+    """A stop that returns nothing bears what pulls the foot on."""
+    found = truth_of(dragged(limits=(-1.0, 0.1), sole=0.0, pull=3.0), np.array([0.0, 0.3]))
+    hit = (np.sqrt(1 + 2 * 3.0 * 0.1) - 1) / 3.0
+    assert happened(found) == [("impact", "rail")]
+    times_of(found, hit)
+    assert found.record.q[1, 0] == pytest.approx(0.1, abs=1e-14)
+    assert found.record.named[1, 0] == pytest.approx(-2.0 * 3.0, abs=1e-12)
+    assert np.isinf(found.horizon)
+
+
+@pytest.mark.drill
+def test_a_finger_that_meets_its_stop_lets_the_ball_go() -> None:
+    """A finger with a stop flicks a ball, both routes alike: friction slows it, the stop throws it back."""
+    flick = mechanism_of("flick")
+    for joint, event in (
+        (replace(flick.joints[0], limits=(-1.0, 0.15), restitution=0.3), ("impact", "knuckle")),
+        (replace(flick.joints[0], friction=0.05), ("slip", "push")),
+    ):
+        found = truth_of(replace(flick, joints=(joint, *flick.joints[1:])), np.array([0.0, 0.08]))
+        assert event in happened(found)
+        assert np.isinf(found.horizon)
+        assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
 
 
 def test_a_table_and_the_ball_on_it_keep_their_moment_of_momentum() -> None:
@@ -360,26 +411,26 @@ def test_a_ball_that_just_rolls_is_ill_posed(part: int) -> None:
     assert (found.horizon, tuple(found.events)) == (0.0, ())
 
 
-def test_a_driven_foot_slides_as_newton_says() -> None:
-    """A force that grows in time up to its limit moves a foot against friction by a cubic, then a parabola of time."""
+def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
+    """A cart on a rail, at 1 m/s, with a foot on a floor; laws of the ``rail``, and a pull along it [m/s²]."""
     inertia = (1.0, 1.0, 1.0)
-    bodies = tuple(Body(name, mass, inertia=inertia) for name, mass in (("cart", 0.5), ("foot", 1.5)))
     joints = (
-        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,)),
+        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,), **rail),
         Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
     )
-    geometries = (Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane"))
-    found = truth_of(
-        Mechanism(
-            bodies=bodies,
-            joints=joints,
-            actuators=(Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0),),
-            geometries=geometries,
-            pairs=(Pair("sole", ("ball", "floor"), friction=0.2),),
-            gravity=(0.0, 0.0, -9.81),
-        ),
-        np.array([0.0, 0.1, 0.22]),
+    return Mechanism(
+        bodies=tuple(Body(name, mass, inertia=inertia) for name, mass in (("cart", 0.5), ("foot", 1.5))),
+        joints=joints,
+        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
+        pairs=(Pair("sole", ("ball", "floor"), friction=sole),),
+        gravity=(pull, 0.0, -9.81),
     )
+
+
+def test_a_driven_foot_slides_as_newton_says() -> None:
+    """A force that grows in time up to its limit moves a foot against friction by a cubic, then a parabola of time."""
+    push = Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0)
+    found = truth_of(replace(dragged(), actuators=(push,)), np.array([0.0, 0.1, 0.22]))
     slowed = 0.2 * 1.5 * 9.81 / 2
     moved = [0.1 - slowed * 0.1**2 / 2 + 20 / 2 * 0.1**3 / 6]
     moved.append(0.22 - slowed * 0.22**2 / 2 + 20 / 2 * (0.2**3 / 6 + 0.2**2 / 2 * 0.02) + 4.0 / 2 * 0.02**2 / 2)

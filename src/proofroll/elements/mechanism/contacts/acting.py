@@ -63,12 +63,21 @@ def heading_of(own: Acting, found: Touching) -> Array:
     return np.asarray(given / length)
 
 
-def held_directions(own: Acting, found: Touching) -> Array:
-    """Directions that a contact which sticks holds, (3, 3); the normal and its line where it can slide along one."""
+def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
+    """Directions that a contact holds, (directions, 3).
+
+    A slip holds its normal, if the contact ``presses``; what sticks holds all directions, or its normal and its line
+    where it can slide along one only.
+    """
+    if own.kind == "open":
+        return np.zeros((0, 3))
+    normal = found.normal[None] if presses else np.zeros((0, 3))
+    if own.kind == "slip":
+        return normal
     if own.along is None:
         return np.eye(3)
     line = np.array(own.along) - found.normal * (found.normal @ np.array(own.along))
-    return np.array([found.normal, line / np.linalg.norm(line)])
+    return np.vstack([normal, line / np.linalg.norm(line)])
 
 
 def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array, G: Array) -> Acting:

@@ -2,7 +2,8 @@
 
 Of each contact the components are normal and two along the surface. N ≥ 0, w_n ≥ 0 and N w_n = 0; the friction is at
 most μN, and μN against w_t where w_t is not zero. In accelerations c are those without the forces; in an impact they
-are speeds, with what the law of impact returns.
+are speeds, with what the law of impact returns. A friction without a normal has a bound of its own: it acts along the
+surface alone, where its force moves anything.
 """
 
 from __future__ import annotations
@@ -33,7 +34,12 @@ PAINLEVE = (
 
 
 def solved(
-    G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], names: Sequence[str]
+    G: Array,
+    c: Array,
+    friction: Array,
+    sliding: Sequence[Array | None],
+    names: Sequence[str],
+    bounds: Array | None = None,
 ) -> tuple[Array, list[Outcome]]:
     """The forces of all contacts, shape (contacts, 3), and what each contact does.
 
@@ -43,36 +49,73 @@ def solved(
         friction: coefficient of each.
         sliding: unit vector along the surface, shape (2,), of a contact that slides already; friction is against it.
         names: for messages.
+        bounds: of each friction without a normal; 0, or none given: it has one.
 
     Raises:
         NotUnique: a contact's force has no unique answer.
         Refused: no answer is found.
     """
     f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
+    bounds = np.zeros(len(friction)) if bounds is None else bounds
     for _ in range(_SWEEPS):
         before = f.copy()
         for k, mu in enumerate(friction):
             own = slice(3 * k, 3 * k + 3)
             free = c[own] + G[own] @ f - G[own, own] @ f[own]
-            f[own], done[k] = _one(G[own, own], free, mu, sliding[k], names[k])
+            if bounds[k]:
+                f[own], done[k] = _rubbing(G[own, own], free, bounds[k], sliding[k])
+            else:
+                f[own], done[k] = _one(G[own, own], free, mu, sliding[k], names[k])
         if np.abs(f - before).max() <= _SETTLED * np.abs(f).max():
             w = (c + G @ f).reshape(-1, 3)
             least = _RESTS * float(np.abs(c).max())
             for k, along in enumerate(sliding):
-                if done[k] == "slip" and along is None and friction[k] and np.linalg.norm(w[k, 1:]) <= least:
+                rubs = friction[k] or bounds[k]
+                if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
                     done[k] = "stick"  # of several that hold together one may reach its bound, and nothing moves
             return f.reshape(-1, 3), done
     raise Refused(f"the forces of the contacts {', '.join(names)} are not found in {_SWEEPS} sweeps")
 
 
 def sure(
-    G: Array, c: Array, friction: Array, sliding: Sequence[Array | None], names: Sequence[str]
+    G: Array,
+    c: Array,
+    friction: Array,
+    sliding: Sequence[Array | None],
+    names: Sequence[str],
+    bounds: Array | None = None,
+    least: float = 0.0,
 ) -> tuple[Array, list[Outcome], bool]:
-    """Solution as :func:`solved`, and True if a little more load or less friction gives the same outcome."""
-    force, done = solved(G, c, friction, sliding, names)
-    nudge = _NUDGE * float(np.abs(c).max()) * np.tile([1.0, 0.0, 0.0], len(friction))
-    beside = (solved(G, c + side * nudge, friction * (1 - side * _NUDGE), sliding, names)[1] for side in (1.0, -1.0))
-    return force, done, all(other == done for other in beside)
+    """Solution as :func:`solved`, and True if a little less pressure and friction, or more, gives the same outcome.
+
+    A contact that presses by no more than a ``least`` part of the largest force does what an open one does.
+    """
+    bounds = np.zeros(len(friction)) if bounds is None else bounds
+    force, done = solved(G, c, friction, sliding, names, bounds)
+    own = np.diag(G)[::3]
+    # as a force of each contact, which what holds the others takes up
+    lift = np.tile([1.0, 0.0, 0.0], len(friction)) * np.repeat(np.where(own > 0, 1 / np.where(own > 0, own, 1), 0.0), 3)
+    nudge = _NUDGE * float(np.abs(c).max()) * G @ lift
+
+    def outcome(force: Array, done: Sequence[Outcome]) -> list[Outcome]:
+        little = least * float(np.abs(force).max())
+        return ["open" if each[0] <= little and least else own for each, own in zip(force, done, strict=True)]
+
+    nominal = outcome(force, done)
+    same = all(
+        outcome(*solved(G, c + side * nudge, friction * part, sliding, names, bounds * part)) == nominal
+        for side, part in ((1.0, 1 - _NUDGE), (-1.0, 1 + _NUDGE))
+    )
+    return force, done, same
+
+
+def _rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Array, Outcome]:
+    """Friction without a normal, along a line, while all other forces are as they are."""
+    if sliding is not None:
+        return np.array([0.0, *(-bound * sliding)]), "slip"
+    held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
+    size = float(np.linalg.norm(held))
+    return (held, "stick") if size <= bound * (1 + _AT_BOUND) else (held * (bound / size), "slip")
 
 
 def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tuple[Array, Outcome]:

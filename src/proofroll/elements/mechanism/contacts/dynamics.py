@@ -16,12 +16,18 @@ from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import OPEN, ContactMode, acting, heading_of, held_directions
 from proofroll.elements.mechanism.contacts.coulomb import sure
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
 from proofroll.elements.mechanism.contacts.start import TOUCHING, least_speed, touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion
 from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, skew
+
+# Part of an impact's largest impulse that moves nothing: pressure that is nudged by 1e-6 makes some of it.
+_NO_IMPULSE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -65,16 +71,16 @@ class ContactSolution:
 
 
 class ContactDynamics:
-    """A mechanism in the coordinates of its tree, with its contacts."""
+    """A mechanism in the coordinates of its tree, with its contacts; those of joints come after those of bodies."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
-        if self.equations.switched:
-            raise Refused("dry friction or stops of joints beside contacts of bodies; no route follows both")
-        self.contacts = mechanism.contacts
+        self._of_joints = joint_contacts(self.equations.switched)
+        self.contacts: tuple[BodyContact | JointContact, ...] = (*mechanism.contacts, *self._of_joints)
         self.friction = np.array([contact.friction for contact in self.contacts])
+        self._bounds = np.array([contact.bound for contact in self.contacts])
         index = mechanism.body_index
-        self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in self.contacts]
+        self._bodies = [(index[contact.body_a], index[contact.body_b]) for contact in mechanism.contacts]
 
     def at(self, q: Array, v: Array, time: float = 0.0) -> ContactsNow:
         """Kinematics and free accelerations for coordinates (nq) and velocities (nv) at a time [s]."""
@@ -84,6 +90,10 @@ class ContactDynamics:
             W = W - found.split[0] @ found.split[0].T
         touching = touches(self.mechanism, found.motion)
         parts = [self._row(found.motion, k, each) for k, each in enumerate(touching)]
+        for contact in self._of_joints:
+            at = contact.joint.velocity
+            touching += (contact.touching(float(q[contact.joint.coordinate]), float(v[at])),)
+            parts.append((np.outer(contact.direction, np.eye(len(v))[at]), np.zeros(3)))
         J, bias = (np.array(part) for part in zip(*parts, strict=True))
         return ContactsNow(found, W, touching, J, bias)
 
@@ -108,30 +118,29 @@ class ContactDynamics:
 
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
         """See :meth:`solve`."""
-        rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], [], list[int]()
+        rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
+        force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
-            n = found.normal
+            directions = held_directions(own, found, presses=not self._bounds[k])
+            rows.append(directions @ state.J[k])
+            bias.append(directions @ state.bias[k])
+            owner += [k] * len(directions)
             if own.kind == "slip":
-                rows.append(n[None] @ state.J[k])
-                bias.append(np.array([n @ state.bias[k] + found.normal_rate @ found.slide]))
-                along.append(n - self.friction[k] * heading_of(own, found) if self.friction[k] else n)
-                owner.append(k)
-            elif own.kind == "stick":
-                directions = held_directions(own, found)
-                rows.append(directions @ state.J[k])
-                bias.append(directions @ state.bias[k])
-                along += list(directions)
-                owner += [k] * len(directions)
+                bias[-1] = bias[-1] + found.normal_rate @ found.slide
+                heading = heading_of(own, found) if self.friction[k] or self._bounds[k] else np.zeros(3)
+                force[k] = -self._bounds[k] * heading
+                directions = directions - self.friction[k] * heading
+            along += list(directions)
         K, free = np.concatenate(rows), state.solution.acceleration
+        free = free + state.W @ np.einsum("kin,ki->n", state.J, force)
         if not owner:
-            return self._solution(state, free, np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool), 1.0)
+            return self._solution(state, free, force, known, 1.0)
         D = np.array([direction @ state.J[k] for direction, k in zip(along, owner, strict=True)])
         S, wanted = K @ state.W @ D.T, -(K @ free + np.concatenate(bias))
         smooth = K @ state.W @ K.T
         values, vectors = np.linalg.eigh(smooth)
         weak = values < RANK * values[-1]
         z = np.linalg.lstsq(S, wanted, rcond=RANK)[0] if weak.any() else np.linalg.solve(S, wanted)
-        force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
         for k, direction, size, loose in zip(owner, along, z, vectors[:, weak], strict=True):
             force[k] += size * direction
             known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
@@ -165,7 +174,7 @@ class ContactDynamics:
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
-        y = np.append(self.equations.eliminated(y[:-1]), y[-1])
+        y = np.append(self.equations.eliminated(y[:-1], ()), y[-1])
         q, v, time = self.parts(y)
         closed = [k for k, own in enumerate(mode) if own.kind != "open"]
         if not closed:
@@ -223,7 +232,7 @@ class ContactDynamics:
             across = frames[k][:, 1:].T @ found.slide
             sliding.append(None if still[k] else across / np.linalg.norm(across))
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in which]
-        force, done, same = sure(G, c, self.friction[which], sliding, names)
+        force, done, same = sure(G, c, self.friction[which], sliding, names, self._bounds[which])
         mode = [OPEN for _ in closed]
         for place, k in enumerate(which):
             own = slice(3 * place, 3 * place + 3)
@@ -252,7 +261,8 @@ class ContactDynamics:
         c = J @ v
         c[::3] += restitution * np.minimum(c[::3], 0.0)
         G, names = J @ state.W @ J.T, [self.contacts[k].name for k in closed]
-        impulse, _, same = sure(G, c, self.friction[list(closed)], [None] * len(closed), names)
+        sliding = [None] * len(closed)
+        impulse, _, same = sure(G, c, self.friction[list(closed)], sliding, names, least=_NO_IMPULSE)
         pressed = [k for k in range(len(closed)) if impulse[k, 0] > 0]
         for a in pressed:
             for b in pressed:
@@ -263,16 +273,25 @@ class ContactDynamics:
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
-        """Fields of a record at one time [s], and the forces of contact, (contacts, 3), NaN where not determinate."""
-        found = self.solve(q, v, mode, time)
-        load = np.einsum("kin,ki->n", found.state.J, found.force)
+        """Fields of a record at one time [s], and the forces of bodies' contacts, (contacts, 3).
+
+        Forces are NaN where they are not determinate.
+        """
+        found, count = self.solve(q, v, mode, time), len(self._bodies)
+        pressed = found.force[:count]
+        load = np.einsum("kin,ki->n", found.state.J[:count], pressed)
         applied = np.zeros((len(self.mechanism.bodies) + 1, 6))
-        for (a, b), each, force in zip(self._bodies, found.state.touching, found.force, strict=True):
+        for (a, b), each, force in zip(self._bodies, found.state.touching, pressed, strict=False):
             wrench = np.concatenate([force, cross(each.place, force)])
             applied[a] += wrench
             applied[b] -= wrench
-        record = self.equations.sample(q, v, (), time, load, applied)
-        return record, np.where(found.determinate, found.force, np.nan)
+        joints = mode_of_joints(self.equations.switched, self.contacts, mode)
+        record = self.equations.sample(q, v, joints, time, load, applied)
+        loose = {c.joint.number for c, own in zip(self._of_joints, found.determinate[count:], strict=True)
+                 if not own[c.direction != 0].all()}  # fmt: skip
+        named = [item.field in {"friction", "stop"} and item.place in loose for item in named_forces(self.mechanism)]
+        record["named"] = np.where(named, np.nan, record["named"])
+        return record, np.where(found.determinate[:count], pressed, np.nan)
 
 
 def _held(W: Array, K: Array, violation: Array) -> Array:

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -146,8 +146,10 @@ class BodyContact:
         body_a, body_b: of the first and the second geometry.
         shape_a, shape_b: in the frames of these; one of them may be a plane.
         friction, restitution: of the pair.
+        bound: of a friction that no normal force has; bodies have none [N].
     """
 
+    bound: ClassVar[float] = 0.0
     name: str
     body_a: str
     body_b: str

@@ -1,0 +1,96 @@
+"""Stops and dry friction of joints in a mechanism whose bodies touch: contacts along a coordinate.
+
+A stop presses along its coordinate as a smooth surface does along its normal. Dry friction has no normal: it holds
+along a line, or rubs there with a force that nothing else changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contacts.acting import ContactMode
+from proofroll.elements.mechanism.contacts.geometry import BodyContact
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import Mode, SwitchedJoint
+
+_X, _Y, _NONE = np.eye(3)[0], np.eye(3)[1], np.zeros(3)
+
+
+@dataclass(frozen=True)
+class JointContact:
+    """One law of a joint; its normal is x, dry friction acts along y, in units of the coordinate.
+
+    Attributes:
+        joint: that has it.
+        side: 1: the stop below, -1: the stop above, 0: dry friction.
+    """
+
+    joint: SwitchedJoint
+    side: int
+    friction: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of the joint."""
+        return self.joint.name
+
+    @property
+    def bound(self) -> float:
+        """Largest force of dry friction [N, N m]; 0: a stop."""
+        return 0.0 if self.side else self.joint.friction
+
+    @property
+    def restitution(self) -> float:
+        """Restitution of an impact on the stop."""
+        return self.joint.restitution
+
+    @property
+    def direction(self) -> Array:
+        """Slide that a unit rate of the coordinate is."""
+        return np.asarray(self.side * _X if self.side else _Y)
+
+    def touching(self, q: float, v: float) -> Touching:
+        """The contact at a coordinate and its rate."""
+        stop = self.joint.low if self.side > 0 else self.joint.high
+        gap = self.side * (q - stop) if self.side else 0.0
+        return Touching(gap, _X, _NONE, _NONE, _NONE, v * self.direction)
+
+
+def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
+    """The laws of switched joints as contacts.
+
+    Raises:
+        Refused: a joint has stops and dry friction, whose shares at a stop are not determinate.
+    """
+    found = []
+    for joint in joints:
+        sides = [side for side, stop in ((1, joint.low), (-1, joint.high)) if np.isfinite(stop)]
+        if sides and joint.friction:
+            raise Refused(
+                f"joint {joint.name} has stops and dry friction beside contacts of bodies; choose one of both"
+            )
+        found += [JointContact(joint, side) for side in sides or [0]]
+    return tuple(found)
+
+
+def mode_of_joints(
+    joints: Sequence[SwitchedJoint], contacts: Sequence[BodyContact | JointContact], mode: ContactMode
+) -> Mode:
+    """Modes of switched joints in a mode of contacts."""
+    own = {joint.name: "free" for joint in joints}
+    for contact, acting in zip(contacts, mode, strict=True):
+        if not isinstance(contact, JointContact) or acting.kind == "open":
+            continue
+        if contact.side:
+            own[contact.name] = "low" if contact.side > 0 else "high"
+        elif acting.kind == "stick":
+            own[contact.name] = "stick"
+        else:
+            assert acting.along is not None  # one coordinate is one line
+            own[contact.name] = contact.joint.moving(acting.along[1])
+    return tuple(own.values())
