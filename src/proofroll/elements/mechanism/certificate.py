@@ -148,7 +148,7 @@ def _compare_response(
     mechanism = element.mechanism
     dynamics = ContactDynamics(mechanism)
     state = dynamics.at(*mechanism.start())
-    shut = [k for k, each in enumerate(state.touching) if each.gap <= TOUCHING]
+    shut = [k for k, _ in enumerate(mechanism.contacts) if state.touching[k].gap <= TOUCHING]
     if not shut:
         return
     normals = [np.outer(state.touching[k].normal, state.touching[k].normal) for k in shut]

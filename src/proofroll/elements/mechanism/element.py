@@ -292,9 +292,9 @@ class MechanismElement:
     @property
     def first_press(self) -> FloatArray:
         """Forces of contacts on their first bodies at the start [N], (contacts, 3); NaN where not determinate."""
-        found = self._pressed
-        unknown = np.full((len(self.mechanism.contacts), 3), np.nan)
-        return unknown if found is None else np.where(found.determinate, found.force, np.nan)
+        found, count = self._pressed, len(self.mechanism.contacts)
+        unknown = np.full((count, 3), np.nan)
+        return unknown if found is None else np.where(found.determinate, found.force, np.nan)[:count]
 
     @cached_property
     def first_named(self) -> FloatArray:

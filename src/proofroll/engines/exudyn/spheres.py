@@ -80,7 +80,7 @@ class Spheres(Redundant):
         try:
             start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
         except NotUnique:  # no law says what presses
-            start = dynamics.solve(*mechanism.start(), (OPEN,) * len(mechanism.contacts))
+            start = dynamics.solve(*mechanism.start(), (OPEN,) * len(dynamics.contacts))
         lacking = 0.0
         for number, contact in enumerate(mechanism.contacts):
             each = start.state.touching[number]
@@ -89,7 +89,7 @@ class Spheres(Redundant):
             self._contacts.append(self._add_contact(contact, each.gap, pressed, speed, settings))
             if speed < settings.penalty[1]:
                 lacking += float(np.linalg.norm(start.force[number] - pressed * each.normal))
-        load = float(np.abs(start.force).max(initial=0.0))
+        load = float(np.abs(start.force[: len(mechanism.contacts)]).max(initial=0.0))
         self._builds_up = lacking > _LITTLE * load
         if self._builds_up:
             self._softness = min(_LARGEST, 2 * lacking / load)

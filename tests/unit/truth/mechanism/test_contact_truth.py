@@ -297,6 +297,19 @@ def test_a_smooth_foot_is_pressed_against_a_stop() -> None:
     assert np.isinf(found.horizon)
 
 
+@pytest.mark.parametrize("laws", [{"friction": 0.05}, {"limits": (-1.0, 0.15)}])
+def test_engines_with_laws_of_joints_beside_contacts_are_certified(laws: dict[str, Any]) -> None:
+    """MuJoCo's first motion and forces are those of equations that have the laws of joints among their contacts."""
+    scene = load_scene("flick")
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)
+    knuckle, *others = element.mechanism.joints
+    stopped = replace(element, mechanism=replace(element.mechanism, joints=(replace(knuckle, **laws), *others)))
+    plugin = load_engine("mujoco")
+    run = plugin.build(replace(scene, elements=(stopped,)), plugin.presets["geoms"]["tuned"])
+    assert [str(line) for line in stopped.certify(run.built(), run.sample()) if not line.holds] == []
+
+
 @pytest.mark.drill
 def test_a_finger_that_meets_its_stop_lets_the_ball_go() -> None:
     """A finger with a stop flicks a ball, both routes alike: friction slows it, the stop throws it back."""
@@ -377,9 +390,9 @@ def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: 
     table = load_scene("free_turntable")
     (element,) = table.elements
     assert isinstance(element, MechanismElement)
-    axle = replace(element.mechanism.joints[0], friction=0.1)
+    axle = replace(element.mechanism.joints[0], friction=0.1, limits=(-9.0, 9.0))
     rubs = replace(element, mechanism=replace(element.mechanism, joints=(axle, *element.mechanism.joints[1:])))
-    with pytest.raises(Refused, match="dry friction or stops of joints beside contacts"):
+    with pytest.raises(Refused, match="has stops and dry friction beside contacts"):
         truth(replace(table, elements=(rubs,)), np.array([0.0, 0.1]))
     assert np.isnan(rubs.first_motion.acceleration).all()  # so an engine that has both is asked for no first motion
     monkeypatch.setattr(coulomb, "_SWEEPS", 0)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from proofroll.core.errors import NotUnique, Refused
+from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.contacts.acting import OPEN, ContactMode, acting, heading_of, held_directions
 from proofroll.elements.mechanism.contacts.coulomb import sure
