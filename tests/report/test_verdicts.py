@@ -218,6 +218,28 @@ def test_the_page_says_all_of_it(outcome: Outcome, parse: Any) -> None:
         assert words in text, words
 
 
+@pytest.mark.parametrize(("other", "alike"), [(1.0005, True), (1.01, False)])
+def test_rows_of_one_scheme_are_no_witnesses_for_one_another(
+    made: tuple[Outcome, Store], parse: Any, other: float, alike: bool
+) -> None:
+    """Two engines with one step and the same errors in all that is judged are named; with others they are not."""
+    rows, runs = made[0].comparison.rows, dict[int, list[Run]]()
+    for run in made[0].runs:
+        number = rows.index(run.row)
+        found = answered(run, 3e-4 * (other if number == 2 else 1.0 + 0.5 * number))
+        second = dataclasses.replace(found.judgements[0], observable="gamma", unit="rad")
+        runs.setdefault(number, []).append(dataclasses.replace(found, judgements=[*found.judgements, second]))
+    outcome = with_runs(made[0], runs)
+    content = report_content([outcome], "proofroll report invented")
+    said = (
+        "Same errors to three digits, so one scheme, and no evidence for one another: "
+        "alpha fine matched (dt 1e-3 s), beta only (dt 1e-3 s)."
+    )
+    page_text = " ".join(parse(page(content, [point_curves(outcome)])).text.split())
+    assert (said in page_text) is alike
+    assert (said in closing_lines(outcome_content(outcome))) is alike
+
+
 def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
     """A row that shares the truth's equations is not named as the closest, however small its error is."""
     content, choice = outcome_content(made[0]), report_content([made[0]], "proofroll report invented").choice

@@ -13,6 +13,9 @@ from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
 from proofroll.report.labels import names, symbol
 
+# Errors of two rows that differ by less than this part are those of one scheme, where they are seen above so many bars
+# of the truth in so many observables at least.
+_SAME, _SEEN, _SEVERAL = 1e-3, 10.0, 2
 _COMPILES = 10.0  # s before the first step: machine code of equations takes one or two, on a busy machine some more
 
 
@@ -150,3 +153,30 @@ def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
     """Remarks on each row, with its name."""
     return [(name, text) for name, row, _ in content.lines() for text in row.remarks]
+
+
+def one_scheme(content: ReportedComparison) -> list[str]:
+    """Sentence that names the rows with one step and the same errors, whoever computed them; nothing if there are none.
+
+    Codes with one scheme print the same digits, right or wrong.
+    """
+    groups: list[list[tuple[str, ReportedRow]]] = []
+    for name, row, _ in content.lines():
+        group = next((each for each in groups if _same_digits(each[0][1], row)), None)
+        if group is None:
+            groups.append([(name, row)])
+        else:
+            group.append((name, row))
+    told = [", ".join(name for name, _ in group) for group in groups if len(group) > 1]
+    return [f"Same errors to three digits, so one scheme, and no evidence for one another: {'; '.join(told)}."] * bool(
+        told
+    )
+
+
+def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:
+    """True if two rows have the same step, and the same errors in all that both are judged by and is seen of them."""
+    if one.resolution != "dt" or (one.resolution, one.resolution_value) != (other.resolution, other.resolution_value):
+        return False
+    pairs = [(one.observables[name], other.observables[name]) for name in one.observables.keys() & other.observables]
+    seen = [(a.largest, b.largest) for a, b in pairs if max(a.largest, b.largest) > _SEEN * a.truth_error_bar]
+    return len(seen) >= _SEVERAL and all(math.isclose(*both, rel_tol=_SAME) for both in seen)

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Verdict
-from proofroll.report.comparison.tables import observables, remarks, seconds_before
+from proofroll.report.comparison.tables import observables, one_scheme, remarks, seconds_before
 from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
@@ -133,7 +133,8 @@ def closing_lines(content: ReportedComparison) -> list[str]:
             if left
             else "Every verdict is as the comparison file expects."
         )
-    return [*lines, *budget_lines(content), *caveat_lines(content.rows), *told_hosts(content.hosts)]
+    shared = [*one_scheme(content), *caveat_lines(content.rows)]
+    return [*lines, *budget_lines(content), *shared, *told_hosts(content.hosts)]
 
 
 def budget_lines(content: ReportedComparison) -> list[str]:
