@@ -9,13 +9,15 @@ import contextlib
 import io
 import json
 import sys
+import weakref
 import zipfile
 import zlib
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +30,8 @@ if TYPE_CHECKING:
 
 # Endings of the files in which trajectories are stored, and in which a person is given one.
 STORED, NETCDF, CSV = ".npz", ".nc", ".csv"
+# Trajectories that were read stay in memory up to this size together [bytes]: those of a few comparisons.
+MOST_HELD = 128 * 2**20
 # What is in such a file beside an array for each variable: their dimensions and all attributes.
 _ABOUT = "about.json"
 # Whether xarray was imported without dask, so that it may go on without: it asks for a scheduler when it writes.
@@ -137,14 +141,21 @@ def read(path: Path) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class StoredTrajectory:
-    """A trajectory in a file, read when it is first asked for and held from then on."""
+    """A trajectory in a file, read when it is first asked for and held while there is room for it."""
 
     file: Path
+    _held: ClassVar[deque[tuple[weakref.ref[StoredTrajectory], int]]] = deque()
 
     @cached_property
     def dataset(self) -> xr.Dataset:
-        """The trajectory; raises as :func:`read` does."""
-        return read(self.file)
+        """The trajectory; raises as :func:`read` does. What was read longest ago makes room for it."""
+        made = read(self.file)
+        self._held.append((weakref.ref(self), made.nbytes))
+        while sum(size for _, size in self._held) > MOST_HELD and len(self._held) > 1:
+            oldest = self._held.popleft()[0]()
+            if oldest is not None:
+                vars(oldest).pop("dataset", None)
+        return made
 
     @property
     def shown(self) -> str:

@@ -14,7 +14,7 @@ from scipy.io import netcdf_file
 from proofroll.core.columns import Columns
 from proofroll.core.errors import ProofrollError
 from proofroll.core.events import Event, with_events
-from proofroll.files.trajectory_file import read, read_columns, write
+from proofroll.files.trajectory_file import StoredTrajectory, read, read_columns, write
 from proofroll.running.simulation import simulate
 
 VALUES = np.array([5e-324, -0.0, 1.7976931348623157e308, np.nan, -np.inf, 0.1, 9.969209968386869e36])
@@ -142,3 +142,17 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(ProofrollError, match="cannot be written"):
         write(ALL_KINDS, tmp_path / "file" / "run.npz")
+
+
+def test_what_was_read_longest_ago_makes_room(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Trajectories are held up to a size together; one that was dropped is read again, and is what it was."""
+    files = [tmp_path / f"{number}.npz" for number in range(4)]
+    for file in files:
+        write(ALL_KINDS, file)
+    monkeypatch.setattr("proofroll.files.trajectory_file.MOST_HELD", int(2.5 * read(files[0]).nbytes))
+    runs = [StoredTrajectory(file) for file in files]
+    first = runs[0].dataset
+    assert all(run.dataset.identical(first) for run in runs)
+    assert [("dataset" in vars(run)) for run in runs] == [False, False, True, True]
+    assert runs[0].dataset.identical(first)
+    assert runs[0].dataset is runs[0].dataset
