@@ -73,7 +73,7 @@ class CutOut:
         lines = sorted(self._imports, key=lambda line: (line.startswith("from"), line))
         self.head = "\n".join(["from __future__ import annotations", *lines]) + "\n"
         # two names of one statement are one definition
-        self.text = "\n\n".join(dict.fromkeys(self._source(place) for place in ordered))
+        self.text = "\n".join(dict.fromkeys(self._source(place) for place in ordered))
         if f" {_OURS}" in self.text:
             raise ValueError(f"an import of {_OURS} is inside a definition among {', '.join(self.names)}")
 
@@ -147,7 +147,7 @@ class CutOut:
         ordered[place] = None
 
     def _source(self, place: _Place) -> str:
-        """Text of a definition, without what is left out of it and what only we read."""
+        """Text of a definition, without what is left out of it and what only we read: of docstrings, all but a line."""
         module, name = place
         if not module:
             return self._instead[name].strip("\n") + "\n"
@@ -158,27 +158,34 @@ class CutOut:
             while lines[first - 2].lstrip().startswith("#"):
                 first -= 1
             gone |= set(range(first - (not lines[first - 2].strip()), (dropped.end_lineno or first) + 1))
-        emptied = {}
-        for part in ast.walk(node):
-            if not isinstance(part, (_Function, ast.ClassDef)):
-                continue
-            words, own = ast.get_docstring(part) or "", part.body[0]
-            if ":`" in words or _OURS in words:  # it leads to other places of the package
-                gone |= set(range(own.lineno, (own.end_lineno or own.lineno) + 1))
-                if len(part.body) == 1:
-                    emptied[own.lineno] = " " * own.col_offset + "..."
+        said = _docstrings(node, gone)
+        for first, last in said:
+            gone |= set(range(first + 1, last + 1))
+        short = {first: text for (first, _), text in said.items()}
         kept, begin = list[str](), _first(node)
         while lines[begin - 2].startswith("#"):  # of a constant, what it is
             begin -= 1
         for number in range(begin, (node.end_lineno or 0) + 1):
-            if number in emptied:
-                kept.append(emptied[number])
-            elif number not in gone:
-                kept.append(_COMMENT.sub("", lines[number - 1]))
+            if number not in gone and short.get(number, "-"):
+                kept.append(short.get(number) or _COMMENT.sub("", lines[number - 1]))
         text = "\n".join(kept)
         if isinstance(node, ast.ClassDef) and not ast.unparse(ast.parse(text + "\n    pass")).count("\n    "):
             text += "\n    pass"
         return re.sub(r":\n\n+", ":\n", re.sub(r"\n{3,}", "\n\n", text)) + "\n"
+
+
+def _docstrings(node: ast.stmt, gone: set[int]) -> dict[tuple[int, int], str]:
+    """First and last line of each docstring of a definition -> its first line; empty where that leads elsewhere."""
+    found = {}
+    for part in ast.walk(node):
+        words = ast.get_docstring(part) if isinstance(part, (_Function, ast.ClassDef)) else None
+        if not words or (own := part.body[0]).lineno in gone:  # type: ignore[attr-defined]  # it has a docstring
+            continue
+        text = words.partition("\n")[0]
+        elsewhere = ":`" in text or _OURS in text
+        text = f'"""{text}"""' if not elsewhere else "..." if len(part.body) == 1 else ""  # type: ignore[attr-defined]
+        found[own.lineno, own.end_lineno] = text and " " * own.col_offset + text
+    return found
 
 
 @functools.cache

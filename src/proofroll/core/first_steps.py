@@ -33,8 +33,7 @@ _SPRINGS = 0.01
 # Of an engine that says its acceleration: steps of a spring that holds a loop at a time constant of two steps set off
 # otherwise by up to a thousandth, however short they are. This leaves them room.
 _STIFF = 5e-3
-DERIVED = ("acceleration", "angular acceleration")
-_BY = " of the first steps"
+OF_FIRST_STEPS = " of the first steps"  # ends the names of their lines
 
 
 def first_steps(kind: Any, scene: Scene, settings: Any) -> list[Line]:
@@ -79,14 +78,14 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
     lines = []
     for row, (quantity, unit, expected, scale) in enumerate(
         (
-            (DERIVED[0], "m/s^2", start.acceleration, start.scale),
-            (DERIVED[1], "rad/s^2", start.angular_acceleration, turning),
+            ("acceleration", "m/s^2", start.acceleration, start.scale),
+            ("angular acceleration", "rad/s^2", start.angular_acceleration, turning),
         )
     ):
         difference, bar = (float(np.max(np.abs(x))) / scale for x in (limit[row] - expected, unknown[row]))
         lines.append(
             Line(
-                scene.label(element, f"{quantity}{_BY}"),
+                scene.label(element, f"{quantity}{OF_FIRST_STEPS}"),
                 unit,
                 tuple(np.ravel(expected).tolist()),
                 tuple(np.ravel(limit[row]).tolist()),
@@ -119,7 +118,7 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
     granted = {line.quantity: line.tolerance for line in lines if line.standing is not Standing.NOT_REPORTED}
     derived = []
     for line in derivable(kind, scene, settings):
-        said = granted.get(line.quantity.replace(_BY, ""))
+        said = granted.get(line.quantity.replace(OF_FIRST_STEPS, ""))
         derived.append(line if said is None else replace(line, tolerance=max(line.tolerance, _STIFF) + said))
     return [*lines, *derived]
 

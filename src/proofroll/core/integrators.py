@@ -1,24 +1,27 @@
-"""Integrators of ẋ = rates(x): one class each, added to INTEGRATORS. None uses values interpolated inside a step."""
+"""Integrators of ẋ = rates(x): one class each, added to INTEGRATORS. None uses values interpolated inside a step.
+
+A step can be looked into. The state inside it comes from a shorter step of the same method from the same start, so that
+a located event is as accurate as the steps are.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Literal, Protocol
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dop853 import Accept, controlled_step, inside_last_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.stalling import StepWatch
 
 Rates = Callable[[FloatArray], FloatArray]
-# Called after each step with its time and state; returns the state to go on from, the very same object if unchanged.
-Accept = Callable[[float, FloatArray], FloatArray]
-
-# scipy accepts no relative tolerance below 100 machine epsilons.
-TIGHTEST = 100 * float(np.finfo(float).eps)
+# Part of a fixed step that is not worth a step of its own.
+_SLIVER = 1e-9
 
 
 def classical_step(rates: Rates, x: FloatArray, h: float) -> FloatArray:
@@ -30,68 +33,41 @@ def classical_step(rates: Rates, x: FloatArray, h: float) -> FloatArray:
     return np.asarray(x + h / 6 * (k1 + 2 * (k2 + k3) + k4))
 
 
-def controlled_step(solver: Any, accept: Accept, until: float, longest: float = math.inf) -> None:
-    """One step of a solver of scipy, at most of a length [s] and at most to the time ``until`` [s].
-
-    The step size that the error control wants survives a step that was shortened to end there.
-
-    Raises:
-        Diverged: no step is small enough.
-    """
-    solver.t_bound, solver.status, solver.max_step = until, "running", longest
-    wanted = solver.h_abs
-    if solver.step() is not None:
-        raise Diverged(f"the step size fell to nothing at t = {solver.t:.6g} s")
-    if solver.t == until:
-        solver.h_abs = max(wanted, solver.h_abs)
-    accepted = accept(float(solver.t), solver.y)
-    if accepted is not solver.y:
-        # The rate that opens the next step must belong to the changed state, or the error control collapses.
-        solver.y, solver.f = accepted, solver.fun(solver.t, accepted)
-
-
-def inside_last_step(solver: Any, t: float) -> FloatArray:
-    """The state at a time [s] within the last step of a DOP853 solver, integrated from where that step began.
-
-    Raises:
-        Diverged: no step is small enough.
-    """
-    if t <= solver.t_old:
-        return np.asarray(solver.y_old)
-    from scipy.integrate import DOP853
-
-    h, options = t - solver.t_old, {"rtol": solver.rtol, "atol": solver.atol}
-    part = DOP853(solver.fun, solver.t_old, solver.y_old, t, first_step=h, **options)
-    while part.status == "running":
-        controlled_step(part, lambda _, y: y, t)
-    return np.asarray(part.y)
-
-
-class Integrator(Protocol):
-    """Moves a state in time.
+class Integrator(ABC):
+    """Moves a state in time, from sample to sample or by single steps.
 
     Attributes:
         resolution: the setting that trades speed for accuracy.
         order: of convergence in ``dt``; None with an adaptive step.
+        stability: largest h λ with which a component that decays like exp(-λ t) still decays.
+        reach: part of the time in which a slip vanishes, doubles or turns by a radian that one step may take.
         t, x: present time [s] and state.
+        t_before, x_before: where the last single step started.
     """
 
     resolution: ClassVar[Literal["dt", "rtol"]]
     order: ClassVar[int | None]
-    t: float
-    x: FloatArray
+    stability: ClassVar[float]
+    reach: ClassVar[float]
 
-    def __init__(self, rates: Rates, accept: Accept, x: FloatArray, scales: FloatArray, resolution: float) -> None:
-        """Starts at time 0.
+    def __init__(self, resolution: float) -> None:
+        """Takes the value of the setting of that name."""
+        self._resolution = resolution
+
+    def begin(self, t: float, x: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:  # noqa: ARG002 -- a fixed step needs no measure of error
+        """Starts, or goes on with another state or other equations.
 
         Args:
+            t: present time [s].
+            x: the state.
             rates: ẋ of x.
-            accept: see :data:`Accept`.
-            x: initial state.
+            accept: see :data:`proofroll.core.dop853.Accept`.
             scales: natural size of each component of x.
-            resolution: value of the setting of that name.
         """
+        self.t, self.x, self.t_before, self.x_before = t, x, t, x
+        self._rates, self._accept = rates, accept
 
+    @abstractmethod
     def advance(self, t: float) -> None:
         """Moves to time t [s]; the last step ends there.
 
@@ -99,60 +75,137 @@ class Integrator(Protocol):
             Diverged: it gave up.
         """
 
+    def aim(self, t: float) -> None:  # noqa: B027 -- the steps of most methods end anywhere
+        """Says that single steps will have to end at the time t [s].
 
-class RungeKutta4:
-    """The classical Runge-Kutta method with a fixed step."""
+        Raises:
+            InputError: the method's own steps do not end there.
+        """
 
-    resolution: ClassVar[Literal["dt", "rtol"]] = "dt"
-    order: ClassVar[int | None] = 4
+    @abstractmethod
+    def step(self, until: float, longest: float) -> None:
+        """One step, at most of this length [s] and at most to the time ``until`` [s].
 
-    def __init__(
-        self,
-        rates: Rates,
-        accept: Accept,
-        x: FloatArray,
-        scales: FloatArray,  # noqa: ARG002 -- a fixed step needs no measure of error
-        resolution: float,
-    ) -> None:
-        self.t, self.x = 0.0, x
-        self._rates, self._accept, self._dt = rates, accept, resolution
+        Raises:
+            Diverged: it gave up.
+        """
+
+    @abstractmethod
+    def inside(self, t: float) -> FloatArray:
+        """The state at a time [s] within the last step."""
+
+    def crossing(self, margin: Callable[[FloatArray], float], high: float, width: float) -> tuple[float, float]:
+        """Times [s] within the last step before and after a margin of the state became negative.
+
+        Args:
+            margin: negative at the time ``high``. One that starts at zero and rises first (a slip starts with none, a
+                rebound at its stop) is followed to where it comes back.
+            high: [s].
+            width: to which the time is located [s].
+        """
+        from scipy.optimize import brentq
+
+        def at(t: float) -> float:
+            return margin(self.inside(t))
+
+        start = low = self.t_before
+        if at(low) <= 0:
+            low = 0.5 * (start + high)
+            while low - start > width and at(low) <= 0:
+                low, high = 0.5 * (start + low), low
+            if low - start <= width:
+                return start, start
+        root = float(brentq(at, low, high, xtol=width, rtol=4 * np.finfo(float).eps))
+        while True:  # what the root search says, with a state on either side
+            before, after = max(low, root - width), min(high, root + width)
+            if (at(before) > 0 or before == low) and (at(after) < 0 or after == high):
+                return before, after
+            width *= 4
+
+    def bracket(self, low: float, high: float) -> tuple[float, float]:
+        """Bracket of an event located between two times [s]: as tight as it was located."""
+        return low, high
+
+
+class RungeKutta4(Integrator):
+    """The classical Runge-Kutta method on a grid of times; after an event it goes to the next point of the grid."""
+
+    resolution = "dt"
+    order = 4
+    stability = 2.78
+    reach = 0.25  # nothing else keeps the error of such a step small
 
     def advance(self, t: float) -> None:
         """See :class:`Integrator`."""
-        rates, h, start, x = self._rates, self._dt, self.t, self.x
+        rates, h, start, x = self._rates, self._resolution, self.t, self.x
         for step in range(1, whole_steps(start, t, h) + 1):
             x = self._accept(start + step * h, classical_step(rates, x, h))
         self.t, self.x = t, x
 
+    def aim(self, t: float) -> None:
+        """See :class:`Integrator`."""
+        whole_steps(self.t, t, self._resolution)
 
-class DormandPrince853:
+    def step(self, until: float, longest: float) -> None:
+        """See :class:`Integrator`."""
+        dt = self._resolution
+        end = (math.floor(self.t / dt + _SLIVER) + 1) * dt
+        if end > until - _SLIVER * dt:
+            end = until
+        if end - self.t > longest:
+            end = self.t + longest
+        if end == self.t:
+            raise Diverged(f"the step size fell to nothing at t = {self.t:.6g} s")
+        self.t_before, self.x_before = self.t, self.x
+        self.x, self.t = self.inside(end), end
+
+    def inside(self, t: float) -> FloatArray:
+        """See :class:`Integrator`."""
+        if t == self.t_before:
+            return self.x_before
+        return self._accept(t, classical_step(self._rates, self.x_before, t - self.t_before))
+
+    def bracket(self, low: float, high: float) -> tuple[float, float]:
+        """See :class:`Integrator`. The step of the grid: a narrower one would trust the step's own error."""
+        start = math.floor(low / self._resolution + _SLIVER) * self._resolution
+        return min(start, low), max(start + self._resolution, high)
+
+
+class DormandPrince853(Integrator):
     """Dormand and Prince's method of order 8 with error control, from scipy.
 
-    One solver lives through the whole run. Its bound moves from sample to sample, so that a step ends at each: scipy's
+    One solver lives from :meth:`begin` on. Its bound moves from sample to sample, so that a step ends at each: scipy's
     interpolant is of order 7 only.
     """
 
-    resolution: ClassVar[Literal["dt", "rtol"]] = "rtol"
-    order: ClassVar[int | None] = None
+    resolution = "rtol"
+    order = None
+    stability = 6.3  # its step multiplies exp(-λ t) by less than 1 up to 6.39
+    reach = 0.6
 
-    def __init__(self, rates: Rates, accept: Accept, x: FloatArray, scales: FloatArray, resolution: float) -> None:
-        from scipy.integrate import DOP853
-
-        self.t, self.x = 0.0, x
-        self._accept, self._watch = accept, StepWatch()
-        self._solver = DOP853(lambda _, y: rates(y), 0.0, x, np.inf, rtol=resolution, atol=resolution * scales)
+    def begin(self, t: float, x: FloatArray, rates: Rates, accept: Accept, scales: FloatArray) -> None:
+        """See :class:`Integrator`."""
+        super().begin(t, x, rates, accept, scales)
+        self._solver = solver_from(lambda _, y: rates(y), t, np.array(x), self._resolution, self._resolution * scales)
+        self._watch = StepWatch()
 
     def advance(self, t: float) -> None:
         """See :class:`Integrator`."""
-        solver = self._solver
-        if t <= self.t:
-            return
-        while solver.t < t:
-            begun = solver.t
-            controlled_step(solver, self._accept, t)
-            self.x = solver.y
-            self._watch.took(float(solver.t), float(solver.t - begun), solver.t == t)
-        self.t, self.x = t, solver.y
+        while self.t < t:
+            self.step(t, math.inf)
+            self._watch.took(self.t, self.t - self.t_before, self.t == t)
+
+    def step(self, until: float, longest: float) -> None:
+        """See :class:`Integrator`."""
+        self.t_before, self.x_before = self.t, self.x
+        controlled_step(self._solver, self._accept, until, longest)
+        self.t, self.x = float(self._solver.t), self._solver.y
+
+    def inside(self, t: float) -> FloatArray:
+        """See :class:`Integrator`."""
+        if t == self.t_before:
+            return self.x_before
+        return self.x if t == self.t else self._accept(t, inside_last_step(self._solver, t))
 
 
 INTEGRATORS: Mapping[str, type[Integrator]] = {"rk4": RungeKutta4, "dop853": DormandPrince853}

@@ -8,9 +8,9 @@ from types import ModuleType
 
 from proofroll.core.announced import loaded
 from proofroll.core.errors import ProofrollError
+from proofroll.core.source_code import OWN
 
 STUDY_FOLDERS = "proofroll.study_folders"
-_PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def data_folder(kind: str) -> Path:
@@ -19,7 +19,7 @@ def data_folder(kind: str) -> Path:
     Raises:
         ProofrollError: neither the installed package nor a repository around it holds the folder.
     """
-    for candidate in (_PACKAGE / kind, _PACKAGE.parents[1] / kind):
+    for candidate in (OWN / kind, OWN.parents[1] / kind):
         if candidate.is_dir():
             return candidate
     raise ProofrollError(f"the folder {kind}/ is neither in the installed package nor beside src/; reinstall proofroll")

@@ -18,6 +18,7 @@ from proofroll.report.figure import panels, svg_text
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.pages import element, environment, rendered
 from proofroll.report.terminal.tables import change_lines
+from proofroll.report.tradeoff.work_precision import SMALLEST
 from proofroll.running.store import write_text
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from proofroll.report.long_table import TableLine
 
 _COLOURS = ("#c9622f", "#3b6fb6", "#3f8f5b", "#8b5fa8", "#b08a1e", "#b8476b", "#2a8f9c", "#000000")
-_SMALLEST = 1e-17  # a logarithm needs a number
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ def _drawn(engine: EngineHistory, dates: Sequence[str]) -> Figure:
         if run.changed:
             look = {"color": next(colours), "lw": 1.4, "marker": "o", "markersize": 3, "label": run.run}
         for panel, values in zip(drawn, (run.errors, run.costs), strict=True):
-            panel.plot(at, [float("nan") if value is None else max(value, _SMALLEST) for value in values], **look)
+            panel.plot(at, [float("nan") if value is None else max(value, SMALLEST) for value in values], **look)
     for panel, title in zip(drawn, ("largest error, in parts of its size", "cost [s/s]"), strict=True):
         panel.set(yscale="log", title=title, xticks=list(at), xlim=(-0.2, len(dates) - 0.8))
         panel.set_xticklabels(marks, rotation=0 if len(dates) < 7 else 60)

@@ -8,10 +8,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.number_format import counted
+from proofroll.robots.mjcf_classes import MAIN
 from proofroll.robots.robot_file import LintRemark, file_inside, required_file
-
-# The default class of what names none.
-_MAIN = "main"
 
 
 class Shapes:
@@ -22,13 +20,13 @@ class Shapes:
     """
 
     def __init__(self, root: Element) -> None:
-        self._classes: dict[str, dict[str, str]] = {_MAIN: {}}
+        self._classes: dict[str, dict[str, str]] = {MAIN: {}}
         for top in root.findall("default"):
-            self._read(top, _MAIN, _MAIN)
+            self._read(top, MAIN, MAIN)
         self._inherited: dict[Element, str] = {}
         self.found: list[tuple[Element, Element, Element]] = []
         for world in root.iter("worldbody"):
-            self._walk(world, world, _MAIN)
+            self._walk(world, world, MAIN)
 
     def _read(self, default: Element, name: str, above: str) -> None:
         self._classes[name] = dict(self._classes[above])
@@ -47,7 +45,7 @@ class Shapes:
 
     def of(self, shape: Element, attribute: str) -> str | None:
         """An attribute of a shape."""
-        name = shape.get("class", self._inherited.get(shape, _MAIN))
+        name = shape.get("class", self._inherited.get(shape, MAIN))
         return shape.get(attribute, self._classes.get(name, {}).get(attribute))
 
 

@@ -13,8 +13,8 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dop853 import controlled_step, corrected_by, go_on_from, integrated_to, located, solver_from
 from proofroll.core.errors import Diverged, Refused
-from proofroll.truth.crossing import first_rise, stays_negative
 
 State = FloatArray
 ModeT = TypeVar("ModeT")
@@ -221,80 +221,17 @@ def walked(
     """
     if not until > time:
         return time, state, None
-    solver = _solver(rates, time, state, until, tolerance)
+    solver, back = solver_from(rates, time, state, float(np.min(tolerance)), tolerance), corrected_by(corrected)
     if first_step is not None:
         solver.h_abs = min(solver.h_abs, max(first_step, 16 * float(np.spacing(time))))
-    while solver.status == "running":
-        before, begun = solver.y.copy(), solver.t
+    while solver.t < until:
         if visited is not None:
-            visited.append((begun, before))
-        message = solver.step()
-        if message is not None or not np.isfinite(solver.y).all():
-            raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
-        seen = guards if noise is None else (lambda y: guards(y) - noise)
-        found = _first(seen, solver.dense_output(), begun, solver.t, begun == time)
-        if found is not None:
-            end, number = _refined(rates, before, begun, solver.t, found, guards, tolerance)
-            return end, corrected(_integrated(rates, before, begun, end, tolerance)), number
-        try:
-            solver.y = corrected(solver.y)
-        except Diverged as stopped:
-            raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {stopped}") from None
-        solver.f = rates(solver.t, solver.y)
+            visited.append((solver.t, solver.y.copy()))
+        controlled_step(solver, None, until)
+        if rise := located(solver, guards, 0.0 if noise is None else noise, leaving=solver.t_old == time):
+            return rise.time, corrected(rise.state), rise.guard
+        go_on_from(solver, back(solver.t, solver.y))
     return until, np.asarray(solver.y), None
-
-
-def _solver(rates: Rates, time: float, state: State, until: float, tolerance: FloatArray) -> Any:
-    from scipy.integrate import DOP853
-
-    solver = DOP853(rates, time, state, until, rtol=1e-3, atol=tolerance)
-    solver.rtol = float(np.min(tolerance))  # scipy accepts no less than 2.2e-14, which is its caution
-    return solver
-
-
-def _first(
-    guards: Callable[[State], FloatArray], between: Callable[[float], State], start: float, end: float, leaving: bool
-) -> tuple[float, int] | None:
-    """Time and number of the guard that rises first in a step; at the start of a leg none has yet (``leaving``)."""
-    known: dict[float, FloatArray] = {}
-
-    def at(time: float) -> FloatArray:
-        if time not in known:
-            values = guards(between(time))
-            known[time] = np.minimum(values, 0.0) if leaving and time <= start else values
-        return known[time]
-
-    found: tuple[float, int] | None = None
-    below = stays_negative(lambda times: np.array([at(float(t)) for t in times]), start, end)
-    for number in np.flatnonzero(np.logical_not(below)).tolist():
-        rise = first_rise(lambda times, k=number: np.array([at(float(t))[k] for t in times]), start, end)  # type: ignore[misc]  # mypy cannot type a default
-        if rise is not None and (found is None or rise < found[0]):
-            found = rise, number
-    return found
-
-
-def _refined(
-    rates: Rates,
-    before: State,
-    start: float,
-    end: float,
-    found: tuple[float, int],
-    guards: Callable[[State], FloatArray],
-    tolerance: FloatArray,
-) -> tuple[float, int]:
-    """The time of a rise, by secants on the state integrated afresh: a dense output has fewer digits than a step."""
-    time, number = found
-    span = 1e-4 * (end - start)
-    for _ in range(4):
-        state = _integrated(rates, before, start, time, tolerance)
-        here = float(guards(state)[number])
-        rate = rates(time, state)
-        slope = float(guards(state + span * rate)[number] - guards(state - span * rate)[number]) / (2 * span)
-        better = time - here / slope if slope > 0 else time
-        if not start - span <= better <= end + span or abs(better - time) <= 2 * np.spacing(time):
-            break
-        time = better
-    return time, number
 
 
 def between(
@@ -307,23 +244,13 @@ def between(
     """States at rising times [s], each from the start of the step that holds it, shape (times, state)."""
     starts = np.searchsorted([begun for begun, _ in visited], times, side="right") - 1
     steps = [visited[max(int(k), 0)] for k in starts]
-    found = [_integrated(rates, y, at, float(t), tolerance) for t, (at, y) in zip(times, steps, strict=True)]
-    return np.array([corrected(state) for state in found])
-
-
-def _integrated(rates: Rates, state: State, start: float, end: float, tolerance: FloatArray) -> State:
-    """The state at the end of a part of a step, which takes one step unless its error is too large.
-
-    A guard that rose just before the step, by less than its round-off, is a moment before it: in a straight line.
-    """
-    if end <= start:
-        return state + (end - start) * rates(start, state)
-    solver = _solver(rates, start, state, end, tolerance)
-    solver.h_abs = end - start
-    while solver.status == "running":
-        if message := solver.step():
-            raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message}")
-    return np.asarray(solver.y)
+    rtol = float(np.min(tolerance))
+    return np.array(
+        [
+            corrected(integrated_to(rates, at, y, t, rtol, tolerance))
+            for t, (at, y) in zip(times.tolist(), steps, strict=True)
+        ]
+    )
 
 
 def states_of(

@@ -29,8 +29,9 @@ def made(cut: CutOut, more: str = "") -> dict[str, Any]:
 
 def test_it_runs_without_the_package() -> None:
     """A class comes with the functions and constants that its methods need, in an order that can be executed."""
-    cut = CutOut([RungeKutta4], ["advance", "x"])
-    run = made(cut)["RungeKutta4"](lambda x: -x, lambda _, x: x, np.ones(1), np.ones(1), 0.1)
+    cut = CutOut([RungeKutta4], ["begin", "advance", "x"])
+    run = made(cut)["RungeKutta4"](0.1)
+    run.begin(0.0, np.ones(1), lambda x: -x, lambda _, x: x, np.ones(1))
     run.advance(1.0)
     assert run.x == pytest.approx(math.exp(-1), rel=1e-5)
     assert {"RungeKutta4", "classical_step", "whole_steps"} <= set(cut.names)

@@ -63,11 +63,11 @@ def test_orientation_makes_no_difference() -> None:
 
 
 def test_start_of_slip_does_not_matter(true: xr.Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The size of slip up to which the direction is slaved, ten times larger, moves the events by next to nothing."""
+    """The size of slip up to which the direction is slaved, a thousandfold, moves events by next to nothing."""
     from proofroll.engines.pinocchio import stick_slip
 
     before = happened(true)
-    monkeypatch.setattr(stick_slip, "_HANDOVER", 10 * stick_slip._HANDOVER)
+    monkeypatch.setattr(stick_slip, "_HANDOVER", 1000 * stick_slip._HANDOVER)
     after = run(TUNED, 0.5, mu_static=0.15)
     assert happened(after) != before
     assert_events(after, before, within=1e-8)

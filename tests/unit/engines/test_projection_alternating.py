@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from proofroll.core.errors import Diverged
+from proofroll.core.integrators import INTEGRATORS
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess
 from proofroll.engines.projection.contact_modes import ContactMotion
 from proofroll.engines.projection.joint_modes import SwitchedMotion
-from proofroll.engines.projection.stepping import STEPPERS
 
 
 class Bouncing(AlternatingMotion[str]):
@@ -41,7 +41,7 @@ class Bouncing(AlternatingMotion[str]):
 @pytest.mark.parametrize(("name", "resolution"), [("rk4", 1e-2), ("dop853", 1e-10)])
 def test_a_mode_ends_where_its_margin_does(name: str, resolution: float) -> None:
     """Impacts are located far below the step, and each has its time in its bracket."""
-    motion = Bouncing(STEPPERS[name](resolution), 0.5)
+    motion = Bouncing(INTEGRATORS[name](resolution), 0.5)
     motion.advance(1.0)
     fall = np.sqrt(2 / 9.81)
     assert [event.time for event in motion.events] == pytest.approx([fall, 2 * fall], rel=1e-10)
@@ -52,7 +52,7 @@ def test_a_mode_ends_where_its_margin_does(name: str, resolution: float) -> None
 def test_modes_that_end_at_once_end_the_run() -> None:
     """Twenty changes without any progress are an endless loop."""
     with pytest.raises(Diverged, match="bounces alternate without end"):
-        Bouncing(STEPPERS["dop853"](1e-10), 0.0).advance(1.0)
+        Bouncing(INTEGRATORS["dop853"](1e-10), 0.0).advance(1.0)
 
 
 def test_joints_and_contacts_go_from_mode_to_mode_alike() -> None:

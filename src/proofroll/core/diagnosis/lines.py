@@ -19,8 +19,6 @@ _EXACT = 1e-6
 _SHOWN = 3
 # Numbers of one line are one factor times the scene's to this part.
 _ALIKE = 1e-9
-# Lines that the first steps of an engine give, see :mod:`proofroll.core.first_steps`.
-DERIVED = " of the first steps"
 
 
 def differing(lines: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

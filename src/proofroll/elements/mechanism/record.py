@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from proofroll.core.dop853 import controlled_step, corrected_by, solver_from
 from proofroll.core.errors import Diverged
 from proofroll.core.stalling import StepWatch
 from proofroll.elements.mechanism.model import Mechanism
@@ -61,7 +62,7 @@ def integrated(
     start: Array,
     times: Array,
     tolerance: float,
-    corrected: Callable[[Array], Array] | None = None,
+    corrected: Callable[[Array], Array],
     least: Array | None = None,
 ) -> Iterator[Array]:
     """The state at each time by DOP853; the solver steps exactly onto it, for its interpolation is of lower order.
@@ -78,37 +79,23 @@ def integrated(
         least: absolute tolerance of each component; None: ``tolerance``.
 
     Raises:
-        Diverged: the steps become too small or too many, or the state is not finite.
+        Diverged: the steps become too small or too many.
     """
-    from scipy.integrate import DOP853
+    solver = solver_from(rate, 0.0, start, tolerance, tolerance if least is None else least)
+    steps, watch, lost, back = 0, StepWatch(), np.zeros_like(start), corrected_by(corrected)
 
-    # scipy needs an end; it is moved from sample to sample, so that the step size survives
-    solver = DOP853(rate, 0.0, start, float(times[-1]) or 1.0, rtol=1e-3, atol=tolerance)
-    solver.atol = tolerance if least is None else least
-    solver.rtol = tolerance  # scipy accepts no less than 2.2e-14, which is its caution, not the method's limit
-    steps, watch, lost = 0, StepWatch(), np.zeros_like(start)
-    for time in times:
-        if time > solver.t:
-            solver.t_bound, solver.status = float(time), "running"
+    def accept(t: float, _: Array) -> Array:
+        nonlocal lost
+        moved = (t - solver.t_old) * (solver.K[:-1].T @ solver.B) + lost
+        y = solver.y_old + moved
+        lost = moved - (y - solver.y_old)
+        return back(t, y)
+
+    for time in times.tolist():
         while solver.t < time:
-            usual, before, begun = solver.h_abs, solver.y, solver.t
-            message = solver.step()
+            controlled_step(solver, accept, time)
+            watch.took(solver.t, solver.step_size, solver.t == time)
             steps += 1
-            if solver.status == "failed" or not np.isfinite(solver.y).all():
-                raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {message or 'the state is not finite'}")
-            moved = (solver.t - begun) * (solver.K[:-1].T @ solver.B) + lost
-            solver.y = before + moved
-            lost = moved - (solver.y - before)
-            landing = solver.status == "finished"
-            watch.took(float(solver.t), solver.step_size, landing)
             if steps > _MOST_STEPS:
                 raise Diverged(f"DOP853 needs more than {_MOST_STEPS} steps; it reached t = {solver.t:.6g} s")
-            if landing:
-                solver.h_abs = max(solver.h_abs, usual)
-            if corrected is not None:
-                try:
-                    solver.y = corrected(solver.y)
-                except Diverged as stopped:
-                    raise Diverged(f"DOP853 stopped at t = {solver.t:.6g} s: {stopped}") from None
-                solver.f = rate(solver.t, solver.y)
         yield solver.y.copy()

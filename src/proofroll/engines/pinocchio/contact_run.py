@@ -18,10 +18,9 @@ from proofroll.elements.ball_on_surface.mechanics import (
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 from proofroll.engines.pinocchio.contact import UNBOUNDED_FRICTION, ContactSteps
+from proofroll.engines.pinocchio.integrators import QUATERNION
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
-# Numbers of a joint's configuration if it is an orientation.
-_QUATERNION = 4
 # Errors that the solver's tolerance and round-off explain, over what was measured at most on either scene.
 _MARGIN = 10.0
 
@@ -75,7 +74,7 @@ class ContactRun(ContactSteps):
             terms=terms_held(
                 resists=lever,
                 slips=contact.friction(self.mu_static) != UNBOUNDED_FRICTION[self.solver],
-                turns=contact.model.joints[contact.ball].nq == _QUATERNION,
+                turns=contact.model.joints[contact.ball].nq == QUATERNION,
             ),
         )
 

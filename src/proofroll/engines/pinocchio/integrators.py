@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dop853 import controlled_step, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
-from proofroll.core.integrators import controlled_step
 from proofroll.engines.pinocchio.ball_with_rows import BallWithRows, left_the_wall
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -148,7 +148,7 @@ class TangentRungeKutta4(FixedStep):
 SHORT = 1e-4
 PATIENCE = 500
 # Numbers of the ball's orientation in a configuration.
-_QUATERNION = 4
+QUATERNION = 4
 
 
 class Adaptive(TangentIntegrator):
@@ -164,7 +164,7 @@ class Adaptive(TangentIntegrator):
             require_tangent_map()
         # In both formulations the orientation is last. Without it, see FixedStep, no more than the place is integrated,
         # and its rates are velocities of the joints.
-        self._places = self._model.nq if self.turns else self._model.nq - _QUATERNION
+        self._places = self._model.nq if self.turns else self._model.nq - QUATERNION
         self._rtol = float(settings.rtol or 0.0)
         # Components in the ball's turning axes pass through zero all the time: a hundredth of their natural size
         # keeps the tolerance relative to most of their range.
@@ -203,9 +203,7 @@ class Adaptive(TangentIntegrator):
         return np.concatenate((v[:n], self._mechanism.accelerate(self._data, q, v)))
 
     def _solver_from(self, rates: Any, start: float, y: FloatArray) -> Any:
-        from scipy.integrate import DOP853
-
-        return DOP853(rates, start, y, np.inf, rtol=self._rtol, atol=self._atol)
+        return solver_from(rates, start, y, self._rtol, self._atol)
 
     def _advance(self, start: float, end: float) -> None:
         if end <= start:

@@ -7,13 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from proofroll.elements.mechanism.joint import AT_STOP
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import SwitchedJoint, switched_joints
 from proofroll.engines.pinocchio.joint_tree import JointTree
-
-# Distance [rad, m] up to which a joint is at its stop.
-_AT_STOP = 1e-9
 
 
 class JointRow(NamedTuple):
@@ -79,7 +77,7 @@ class JointRows:
         """
         found = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
-        closed = {item.joint.number for item in self.stops if item.gap(q) <= _AT_STOP}
+        closed = {item.joint.number for item in self.stops if item.gap(q) <= AT_STOP}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
             if item.limit is None or item.joint.number in closed:
                 total[item.joint.number] += item.sign * float(size)

@@ -40,8 +40,8 @@ class MechanismMotion:
         # where signals change in time, it is the last component of the state: integrators hand on nothing else
         start = np.concatenate([self.tree.q0, self.tree.v0, np.zeros(int(self.tree.varies))])
         resolution = float(getattr(settings, settings.resolution))
-        integrator = INTEGRATORS[settings.integrator]
-        self.motion = integrator(self._rates, self._accepted, start, np.ones(len(start)), resolution)
+        self.motion = INTEGRATORS[settings.integrator](resolution)
+        self.motion.begin(0.0, start, self._rates, self._accepted, np.ones(len(start)))
 
     def _rates(self, y: Array) -> Array:
         q, v = y[: self._nq], y[self._nq : self._end]

@@ -6,14 +6,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-import numpy as np
 from annotated_types import Ge, Gt
 
+from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.errors import refuse_first
 from proofroll.elements.ball_on_surface.model import BallCapability
-
-# scipy raises anything below 100 machine epsilons to it, with no more than a warning.
-TIGHTEST_RTOL = 100 * float(np.finfo(float).eps)
 
 _ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
 # Formulations of mechanisms, and their integrators.
@@ -64,7 +61,7 @@ class PinocchioSettings:
     preset: Literal["default", "matched", "tuned"] = "matched"
     integrator: Literal["semi_implicit_euler", "midpoint", "leapfrog", "rk4", "rk4_dexpinv", "dop853"] = "dop853"
     dt: Annotated[float, Gt(0)] | None = None
-    rtol: Annotated[float, Ge(TIGHTEST_RTOL)] | None = 1e-13
+    rtol: Annotated[float, Ge(TIGHTEST)] | None = 1e-13
     orientation: bool | None = None
     projection: bool = True
     solver: Literal["pgs", "admm"] | None = None
@@ -198,7 +195,7 @@ PRESETS: Mapping[str, Mapping[str, PinocchioSettings]] = {
         "default": PinocchioSettings("null_space", "default", "rk4", 1e-3, None, projection=False),
         "matched": PinocchioSettings("null_space", "matched", "rk4", 1e-3, None),
         # nothing left of the integrator but round-off
-        "tuned": PinocchioSettings("null_space", "tuned", rtol=TIGHTEST_RTOL),
+        "tuned": PinocchioSettings("null_space", "tuned", rtol=TIGHTEST),
     },
     "constraint_dynamics": {
         "default": PinocchioSettings(

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dop853 import Rise, located
 from proofroll.core.events import Event
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact
 from proofroll.engines.pinocchio.ball_with_rows import NOISE, BallWithRows, SlidingContact, left_the_wall, unit
-from proofroll.engines.pinocchio.crossing import located
 from proofroll.engines.pinocchio.integrators import Adaptive
 from proofroll.engines.pinocchio.settings import PinocchioSettings
 
@@ -157,9 +157,9 @@ class AdaptiveStickSlip(Adaptive):
             before, monitor = monitor, self._after_step(solver.y)
             stop = self._stop(solver, before, monitor)
             if monitor[2] < -self._mechanism.faint:
-                self._leave(solver, before[2], monitor[2], stop)
+                self._leave(solver, stop)
             if stop is not None:
-                return self._switch(*stop)
+                return self._switch(*stop[:3])
         self._monitored = monitor
         self._keep(solver.y)
         return end
@@ -192,41 +192,29 @@ class AdaptiveStickSlip(Adaptive):
         beyond, normal_force = self._mechanism.excess(self._data, *self._split(y), self.mu_static)
         return beyond, 0.0, normal_force
 
-    def _stop(
-        self, solver: Any, before: tuple[float, float, float], after: tuple[float, float, float]
-    ) -> tuple[float, float, FloatArray] | None:
-        """Time at which the mode ended within the last step [s], half the width of its bracket [s], and state."""
+    def _stop(self, solver: Any, before: tuple[float, float, float], after: tuple[float, float, float]) -> Rise | None:
+        """End of the mode within the last step."""
         if self._mode is FrictionLaw.STICKING:
             # The excess lies in [-1, 1] and its crests are many steps wide, so far below zero nothing is missed.
             if max(before[0], after[0]) < -0.1 - abs(after[0] - before[0]):
                 return None
-            return located(
-                solver, lambda y: self._excess(y) - _GRAZE, before[0] - _GRAZE, after[0] - _GRAZE, self._span
-            )
+            return located(solver, lambda y: np.array([self._excess(y) - _GRAZE]))
         if self._mode is FrictionLaw.CREEPING:
             if after[0] >= self._handover:
-                return located(
-                    solver, lambda y: self._speed(y)[0] - self._handover, -self._handover, after[0], self._span
-                )
+                return located(solver, lambda y: np.array([self._speed(y)[0] - self._handover]))
             # It ends below zero by more than round-off, or the zero at which it began would be found again.
             if after[0] < -self._least and after[1] < 0:
-                return located(
-                    solver,
-                    lambda y: -self._speed(y)[0] - self._least,
-                    -before[0] - self._least,
-                    -after[0] - self._least,
-                    self._span,
-                )
+                return located(solver, lambda y: np.array([-self._speed(y)[0] - self._least]))
         return None
 
-    def _leave(self, solver: Any, before: float, after: float, stop: tuple[float, float, FloatArray] | None) -> None:
+    def _leave(self, solver: Any, stop: Rise | None) -> None:
         """Says that the ball leaves the wall where N falls through zero, unless the mode ends before that.
 
         Raises:
             Diverged: the ball leaves the wall.
         """
-        lift = located(solver, lambda y: -self._monitor(y)[2], -before, -after, self._span)
-        time, width = lift[:2] if lift is not None else (float(solver.t), float(solver.step_size))
+        lift = located(solver, lambda y: np.array([-self._monitor(y)[2]]))
+        time, width = lift[:2] if lift else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
             self._record("lift_off", time, width)
             raise left_the_wall(f"at {time:.6g} s")

@@ -27,13 +27,11 @@ from proofroll.engines.projection.mechanism import ProjectionMechanism
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.orientation import EulerAngles, FollowedFrame, Orientation, RotatingFrame
 from proofroll.engines.projection.settings import PRESETS, ProjectionSettings
-from proofroll.engines.projection.stepping import STEPPERS
 from proofroll.engines.projection.switching import Switching
 from proofroll.engines.projection.taylor import TaylorSeries
 
 # Numbers of the state that are not the ball's orientation: two coordinates and five velocities.
 _WITHOUT_ORIENTATION = 7
-_TURN = 2 * math.pi
 _OF_BALLS = ("euler", "rotating_frame")
 
 
@@ -112,10 +110,11 @@ class Projection:
             assert settings.formulation != "dependent"  # see the settings
             self._motion = TaylorSeries(body, settings.formulation, x, resolution, self._check, self._accepted)
         elif math.isfinite(body.contact.mu_static) or body.contact.rolling_resistance > 0:
-            stepper = STEPPERS[settings.integrator](resolution)
+            stepper = INTEGRATORS[settings.integrator](resolution)
             self._motion = Switching(self._ball, body, stepper, x, scales, self._check, self._renewed, self._eliminate)
         else:
-            self._motion = INTEGRATORS[settings.integrator](self._ball.rates, self._accept, x, scales, resolution)
+            self._motion = INTEGRATORS[settings.integrator](resolution)
+            self._motion.begin(0.0, x, self._ball.rates, self._accept, scales)
 
     def _check(self, t: float, x: FloatArray) -> None:
         n = self._coordinates
@@ -139,10 +138,10 @@ class Projection:
         Nothing depends on whole turns, but round-off and the tolerance of a step go with the largest component of the
         state: after ten thousand turns the angles would be known to eleven digits, and with them what rolls.
         """
-        beyond = [index for index in self._angles if abs(x.item(index)) > _TURN]
+        beyond = [index for index in self._angles if abs(x.item(index)) > math.tau]
         if beyond:
             x = x.copy()
-            x[beyond] -= _TURN * np.trunc(x[beyond] / _TURN)
+            x[beyond] -= math.tau * np.trunc(x[beyond] / math.tau)
         return x
 
     def _renewed(self, t: float, x: FloatArray) -> FloatArray | None:

@@ -14,15 +14,13 @@ import numpy as np
 
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
+from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.projection.dependent import DependentCoordinates
-from proofroll.engines.projection.stepping import Stepper
 
 ModeT = TypeVar("ModeT")
-# Speed of an impact, over that of the first one of this joint or contact, below which rebounds are left out.
-SETTLED = 1e-6
 # A mode that ends where it started is possible; as many in a row as this are an endless loop.
-_WITHOUT_PROGRESS = 20
+WITHOUT_PROGRESS = 20
 _ULPS = 4  # of the time, to which switches are located
 
 
@@ -43,7 +41,7 @@ class Excess(NamedTuple):
 
 
 class AlternatingMotion(ABC, Generic[ModeT]):
-    """Motion by a :class:`Stepper`, which begins anew with each mode; its states y are x and the time.
+    """Motion by an integrator, which begins anew with each mode; its states y are x and the time.
 
     Attributes:
         t, x: present time [s] and state.
@@ -57,7 +55,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
     def __init__(
         self,
         equations: DependentCoordinates,
-        stepper: Stepper,
+        stepper: Integrator,
         accept: Callable[[float, Array], Array],
         breaks: Sequence[float] = (),
     ) -> None:
@@ -74,7 +72,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
     @property
     def x(self) -> Array:
         """State now."""
-        return self._stepper.y[:-1]
+        return self._stepper.x[:-1]
 
     @abstractmethod
     def _excess(self, y: Array) -> list[Excess]:
@@ -116,14 +114,14 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         stepper.aim(t)
         while stepper.t < t:
             stepper.step(min([t, *(at for at in self._breaks if at > stepper.t)]), np.inf)
-            ended = [one for one in self._excess(stepper.y) if one.size > 0 and one.closing]
+            ended = [one for one in self._excess(stepper.x) if one.size > 0 and one.closing]
             if ended:
                 self._switch(*min((self._crossing(one), one.which, one.kind) for one in ended))
                 continue
             self._idle = 0
-            self._look(stepper.y)
+            self._look(stepper.x)
             if stepper.t in self._breaks:
-                self._enter(stepper.t, stepper.y, self.mode)
+                self._enter(stepper.t, stepper.x, self.mode)
 
     def _crossing(self, end: Excess) -> float:
         """Time just after a mode ended within the last step [s]."""
@@ -137,7 +135,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
     def _switch(self, t: float, which: int, kind: str) -> None:
         stepper = self._stepper
         self._idle = self._idle + 1 if t <= stepper.t_before else 0
-        if self._idle > _WITHOUT_PROGRESS:
+        if self._idle > WITHOUT_PROGRESS:
             raise Diverged(f"{self.alternates} alternate without end at t = {t:.6g} s")
         y, mode, happened = self._next(stepper.inside(t), which, kind)
         bracket = stepper.bracket(max(stepper.t_before, t - _ULPS * float(np.spacing(t))), t)

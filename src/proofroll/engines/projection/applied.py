@@ -15,8 +15,6 @@ from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import switched_joints
 from proofroll.engines.projection.connections import SKEW, Bodies, Ends
 
-_TURN = 2 * math.pi
-
 
 class _Law(NamedTuple):
     """Spring, damper and drive of one coordinate of a joint; ``axis`` z (of A), x (of B) or slide (along z of A).
@@ -161,7 +159,7 @@ class Applied:
             angle = math.atan2(B[:, 0] @ A[:, 1], B[:, 0] @ A[:, 0])
         else:
             angle = math.atan2(A[:, 2] @ B[:, 1], A[:, 2] @ B[:, 2])
-        return angle + _TURN * round((self._angles[law] - angle) / _TURN)
+        return angle + math.tau * round((self._angles[law] - angle) / math.tau)
 
     @property
     def remembers(self) -> bool:

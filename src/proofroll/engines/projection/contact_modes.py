@@ -14,24 +14,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from proofroll.core.arrays import cross
+from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
-from proofroll.core.integrators import Accept
+from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
 from proofroll.elements.mechanism.contacts.family import Family
-from proofroll.elements.mechanism.contacts.start import TOUCHING
+from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.engines.projection.alternating import SETTLED, AlternatingMotion, Excess
+from proofroll.elements.mechanism.switches import SETTLED
+from proofroll.engines.projection.alternating import AlternatingMotion, Excess
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
-from proofroll.engines.projection.stepping import Stepper
 
 _RANK = 1e-10  # of the largest singular value: rows of contacts that depend on each other
-_STILL = 1e-9  # m/s: digits of a file, by which what touches may slide at the start
 _REST = 1e-2  # of what gravity makes in a fixed step: slips as slow as this end with another that ends
 
 
@@ -60,7 +60,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self,
         equations: DependentCoordinates,
         mechanism: Mechanism,
-        stepper: Stepper,
+        stepper: Integrator,
         accept: Accept,
         step: float,
     ) -> None:
@@ -68,11 +68,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
-        self._faint = max(_STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
+        self._faint = max(STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         start = np.append(equations.start, 0.0)
         now = self.at(start)
-        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= _STILL for each in now.touching]
-        still = [bool(np.linalg.norm(each.slide) <= _STILL) for each in now.touching]
+        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= STILL for each in now.touching]
+        still = [bool(np.linalg.norm(each.slide) <= STILL) for each in now.touching]
         self._enter(0.0, start, self._decided(now, closed, still))
 
     def at(self, y: Array) -> ContactsThere:
@@ -169,13 +169,13 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def solve(self) -> tuple[SolvedState, Array, tuple[Touching, ...]]:
         """Equations of motion now, the forces of contact, and the contacts."""
-        now = self.at(self._stepper.y)
+        now = self.at(self._stepper.x)
         force = self.forces(now, self.mode)
         return self._equations.solve(self.x, np.einsum("kin,ki->n", now.J, force)), force, now.touching
 
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`proofroll.elements.mechanism.sampling.MechanismBuilt`."""
-        now = self.at(self._stepper.y)
+        now = self.at(self._stepper.x)
         found = now.touching
         return {
             "contact_gap": np.array([each.gap for each in found]),
@@ -236,7 +236,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             x, closed = self._struck(x, now, k)
             happened = [("impact", self.contacts[k].name)]
             now = self.at(x)
-            still = [bool(np.linalg.norm(across(each)) <= _STILL) for each in now.touching]
+            still = [bool(np.linalg.norm(across(each)) <= STILL) for each in now.touching]
         elif kind == "still":
             slips = [float(np.linalg.norm(across(each))) for each in now.touching]
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import Refused
+from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, switched_joints
-from proofroll.engines.projection.alternating import SETTLED, AlternatingMotion, Excess
+from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, changes, held_by, switched_joints
+from proofroll.engines.projection.alternating import AlternatingMotion, Excess
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
-from proofroll.engines.projection.stepping import Stepper
 
 _DEPENDENT = 1e-12  # of the largest response: directions that respond less hold one degree of freedom together
 
@@ -37,7 +37,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         self,
         equations: DependentCoordinates,
         mechanism: Mechanism,
-        stepper: Stepper,
+        stepper: Integrator,
         accept: Callable[[float, Array, Sequence[int]], Array],
     ) -> None:
         super().__init__(equations, stepper, lambda t, x: accept(t, x, self._held), breaks(mechanism.signals))
@@ -52,7 +52,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
 
     def solve(self, y: Array | None = None) -> SolvedState:
         """Equations of motion in the present mode, now or at a state with its time."""
-        x = self._at(self._stepper.y if y is None else y)
+        x = self._at(self._stepper.x if y is None else y)
         return self._equations.solve(x, self._load(self.mode), held=self._held)
 
     def along_joints(self, count: int) -> dict[str, Array]:

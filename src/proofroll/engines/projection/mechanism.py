@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import cross
+from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.events import Event
-from proofroll.core.integrators import INTEGRATORS, Accept, Integrator
+from proofroll.core.integrators import INTEGRATORS, Integrator
 from proofroll.core.stalling import Stalled
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability, require
 from proofroll.elements.mechanism.pose_words import pose
@@ -30,7 +31,6 @@ from proofroll.engines.projection.dependent import DependentCoordinates, SolvedS
 from proofroll.engines.projection.joint_modes import SwitchedMotion
 from proofroll.engines.projection.recursion import compiled
 from proofroll.engines.projection.settings import ProjectionSettings
-from proofroll.engines.projection.stepping import STEPPERS
 
 PROVIDES = frozenset(
     ALL_JOINTS
@@ -85,21 +85,20 @@ class ProjectionMechanism:
         self._switched: SwitchedMotion | None = None
         self._touching: ContactMotion | None = None
         self._motion: Integrator | SwitchedMotion | ContactMotion
+        stepper = INTEGRATORS[settings.integrator](resolution)
         if mechanism.contacts:
-            stepper = STEPPERS[settings.integrator](resolution)
             self._motion = self._touching = ContactMotion(
                 self._equations, mechanism, stepper, self._accepted, resolution if settings.resolution == "dt" else 0.0
             )
             return
         if switched:
-            stepper = STEPPERS[settings.integrator](resolution)
             self._motion = self._switched = SwitchedMotion(self._equations, mechanism, stepper, self._accepted)
             return
-        integrator = INTEGRATORS[settings.integrator]
         accepted: Accept = self._accepted
         if self._timed:  # the time is the last component of the state: integrators hand on nothing else
             start, rates, accepted = np.append(start, 0.0), self._rates_in_time, self._accepted_in_time
-        self._motion = integrator(rates, accepted, start, np.ones(len(start)), resolution)
+        self._motion = stepper
+        stepper.begin(0.0, start, rates, accepted, np.ones(len(start)))
 
     def _rates_in_time(self, y: Array) -> Array:
         self._equations.applied.now = float(y[-1])

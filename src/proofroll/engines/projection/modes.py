@@ -49,7 +49,7 @@ class Pace(NamedTuple):
 
     Attributes:
         speed, time: natural size of speeds [m/s] and times [s].
-        stability, reach: of the integrator, see :class:`proofroll.engines.projection.stepping.Stepper`.
+        stability, reach: of the integrator, see :class:`proofroll.core.integrators.Integrator`.
     """
 
     speed: float

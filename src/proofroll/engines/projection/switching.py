@@ -10,20 +10,19 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
+from proofroll.core.integrators import Integrator
 from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.mechanics import natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.engines.projection.alternating import WITHOUT_PROGRESS
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
 from proofroll.engines.projection.modes import ContactMode, Exit, Pace, Survey
 from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
-from proofroll.engines.projection.stepping import Stepper
 from proofroll.engines.projection.sticking import Rest, Stick
 
 # Times are located to this part of the time scale of the motion, or to round-off of the time itself.
 _LOCATED = 1e-12
-# A mode that ends where it started is possible; as many in a row as this are an endless loop.
-_WITHOUT_PROGRESS = 20
 
 
 class Switching:
@@ -40,7 +39,7 @@ class Switching:
         self,
         ball: ProjectedBall,
         body: RollingBall,
-        stepper: Stepper,
+        stepper: Integrator,
         x: FloatArray,
         scales: FloatArray,
         check: Callable[[float, FloatArray], None],
@@ -83,7 +82,7 @@ class Switching:
     @property
     def x(self) -> FloatArray:
         """Coordinates and velocities now."""
-        return self.mode.x(self.stepper.y)
+        return self.mode.x(self.stepper.x)
 
     @property
     def t(self) -> float:
@@ -93,12 +92,12 @@ class Switching:
     @property
     def rates(self) -> FloatArray:
         """Rates of the state now, those of x first."""
-        return self.mode.rates(self.stepper.y)
+        return self.mode.rates(self.stepper.x)
 
     @property
     def force(self) -> FloatArray:
         """Force of the wall on the ball now along the local axes [N], shape (3,)."""
-        return self.mode.force(self.stepper.y)
+        return self.mode.force(self.stepper.x)
 
     def advance(self, t: float) -> None:
         """Moves to time t [s].
@@ -117,9 +116,9 @@ class Switching:
             if ended is not None:
                 self._switch(*ended)
             elif survey.slaved:
-                self._enter(self._slaved, stepper.t, stepper.y[:-1])
+                self._enter(self._slaved, stepper.t, stepper.x[:-1])
             elif (renewed := self._renewed(stepper.t, self.x)) is not None:
-                self._enter(self.mode, stepper.t, np.concatenate([renewed, stepper.y[len(renewed) :]]))
+                self._enter(self.mode, stepper.t, np.concatenate([renewed, stepper.x[len(renewed) :]]))
             else:
                 self._survey, self._idle = survey, 0
 
@@ -127,8 +126,8 @@ class Switching:
         """After a step."""
         stepper = self.stepper
         if self.mode is self._stick and self._stick.halts and not self.friction.bounded:
-            return self._stick.glance(stepper.y, self._survey, stepper.t - stepper.t_before)
-        return self.mode.survey(stepper.y)
+            return self._stick.glance(stepper.x, self._survey, stepper.t - stepper.t_before)
+        return self.mode.survey(stepper.x)
 
     def _enter(self, mode: ContactMode, t: float, y: FloatArray) -> None:
         def accept(at: float, state: FloatArray) -> FloatArray:
@@ -175,7 +174,7 @@ class Switching:
 
     def _switch(self, exit_: Exit, low: float, high: float) -> None:
         self._idle = self._idle + 1 if high == self.stepper.t_before else 0
-        if self._idle > _WITHOUT_PROGRESS:
+        if self._idle > WITHOUT_PROGRESS:
             raise Diverged(f"sticking and slipping alternate without end at t = {high:.6g} s")
         y = self.stepper.inside(high)
         x = self.mode.x(y)

@@ -121,7 +121,8 @@ class Integrated(ReducedModel):
         a, per_metre = body.ball.radius, 1 / self._scales
         scales = np.concatenate([a * per_metre, speed * per_metre, [speed / a]])
         x = start(body)
-        self._motion = DormandPrince853(lambda x: reduced_rates(body, x)[0], self._accepted, x, scales, rtol)
+        self._motion = DormandPrince853(rtol)
+        self._motion.begin(0.0, x, lambda x: reduced_rates(body, x)[0], self._accepted, scales)
         self._last, self._until = (0.0, x), 0.0
 
     def advance(self, t: float) -> None:

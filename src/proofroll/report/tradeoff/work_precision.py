@@ -19,7 +19,7 @@ _COLOURS = ("#3b6fb6", "#c9622f", "#3f8f5b", "#8b5fa8", "#b08a1e", "#5b6770", "#
 _DASHES = ("-", "--", "-.", ":")
 _MARKERS = "osD^vPX*"
 # Errors below this are round-off of every double; a logarithm needs a number.
-_SMALLEST = 1e-17
+SMALLEST = 1e-17
 # Height of a line of the legend [in].
 _LINE = 0.145
 
@@ -63,7 +63,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
         index = styles.index(formulation)
         panel.plot(
             [point.seconds_per_second for point in points],
-            [max(point.error[quantity] or 0.0, _SMALLEST) for point in points],
+            [max(point.error[quantity] or 0.0, SMALLEST) for point in points],
             color=_COLOURS[engines.index(engine) % len(_COLOURS)],
             linestyle=_DASHES[index % len(_DASHES)],
             marker=_MARKERS[index % len(_MARKERS)],
@@ -77,7 +77,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
     _front(panel, study, quantity)
     bar = facts.truth_error_bar
     if bar:
-        panel.axhspan(_SMALLEST, bar, color="0.88", lw=0, zorder=0)
+        panel.axhspan(SMALLEST, bar, color="0.88", lw=0, zorder=0)
     cost = study.truth.seconds_per_second
     if cost and bar:
         panel.plot([cost], [bar], marker="*", color="black", markersize=9, linestyle="", label="truth: its error bar")
@@ -91,7 +91,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
 
 def _front(panel: Any, study: TradeoffStudy, quantity: str) -> None:
     """Draws Pareto fronts as steps."""
-    floor = max(study.quantities[quantity].truth_error_bar or 0.0, _SMALLEST)
+    floor = max(study.quantities[quantity].truth_error_bar or 0.0, SMALLEST)
     right = max((p.seconds_per_second for p in study.points if p.seconds_per_second), default=1.0)
     for key, colour, words in (
         ("pareto_engines", "black", "Pareto front of the engines"),

@@ -18,6 +18,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, scatter_of, size, tightest
 from proofroll.core.number_format import number
 from proofroll.core.verdict import round_off_of
+from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 from proofroll.studies.tradeoff.records import CurveBudget
 
@@ -29,7 +30,6 @@ _STALLED = 0.25
 _ABOVE = 3.0
 # How far a declared order may lie outside the interval of the observed one before it counts as contradicted.
 _SLACK = 0.25
-_CONFIDENCE = 0.95
 
 NOTHING = "there is no step and no tolerance"
 TIME_STEP, MODEL_FORM, FLOOR, TRUTH = (
@@ -158,7 +158,7 @@ def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:
 
     seen = np.log(np.asarray(differences)[span])
     (_, order), covariance = curve_fit(law, pairs, seen, p0=(seen[-1], np.mean(local[start:end])))
-    half = float(t.ppf(0.5 + _CONFIDENCE / 2, len(pairs) - 2) * np.sqrt(covariance[1, 1]))
+    half = float(t.ppf(0.5 + CONFIDENCE / 2, len(pairs) - 2) * np.sqrt(covariance[1, 1]))
     return Order(float(order), float(order) - half, float(order) + half, *between)
 
 

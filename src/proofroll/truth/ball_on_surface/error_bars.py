@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 # cases were further from it than the routes were from each other, by up to 2.25 times.
 SAFETY = 3.0
 # A route's own round-off: values carry a relative error of some machine epsilons even where the routes agree.
-_ROUND_OFF = 4 * np.finfo(float).eps
+ROUND_OFF = 4 * np.finfo(float).eps
 # What is a small difference of large numbers, and of which.
 _DIFFERENCE_OF = {"gap": "p_WB", "slip": "v_WB", "slip2": "v_WB", "slip3": "v_WB"}
 # Where the normal force is this many of its own error bars or less, the friction needed is 0/0.
@@ -68,5 +68,5 @@ def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
         size = 0.0 if values.dtype == bool else np.max(np.abs(mine), initial=0.0)
         difference = np.max(np.abs(mine - other), initial=0.0)
         if name in _DIFFERENCE_OF:  # it has the round-off of what it is a difference of
-            difference += _ROUND_OFF * np.max(np.abs(result[_DIFFERENCE_OF[name]].to_numpy()), initial=0.0)
+            difference += ROUND_OFF * np.max(np.abs(result[_DIFFERENCE_OF[name]].to_numpy()), initial=0.0)
         values.attrs["error_bar"] = float(SAFETY * (difference + floor * size))

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.crossing import first_rise
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.route import End, Leg, Route, World
-from proofroll.truth.crossing import first_rise
 
 # A ball that leaves the wall is looked for on it from this part of its pace on; its gap has grown from zero till then.
 _LEFT = 1e-3

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.crossing import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.ball_on_surface import taylor
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.route import Route
-from proofroll.truth.crossing import first_rise
 
 _UNREACHABLE = 1e6  # a static friction that stands for rolling without slip, and still can be squared
 _POINTS = 12

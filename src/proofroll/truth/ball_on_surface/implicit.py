@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, cross
+from proofroll.core.crossing import first_rise
 from proofroll.core.errors import Diverged
 from proofroll.elements.ball_on_surface.mechanics import always_pressed
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -18,7 +19,6 @@ from proofroll.truth.ball_on_surface.contact import ContactRates
 from proofroll.truth.ball_on_surface.impact import by_equations
 from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
-from proofroll.truth.crossing import first_rise
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
 _APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,

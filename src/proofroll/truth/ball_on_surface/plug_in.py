@@ -20,7 +20,7 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form
 from proofroll.truth.ball_on_surface import rolling, unreduced_taylor
-from proofroll.truth.ball_on_surface.error_bars import dataset_of, put_error_bars
+from proofroll.truth.ball_on_surface.error_bars import ROUND_OFF, dataset_of, put_error_bars
 from proofroll.truth.ball_on_surface.onset import edge_between, onset
 from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS
 from proofroll.truth.ball_on_surface.stick_slip import stays_on, stick_slip
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _ILL_POSED = "the time of the first slip hangs on less than the parameters are known to"
-# A route's own round-off: its values carry a relative error of some machine epsilons even where the routes agree.
-_ROUND_OFF = 4 * np.finfo(float).eps
 
 
 class BallOnSurfaceTruth:
@@ -111,6 +109,6 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
 
     result = dataset_of(scene, times, first(times), from_start(lambda at: first(at).w_WB), (), QUATERNIONS)
     check = dataset_of(scene, times, second(times), from_start(second_spin), (), MATRICES)
-    put_error_bars(result, check, _ROUND_OFF)
+    put_error_bars(result, check, ROUND_OFF)
     result.attrs["second_route"] = check.attrs["route"]
     return result

@@ -9,18 +9,21 @@ friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, s
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.dop853 import located
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import reduced_rates, start
-from proofroll.truth.ball_on_surface.explicit import ExplicitRun, Piece, Rates, stop
+from proofroll.truth.ball_on_surface.explicit import ExplicitRun, Rates
 from proofroll.truth.ball_on_surface.route import End
 from proofroll.truth.ball_on_surface.sliding import Sliding
 
+_Stop = tuple[End, Callable[[FloatArray], float]]
 _APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
 _STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
 
@@ -75,14 +78,14 @@ class Polar(Sliding):
     def _stick(self, time: float, state: FloatArray, until: float) -> ExplicitRun:
         resisted = self._body.contact.rolling_resistance > 0
 
-        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
-            if found := self._ended(piece):
-                return found
-            left = self._until_halt(piece.last) if resisted else np.inf
-            if not (left < _STILL * self._pace and piece.end < until):
+        def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
+            if stopped := self._ended(solver):
+                return stopped
+            left = self._until_halt(solver.y) if resisted else np.inf
+            if not (left < _STILL * self._pace and solver.t < until):
                 return None
-            halted = piece.last + left * self.rates(piece.last)
-            return piece.end + left, self.nudged(halted, np.zeros(3)), End.HALT
+            halted = solver.y + left * self.rates(solver.y)
+            return solver.t + left, self.nudged(halted, np.zeros(3)), End.HALT
 
         cap = (lambda y: _APPROACH * self._until_halt(y)) if resisted else None
         return ExplicitRun(self.rates, time, state, until, atol=self._atol[:5], ended=ended, cap=cap)
@@ -96,28 +99,24 @@ class Polar(Sliding):
     def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> ExplicitRun:
         rates: Rates = lambda y: self._following(y)[0]  # noqa: E731 -- one line each for two closures
 
-        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
-            size = piece.last[5]
-            if size >= handover and (grown := stop(rates, piece, lambda y: y[5] - handover)):
-                return *grown, End.GROWN
-            if size <= 0 and (back := stop(rates, piece, lambda y: -y[5])):
-                return *back, End.STILL
-            return None
+        def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
+            size = solver.y[5]
+            if size >= handover:
+                return _first(solver, [(End.GROWN, lambda y: y[5] - handover)])
+            return _first(solver, [(End.STILL, lambda y: -y[5])]) if size <= 0 else None
 
         return ExplicitRun(rates, time, np.append(state, 0.0), until, atol=self._atol_slaved, ended=ended)
 
     def _slide(self, first: FloatArray, floor: float, until: float) -> ExplicitRun:
-        stops: tuple[tuple[End, Callable[[FloatArray], float]], ...] = (
+        stops: tuple[_Stop, ...] = (
             (End.LIFTOFF, lambda y: -self._drive(y)[1]),
             (End.TIME, lambda y: y[7] - until),
             (End.STILL, lambda y: floor - y[5]),
         )
 
-        def ended(piece: Piece) -> tuple[float, FloatArray, End] | None:
+        def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
             # Clock and ln|u| pass their limits but once, so the end of a step tells whether one was passed.
-            passed = [(end, g) for end, g in stops if g(piece.last) > 0]
-            found = [(*when, end) for end, g in passed if (when := stop(self._slipping, piece, g))]
-            return min(found, key=lambda item: item[0], default=None)
+            return _first(solver, [(end, g) for end, g in stops if g(solver.y) > 0])
 
         return ExplicitRun(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
 
@@ -210,13 +209,12 @@ class Polar(Sliding):
         slowing = -float(v @ v_rate) / speed if speed > 0 else 0.0
         return speed / slowing if slowing > 0 else np.inf
 
-    def _ended(self, piece: Piece) -> tuple[float, FloatArray, End] | None:
+    def _ended(self, solver: Any) -> tuple[float, FloatArray, End] | None:
         """First end of rolling without slip within a step: time, state and reason."""
-        ends: list[tuple[End, Callable[[FloatArray], float]]] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
+        ends: list[_Stop] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
         if np.isfinite(self._body.contact.mu_static):
             ends.append((End.CONE, self._missing))
-        found = [(*when, end) for end, g in ends if (when := stop(self.rates, piece, g))]
-        return min(found, key=lambda item: item[0], default=None)
+        return _first(solver, ends)
 
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
         frame = self._body.surface.frame(y[:, :2])
@@ -231,3 +229,9 @@ class Polar(Sliding):
         return world_motion(
             self._body, y[:, :2], velocity=local, spin=y[:, 4], slip=u, friction=friction, press=N, route=self.name
         )
+
+
+def _first(solver: Any, stops: Sequence[_Stop]) -> tuple[float, FloatArray, End] | None:
+    """The first of some stops within the last step: time, state and reason."""
+    rise = located(solver, lambda y: np.array([g(y) for _, g in stops])) if stops else None
+    return (rise.time, rise.state, stops[rise.guard][0]) if rise else None

@@ -11,15 +11,15 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
+from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import SETTLED, JointStretches, guard_values, noise_of
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.mechanism.stretches import StretchLaw
 
 _MOST = 6  # joints at rest together: each has up to three candidates
-_SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
+SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
 
 
 class SwitchedBodies(JointStretches):
@@ -68,7 +68,7 @@ class SwitchedBodies(JointStretches):
             state, margin = self._struck(last, leg.mode, which, 0.0)
         rates = self._along(state)[1]
         still = [
-            (own in {"low", "high"} and abs(rates[k]) <= _SLACK * speed)
+            (own in {"low", "high"} and abs(rates[k]) <= SLACK * speed)
             or (k == which and (delay > 0 or not joint.restitution))
             for k, own in enumerate(leg.mode[: len(self.joints)])
         ]
@@ -145,7 +145,7 @@ class SwitchedBodies(JointStretches):
             force, acceleration = self.holding(equations, state, mode), self._accelerations(equations, state)
             kept = min(self._kept(k, mode[k], float(force[k]), float(acceleration[k]), state) for k in open_)
             best = max(best, (kept, mode))
-        if best[0] < -_SLACK:
+        if best[0] < -SLACK:
             raise Refused("no mode of the joints with friction or stops keeps all its inequalities")
         return best[1], max(best[0], 0.0)
 
@@ -193,7 +193,7 @@ class SwitchedBodies(JointStretches):
                 kept += [side[k] * float(rates[k]) / speed for k in resting if k not in pressed]
                 if min(kept) > best[0]:
                     best = min(kept), trial, count
-        if best[0] < -_SLACK:
+        if best[0] < -SLACK:
             raise Refused("no outcome of an impact on several stops keeps all its inequalities")
         if best[2] and (restitution or any(joints[k].restitution for k in resting)):
             raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
@@ -202,7 +202,7 @@ class SwitchedBodies(JointStretches):
 
 def _candidates(joint: SwitchedJoint, q: float) -> Iterator[str]:
     """Modes that a joint at rest may take."""
-    near = _SLACK * max(1.0, abs(joint.low) if np.isfinite(joint.low) else 0.0)
+    near = SLACK * max(1.0, abs(joint.low) if np.isfinite(joint.low) else 0.0)
     if q <= joint.low + near:
         yield from ("low", joint.moving(1.0))
     elif q >= joint.high - near:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from proofroll.elements.mechanism.joint import FACTS
-from proofroll.truth.mechanism.maximal_bodies import BodyInScalars, GeneralBody, Planar
+from proofroll.truth.mechanism.maximal_bodies import AXES, BodyInScalars, GeneralBody, Planar
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
 NONE = (0.0, 0.0, 0.0)
 _Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,15 @@ from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMo
 from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
+from proofroll.elements.mechanism.switches import SETTLED
 from proofroll.truth.hybrid import Stretch, Transition
+from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
 from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, held
-from proofroll.truth.mechanism.joint_stretches import SETTLED
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
 _MOST = 6  # contacts that are closed at once: each has up to four candidates
-_SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
 _SAME = 1e-6  # of the largest speed: outcomes of an impact that differ by less are one
 _SIDES = 180  # of the pyramid inside a cone of friction, by which balance at rest is tried
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
@@ -120,7 +120,7 @@ class ContactBodies(ContactStretches):
         parts = np.kron([1.0, 1.0, 1.0], np.eye(len(rubs))) * size
         matrix = np.block([[*columns, rubs.T, -rubs.T, 0 * rubs.T], [np.zeros((len(rubs), count)), parts]])
         aims = np.concatenate([-found.force, size * bounds[bounds > 0]])
-        return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= _SLACK * size)
+        return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= SLACK * size)
 
     def _struck(
         self, state: Array, found: BodiesState, closed: Sequence[bool], laws: Sequence[float]
@@ -175,7 +175,7 @@ class ContactBodies(ContactStretches):
                 continue
             solution, headed = made
             apart = (self._kept(k, headed[k], still[k], found, solution) for k in range(len(mode)) if closed[k])
-            if (least := min(apart, default=np.inf)) >= -_SLACK:
+            if (least := min(apart, default=np.inf)) >= -SLACK:
                 kept.insert(0, (max(least, 0.0), solution, headed))
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
@@ -237,7 +237,7 @@ class ContactBodies(ContactStretches):
             solution, ways = tried(answer.x), dict(zip(unknown, directions(answer.x), strict=True))
             size = float(np.abs(solution.slide).max()) or 1.0
             ahead = all(float(way @ solution.slide[k]) > 0 for k, way in ways.items())
-            if np.abs(answer.fun).max() <= _SLACK * size and ahead:
+            if np.abs(answer.fun).max() <= SLACK * size and ahead:
                 headed = (Acting("slip", None, _direction(ways[k])) if k in ways else own for k, own in enumerate(mode))
                 return solution, tuple(headed)
         return None

@@ -12,10 +12,10 @@ from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import SETTLED
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_guards import STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts
-from proofroll.truth.mechanism.joint_stretches import SETTLED
 
 
 class ContactTree(ContactStretches):

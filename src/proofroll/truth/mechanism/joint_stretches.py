@@ -20,9 +20,6 @@ from proofroll.truth.mechanism.stretches import Stretches
 from proofroll.truth.mechanism.two_paths import CLOSE
 
 Motors = tuple[Actuator, ...]
-# Of the largest speed at which a joint hit its stop: of slower rebounds only the time is summed. They have 1e-12 of the
-# way of the first, which drowns in the round-off of the coordinate.
-SETTLED = 1e-6
 _NEAR = 1e-12  # relative: a coordinate this close to a stop is at it
 _DIGITS = 8  # last digits of a coordinate that are round-off
 

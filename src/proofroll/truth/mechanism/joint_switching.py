@@ -7,9 +7,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_by
+from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, held_by
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import SETTLED, JointStretches, guard_values, noise_of
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of
 from proofroll.truth.mechanism.stretches import StretchLaw
 
 

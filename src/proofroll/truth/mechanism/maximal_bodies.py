@@ -43,8 +43,8 @@ class BodyInScalars:
     w: Sequence[Scalar]
 
 
-_UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-GROUND = BodyInScalars((0.0,) * 3, _UNIT, (0.0,) * 3, (0.0,) * 3)
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+GROUND = BodyInScalars((0.0,) * 3, AXES, (0.0,) * 3, (0.0,) * 3)
 
 
 class GeneralBody:

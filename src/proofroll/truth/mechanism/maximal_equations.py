@@ -20,12 +20,11 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import FUNCTIONS as SMOOTH
 from proofroll.elements.mechanism.signal import value_at
-from proofroll.truth.mechanism.constraint_rows import Connection, ConstraintRow, ConstraintRows, columns, speed_at
+from proofroll.truth.mechanism.constraint_rows import NONE, Connection, ConstraintRow, ConstraintRows, columns, speed_at
 from proofroll.truth.mechanism.maximal_bodies import GROUND, BodyInScalars, clean, made_bodies, placed_bodies
 from proofroll.truth.scalars import Scalar, add, cross, dot, is_zero, minus, mul, plus, product, scaled, sub, turned
 
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for name in SMOOTH}
-_NONE = (0.0, 0.0, 0.0)
 
 
 class Drive(NamedTuple):
@@ -146,7 +145,7 @@ class MaximalEquations:
         rate: list[Scalar] = []
         for body, at_x, at_u, view in zip(self.bodies, self.x_slices, self.u_slices, views, strict=False):
             weight = [float(body.mass * g) for g in self.mechanism.gravity]
-            force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, _NONE))
+            force += plus(body.gyroscopic(u[at_u]), body.projected(view, weight, NONE))
             rate += body.rate(x[at_x], u[at_u])
         made = self._rows(views)
         rows: list[ConstraintRow] = []
@@ -244,7 +243,7 @@ class MaximalEquations:
         body: int,
         push: Sequence[Scalar],
         arm: Sequence[Scalar],
-        moment: Sequence[Scalar] = _NONE,
+        moment: Sequence[Scalar] = NONE,
     ) -> None:
         """Adds a force at an arm from the centre of mass, and a moment, to the forces along the velocities."""
         if body < 0:

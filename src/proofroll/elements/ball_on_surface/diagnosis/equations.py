@@ -17,7 +17,8 @@ from scipy.interpolate import make_interp_spline
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, Residuals, once
-from proofroll.core.diagnosis.lines import DERIVED, differing, left
+from proofroll.core.diagnosis.lines import differing, left
+from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment, slip_velocity
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerations, stretches
@@ -215,7 +216,9 @@ def _contradicted(lines: Sequence[Mapping[str, Any]], body: RollingBall, law: La
         return False
     natural, expected = natural_acceleration(body), at_start(body, law)
     scales = {"acceleration": natural, "angular acceleration": natural / body.ball.radius}
-    seen = {str(line["quantity"]).removesuffix(DERIVED): line for line in lines if DERIVED in line["quantity"]}
+    seen = {
+        str(line["quantity"]).removesuffix(OF_FIRST_STEPS): line for line in lines if OF_FIRST_STEPS in line["quantity"]
+    }
     for name, scale in scales.items():
         if name in seen:
             off = float(np.max(np.abs(np.subtract(seen[name]["found"], expected[name])))) / scale

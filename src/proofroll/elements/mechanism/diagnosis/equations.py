@@ -18,7 +18,7 @@ from scipy.interpolate import make_interp_spline
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
-from proofroll.core.diagnosis.lines import DERIVED
+from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
@@ -319,7 +319,7 @@ def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | Non
     for name in ("acceleration", "angular acceleration"):
         line = None if derived else lines.get(name)
         if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
-            line = lines.get(name + DERIVED)
+            line = lines.get(name + OF_FIRST_STEPS)
         if line is None or not line["found"] or not np.all(np.isfinite(line["found"])):
             return None
         rows.append(np.reshape(line["found"], (len(element.bodies), 3)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, apart, hypothesis
-from proofroll.core.diagnosis.lines import DERIVED, differing
+from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
     another_clock,
     at_start,
@@ -18,6 +18,7 @@ from proofroll.core.diagnosis.samples import (
     single_precision_run,
 )
 from proofroll.core.diagnosis.vectors import Reported
+from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 
 if TYPE_CHECKING:
@@ -71,9 +72,9 @@ def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
     arm = np.einsum("nij,nj->ni", start.R_WB[0, :-1], com)
     acceleration = np.cross(turning, arm) + np.cross(w, np.cross(w, arm))
     shifts = {"position": arm, "velocity": np.cross(w, arm), "acceleration": acceleration}
-    shifts[f"acceleration{DERIVED}"] = acceleration
+    shifts[f"acceleration{OF_FIRST_STEPS}"] = acceleration
     said = {"position": "p_WB is the position", "velocity": "v_WB is the velocity"}
-    said |= {"acceleration": "the acceleration is that", f"acceleration{DERIVED}": said["velocity"]}
+    said |= {"acceleration": "the acceleration is that", f"acceleration{OF_FIRST_STEPS}": said["velocity"]}
     if set(wrong) - shifts.keys():
         return
     for name, line in wrong.items():

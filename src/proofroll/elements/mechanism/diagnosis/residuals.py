@@ -11,14 +11,15 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, FACTORS, Residuals, once
-from proofroll.core.diagnosis.lines import DERIVED, differing
+from proofroll.core.diagnosis.lines import differing
+from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start, stretch
 
 # Equations that the true run leaves more of, relative, tell nothing.
 _TELLS = 1e-4
 COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
 # Quantities of the certificate that follow from how the mechanism moves.
-_FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", DERIVED)}
+_FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", OF_FIRST_STEPS)}
 
 
 # Where the start itself is another, its accelerations are.
@@ -80,7 +81,7 @@ def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
     """Imbalance of the first steps by themselves, or the tolerance of their lines if that is larger."""
     if start is None:
         return 0.0
-    allowed = [float(line["tolerance"]) for line in evidence.lines if str(line["quantity"]).endswith(DERIVED)]
+    allowed = [float(line["tolerance"]) for line in evidence.lines if str(line["quantity"]).endswith(OF_FIRST_STEPS)]
     return max([float(np.max(np.abs(start.left(Change(start.mechanism))), initial=0.0)), *allowed])
 
 

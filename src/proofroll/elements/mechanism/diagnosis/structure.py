@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.lines import DERIVED, differing, scale_of
+from proofroll.core.diagnosis.lines import differing, scale_of
 from proofroll.core.diagnosis.samples import both
 from proofroll.core.errors import InputError
+from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_run, placed_of, stretch
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, residuals_of
 from proofroll.elements.mechanism.model import Mechanism
@@ -22,8 +23,8 @@ from proofroll.elements.mechanism.placed import Placed
 _REMEDY = "an axis is given in the frame of the parent body; look at whose frame the engine takes"
 # Lines of the certificate that follow from the joints' axes.
 _OF_AXES = {
-    "forces", "torques", "acceleration", "angular acceleration", f"acceleration{DERIVED}",
-    f"angular acceleration{DERIVED}",
+    "forces", "torques", "acceleration", "angular acceleration", f"acceleration{OF_FIRST_STEPS}",
+    f"angular acceleration{OF_FIRST_STEPS}",
 }  # fmt: skip
 
 
@@ -84,7 +85,7 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
     """A joint sets off about another axis than the scene's, in the pose that the scene has."""
     lines, element = {str(line["quantity"]): line for line in evidence.lines}, evidence.element
     wrong = {str(line["quantity"]) for line in differing(evidence.lines)}
-    turning = lines.get(f"angular acceleration{DERIVED}")
+    turning = lines.get(f"angular acceleration{OF_FIRST_STEPS}")
     if not wrong or wrong - _OF_AXES or turning is None or not turning["found"]:
         return
     start, mechanism = element.start, element.mechanism
@@ -128,7 +129,7 @@ def _first(element: Any) -> dict[str, FloatArray]:
     found, wrench = element.first_motion, element.first_wrench
     said = {"acceleration": found.acceleration, "angular acceleration": found.angular_acceleration}
     return {"forces": wrench[:, :3], "torques": wrench[:, 3:], **said} | {
-        f"{name}{DERIVED}": values for name, values in said.items()
+        f"{name}{OF_FIRST_STEPS}": values for name, values in said.items()
     }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from proofroll.core.cut_out import CutOut
 from proofroll.core.errors import Refused
+from proofroll.core.integrators import INTEGRATORS
 from proofroll.core.program_text import assigned
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.loop_points import held_points
@@ -53,13 +54,15 @@ def source(run: MechanismRun, settings: PinocchioSettings) -> str:
     mechanism: Any = run.tree.mechanism
     followed = [(point.body, point.position) for point in mechanism.points]
     followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
-    wanted = [MechanismMotion, *([Actuator] if mechanism.actuators else [])]
+    integrator = INTEGRATORS[settings.integrator]
+    wanted = [integrator, MechanismMotion, *([Actuator] if mechanism.actuators else [])]
     never = "ConstraintDynamics" if settings.proximal is None else "NullSpace"
     instead = {
         "checks": "class checks:\n    RATIO = {}",
         "varies": "def varies(signal):\n    return False",
         "value_at": "def value_at(signal, *_):\n    return signal",
     }
+    instead["INTEGRATORS"] = f"INTEGRATORS = {{{settings.integrator!r}: {integrator.__name__}}}"
     instead |= {never: f"{never} = None", "held_points": "def held_points(_, loop):\n    return HELD[loop.name]"}
     uses = ("advance", "motion", "tree", "rows", "at", "residual", "body", "sprung", "springs", "closed", "length")
     cut = CutOut(wanted, uses, instead)

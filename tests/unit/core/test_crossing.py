@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from proofroll.truth.crossing import first_rise, stays_negative
+from proofroll.core.crossing import first_rise, stays_negative
 
 
 def functions(times):
