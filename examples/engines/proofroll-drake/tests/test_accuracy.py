@@ -36,6 +36,35 @@ def test_loops_of_discrete_plants_are_of_first_order(scene, until):
     assert coarse / fine == pytest.approx(10, rel=0.15)
 
 
+def rest(contact, dt):
+    """How far from its true place of rest a sled on three feet ends [m]."""
+    found = proofroll.simulate(
+        proofroll.load_scene("sled"), "drake[formulation=contact]", until=0.7, every=0.35, dt=dt, contact=contact
+    )
+    return float(np.linalg.norm(found["p_WB"].to_numpy()[-1, 0, :2] - [0.458107051786, 0.048503949880]))
+
+
+@pytest.mark.parametrize("contact", ["tamsi", "lagged"])
+def test_a_sled_rests_where_coulomb_says(contact):
+    """TAMSI and the lagged solver come to the true place of rest in proportion to the step."""
+    coarse, fine = rest(contact, 1e-3), rest(contact, 1e-4)
+    assert coarse < 9e-4
+    assert coarse / fine == pytest.approx(10, rel=0.1)
+
+
+def test_a_convex_cone_has_another_limit():
+    """With SAP, whose cone is convex, the sled ends a centimetre off."""
+    assert 5e-3 < rest("sap", 1e-3) < 2e-2
+
+
+def test_rebounds_and_corners_are_refused():
+    """Points of contact only dissipate, need a radius, and have one law for all pairs."""
+    refused = (("spinning_bounce", "only dissipate"), ("rocking_block", "radius"), ("ladder", "laws of their own"))
+    for scene, reason in refused:
+        with pytest.raises(proofroll.Refused, match=reason):
+            proofroll.simulate(proofroll.load_scene(scene), "drake[formulation=contact]", until=0.1, every=0.1)
+
+
 def test_a_continuous_plant_has_no_loops():
     """Loops, which Drake has for discrete plants alone, are refused, with the way out."""
     with pytest.raises(proofroll.Refused, match="take formulation=discrete"):

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from proofroll.core.scene import Scene
-from proofroll_drake import ball, mechanism
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll_drake import ball, contact, mechanism
 from proofroll_drake.ball import DrakeBall
 from proofroll_drake.mechanism import DrakeMechanism
 from proofroll_drake.settings import PRESETS, DrakeSettings
@@ -21,8 +22,10 @@ class Drake:
         "terms": ball.PROVIDES,
         "continuous": mechanism.CONTINUOUS,
         "discrete": mechanism.DISCRETE,
+        "contact": mechanism.CONTACT,
     }
     lacking: ClassVar[Mapping[str, Mapping[str, str]]] = {"terms": {}} | mechanism.LACKING
+    made_for: ClassVar[Mapping[str, frozenset[str]]] = {"contact": frozenset({MechanismCapability.CONTACT})}
     inherent: ClassVar[Mapping[str, Mapping[str, str]]] = {"terms": ball.INHERENT}
     settings: ClassVar[type[DrakeSettings]] = DrakeSettings
     presets: ClassVar[Mapping[str, Mapping[str, DrakeSettings]]] = PRESETS
@@ -31,6 +34,11 @@ class Drake:
     def version() -> str:
         """Version of the package."""
         return importlib.metadata.version("drake")
+
+    @staticmethod
+    def family(settings: DrakeSettings) -> Mapping[str, str]:
+        """See :class:`proofroll.core.engine_abilities.TellsFamily`."""
+        return contact.family(settings)
 
     @staticmethod
     def build(scene: Scene, settings: DrakeSettings) -> Any:

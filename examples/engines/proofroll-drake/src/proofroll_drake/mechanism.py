@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import DiscreteContactApproximation, MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation
 from pydrake.multibody.tree import (
     LinearSpringDamper,
     PrismaticSpring,
@@ -16,6 +16,7 @@ from pydrake.multibody.tree import (
     SpatialInertia,
 )
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
+from pydrake.systems.framework import DiagramBuilder
 
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged, Refused
@@ -24,6 +25,7 @@ from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, mechanism_of
+from proofroll_drake.contact import DrakeContacts
 from proofroll_drake.joints import connect, start
 from proofroll_drake.settings import DrakeSettings
 
@@ -32,9 +34,12 @@ CONTINUOUS: frozenset[str] = ALL_JOINTS | FORCES | {_CAPABILITY.ARMATURE}
 DISCRETE: frozenset[str] = CONTINUOUS | {
     _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT
 }  # fmt: skip
+CONTACT: frozenset[str] = CONTINUOUS | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}
 _LOOPS = "a continuous plant of Drake has no constraints; take formulation=discrete"
 LACKING: Mapping[str, Mapping[str, str]] = {
     "continuous": dict.fromkeys(DISCRETE - CONTINUOUS, _LOOPS),
+    "contact": dict.fromkeys(DISCRETE - CONTINUOUS, "Drake has loops beside its SAP solver alone")
+    | {_CAPABILITY.CONTACT_REBOUNDS: "Drake's points of contact only dissipate"},
     "discrete": {_CAPABILITY.JOINT_FRICTION: "Drake reads dry friction and does not use it"},
 }
 _SOFT = "Drake's SAP solver makes constraints as stiff as its step can carry, and no stiffer; the first step shows it"
@@ -49,7 +54,9 @@ class DrakeMechanism:
             2 * np.pi * (settings.dt or 0.0) / time
         )  # of the scene in a step [rad]; its fastest part turns up to three times as fast
         self._mechanism, self._settings, self._steps = mechanism, settings, 0
-        self._plant = plant = MultibodyPlant(settings.dt or 0.0)
+        builder = DiagramBuilder()
+        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, settings.dt or 0.0)
+        self._plant = plant
         if settings.dt:
             plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
             plant.SetUseSampledOutputPorts(False)  # reactions of the state as it is, not of the step that led to it
@@ -58,9 +65,14 @@ class DrakeMechanism:
         self._joints = [connect(plant, self._bodies, joint) for joint in mechanism.joints]
         self._add_forces()
         self._close_loops()
+        self._contacts = (
+            DrakeContacts(mechanism, plant, scene_graph, self._bodies, settings) if mechanism.pairs else None
+        )
         plant.Finalize()
-        self._simulator = None if settings.dt else Simulator(plant)
-        self._context = self._simulator.get_mutable_context() if self._simulator else plant.CreateDefaultContext()
+        self._diagram = builder.Build()
+        self._simulator = None if settings.dt else Simulator(self._diagram)
+        self._root = self._simulator.get_mutable_context() if self._simulator else self._diagram.CreateDefaultContext()
+        self._context = plant.GetMyMutableContextFromRoot(self._root)
         drive = np.zeros(plant.num_velocities())
         for joint, built in zip(mechanism.joints, self._joints, strict=True):
             start(plant, self._context, joint, built)
@@ -138,7 +150,7 @@ class DrakeMechanism:
             for _ in range(whole_steps(self._steps * dt, t, dt)):
                 self._context.SetDiscreteState(self._plant.EvalUniquePeriodicDiscreteUpdate(self._context))
                 self._steps += 1
-                self._context.SetTime(self._steps * dt)
+                self._root.SetTime(self._steps * dt)
         except RuntimeError as error:
             raise Diverged(f"Drake: {' '.join(str(error).split())} (t = {t:g} s)") from None
 
@@ -148,7 +160,10 @@ class DrakeMechanism:
         bodies = [self._bodies[body.name] for body in self._mechanism.bodies]
         poses = [plant.EvalBodyPoseInWorld(context, body) for body in bodies]
         rates = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in bodies]
-        force, torque = self._reactions()
+        force, torque, pressed = None, None, None
+        if self._steps or not self._contacts:  # forces of contact are those of a step
+            force, torque = self._reactions()
+            pressed = self._contacts.forces(context) if self._contacts else None
         return MechanismSample(
             np.array([pose.translation() for pose in poses]),
             np.array([rate.translational() for rate in rates]),
@@ -156,6 +171,7 @@ class DrakeMechanism:
             np.array([pose.rotation().ToQuaternion().wxyz() for pose in poses]),
             joint_force=force,
             joint_torque=torque,
+            contact_force=pressed,
         )
 
     def _reactions(self) -> tuple[Any, Any]:
@@ -190,7 +206,7 @@ class DrakeMechanism:
         sprung = self._mechanism.springs or any(one.stiffness or one.damping for one in self._mechanism.joints)
         if self._settings.dt and sprung and not loops:
             soft |= {name: Regularised(min(3 * self._turn, 0.5), _AT_ITS_END) for name in ("forces", "torques")}
-        return MechanismBuilt(
+        found = MechanismBuilt(
             mass=np.array([inertia.get_mass() for inertia in inertias]),
             com=np.array([inertia.get_com() for inertia in inertias]),
             inertia=np.array([_central(inertia) for inertia in inertias]),
@@ -203,6 +219,7 @@ class DrakeMechanism:
             regularised=soft,
             **rates,
         )
+        return self._contacts.built(found, self._settings) if self._contacts else found
 
 
 def _axis(context: Any, joint: Joint, built: Any) -> Any:

@@ -17,18 +17,20 @@ class DrakeSettings:
 
     Attributes:
         formulation: ``terms``, a ball by Drake's mass matrix, bias and Jacobian; ``continuous`` and ``discrete``,
-            mechanisms as a plant of that kind.
+            mechanisms as a plant of that kind; ``contact``, bodies that touch in a discrete plant.
         preset: ``default`` or ``matched``.
         integrator: of the continuous plant, by Drake's name.
         rtol: tolerance of integration, except of the discrete plant.
         dt: step of the discrete plant [s].
+        contact: approximation of contact, by Drake's name.
     """
 
-    formulation: Literal["terms", "continuous", "discrete"] = "continuous"
+    formulation: Literal["terms", "continuous", "discrete", "contact"] = "continuous"
     preset: Literal["default", "matched"] = "matched"
     integrator: Literal["runge_kutta3", "runge_kutta5"] | None = None
     rtol: Annotated[float, Gt(0), Le(1)] | None = None
     dt: Annotated[float, Gt(0)] | None = None
+    contact: Literal["tamsi", "sap", "lagged"] = "tamsi"
 
     def __post_init__(self) -> None:
         """Refuses what does not belong together.
@@ -36,7 +38,7 @@ class DrakeSettings:
         Raises:
             InputError: a step where there is a tolerance, or the other way round.
         """
-        wanted, other = ("dt", "rtol") if self.formulation == "discrete" else ("rtol", "dt")
+        wanted, other = (self.resolution, "rtol" if self.resolution == "dt" else "dt")
         if getattr(self, wanted) is None:
             raise InputError(f"drake: {wanted}", None, f"{self.formulation} needs it; give a positive number")
         if getattr(self, other) is not None:
@@ -45,12 +47,12 @@ class DrakeSettings:
     @property
     def resolution(self) -> str:
         """Name of the setting that trades speed for accuracy."""
-        return "dt" if self.formulation == "discrete" else "rtol"
+        return "dt" if self.formulation in {"discrete", "contact"} else "rtol"
 
     @property
     def order(self) -> int | None:
         """Order of the discrete plant's semi-implicit Euler."""
-        return 1 if self.formulation == "discrete" else None
+        return 1 if self.resolution == "dt" else None
 
 
 PRESETS: Mapping[str, Mapping[str, DrakeSettings]] = {
@@ -61,4 +63,8 @@ PRESETS: Mapping[str, Mapping[str, DrakeSettings]] = {
         "matched": DrakeSettings("continuous", "matched", "runge_kutta5", 1e-10),
     },
     "discrete": {"default": DrakeSettings("discrete", "default", dt=1e-3)},
+    "contact": {
+        "default": DrakeSettings("contact", "default", dt=1e-3, contact="lagged"),  # what a plant has if nobody chooses
+        "matched": DrakeSettings("contact", "matched", dt=1e-3, contact="tamsi"),
+    },
 }
