@@ -33,7 +33,7 @@ class TimeBudget:
         self.seconds = seconds
         self._start, self._lost = processor_seconds() - spent, 0.0
         self._group = group
-        self._begun: dict[str, float] = {}
+        self._begun: dict[str, tuple[float, float]] = {}
         self._unfinished: Counter[int] = Counter()
         self._shares: dict[int, float] = {}
         self._lock = threading.Lock()
@@ -51,9 +51,13 @@ class TimeBudget:
 
     def _left(self) -> float:
         """See :attr:`left`; under the lock."""
-        now = time.monotonic()
-        used = processor_seconds() - self._start + self._lost + sum(now - begun for begun in self._begun.values())
+        used = processor_seconds() - self._start + self._lost + sum(map(self._passed, self._begun))
         return max(0.0, _OF_CASES * self.seconds - used)
+
+    def _passed(self, case: str) -> float:
+        """Seconds of a case that has begun: by the wall, where others may have the processor, but what it may take."""
+        begun, allowed = self._begun[case]
+        return min(time.monotonic() - begun, allowed)
 
     def wait(self, case: str) -> None:
         """Counts one more case that waits for a worker."""
@@ -67,8 +71,9 @@ class TimeBudget:
             left = self._left()
             share = self._shares.setdefault(group, left / len(self._unfinished))
             seconds = min(left / max(1, min(abreast, self._unfinished.total())), share)
-            self._begun[case] = time.monotonic()
-            return seconds if seconds > _LEAST else 0.0
+            seconds = seconds if seconds > _LEAST else 0.0
+            self._begun[case] = time.monotonic(), seconds
+            return seconds
 
     def end(self, case: str, used: float = 0.0, *, lost: bool = False) -> None:
         """Counts a case that has ended.
@@ -76,13 +81,14 @@ class TimeBudget:
         Args:
             case: its key.
             used: its processor time [s].
-            lost: it has none, and counts by its wall time.
+            lost: it has none, and counts by its wall time, but by no more than it was allowed.
         """
         group = self._group.get(case, 0)
         with self._lock:
-            passed = time.monotonic() - self._begun.pop(case)
-            self._lost += passed if lost else 0.0
-            self._shares[group] -= passed if lost else used
+            passed = self._passed(case) if lost else 0.0
+            del self._begun[case]
+            self._lost += passed
+            self._shares[group] -= passed or used
             self._unfinished[group] -= 1
             if not self._unfinished[group]:
                 del self._unfinished[group], self._shares[group]

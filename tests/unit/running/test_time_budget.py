@@ -73,6 +73,21 @@ def test_each_group_has_an_equal_share(monkeypatch: pytest.MonkeyPatch) -> None:
         budget.end(f"b{number}")
 
 
+def test_a_busy_machine_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A case that waits for others, or is ended at its limit after that, counts at most what it was allowed."""
+    now = 0.0
+    monkeypatch.setattr("proofroll.running.time_budget.time.monotonic", lambda: now)
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: 0.0)
+    budget = TimeBudget(100.0, group={"a": 0, "b": 1})
+    for name in "ab":
+        budget.wait(name)
+    assert budget.begin("a", 2) == 45.0
+    now = 1000.0
+    assert budget.left == 45.0
+    budget.end("a", lost=True)
+    assert budget.begin("b", 2) == 45.0
+
+
 def test_what_is_left_is_read_between_two_changes() -> None:
     """Who asks what is left waits until another thread has changed which cases run."""
     budget, found = TimeBudget(100.0), list[float]()
