@@ -21,6 +21,8 @@ _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
 # machine is slower at one time than at another. It is more where all costs scatter: so many median deviations, which
 # are four standard ones of a normal scatter; one in 20,000 exceeds them.
 _COST, _SCATTERS = 1.5, 6.0
+# Digits of errors that changed: as few as tell them apart.
+_DIGITS = (2, 4, 8, 17)
 # So many costs tell how much slower the machine was.
 _ENOUGH = 5
 
@@ -181,7 +183,9 @@ def _changes(
         if old.verdict != new.verdict:
             yield "verdict", f"{name or 'run'} {old.verdict or 'without verdict'} → {new.verdict or 'without verdict'}"
         if (size := _beyond(old, new)) > 0:
-            values.append((size, f"error of {name} {error(old.error)} → {error(new.error)} {new.unit}"))
+            digits = next(count for count in _DIGITS if error(old.error, count) != error(new.error, count))
+            change = f"{error(old.error, digits)} → {error(new.error, digits)}"
+            values.append((size, f"error of {name} {change} {new.unit}"))
     if values:
         more = f", and of {len(values) - 1} more" if len(values) > 1 else ""
         yield "value", f"{max(values)[1]}{more}"
