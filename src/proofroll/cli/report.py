@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.outcome import Outcome
 
 # Processor time of the comparisons of a report without names [s]: with its further studies some 400.
-BUDGET = 240.0
+BUDGET = 200.0
 # Part of the time that writing unfinished pages may take.
 _WRITING = 0.05
 
