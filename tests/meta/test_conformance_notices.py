@@ -22,6 +22,7 @@ from tiny import Tiny, TinySettings
 
 from proofroll.conformance import Check, checks, run_check
 from proofroll.core.errors import InputError, Refused
+from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.sampling import BallSample
 
@@ -180,6 +181,16 @@ def test_another_model_than_is_said_is_noticed(engine: type[Any], formulation: s
     for lie in ("none", *lies):
         (own,) = [check for check in checks(lying(engine, MODELS[lie])) if check.name == name]
         with pytest.raises(AssertionError, match="differs from the scene") if lie in lies else nullcontext():
+            own.run()
+
+
+def test_another_top_than_is_said_is_noticed() -> None:
+    """A slow top shows a centre of mass that is off by a tenth in an engine of spherical joints and first order."""
+    pytest.importorskip("mujoco")
+    name = "first_steps_fit_the_scene[joints-default-slow_top]"
+    for lie in ("none", "gravity", "mass", "inertia", "centre"):
+        (own,) = [check for check in checks(lying(load_engine("mujoco"), MODELS[lie])) if check.name == name]
+        with nullcontext() if lie == "none" else pytest.raises(AssertionError, match="differs from the scene"):
             own.run()
 
 

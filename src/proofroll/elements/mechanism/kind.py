@@ -117,12 +117,14 @@ class MechanismKind:
     def truth_scenes() -> Mapping[str, Scene]:
         """Mechanisms with a loop, oblique axes, a top, springs, feet that slide, an impact, each law and each drive.
 
-        In the two hinges and the falling body all that a model holds changes the first acceleration, gravity, too.
+        In the two hinges, the falling body and the slow top all that a model holds changes the first acceleration,
+        gravity, too.
         """
         from proofroll.files.scene_file import load_scene
 
         found = {name: load_scene(name) for name in ("slider_crank", "heavy_top", "oscillators", "sled")}
         found[_PLAIN] = plain = load_scene(_PLAIN)
+        found["slow_top"] = load_scene("heavy_top", spin=2.0, tilt=1.2)
         found["falling_body"] = _falling(load_scene("free_body", w1=2.0, w3=1.0))
         found["two_spheres"] = _sooner(load_scene("two_spheres", friction=0.5), _SOONER)
         found |= {f"{_PLAIN}-{law}": _with_law(plain, law, value) for law, value in _LAWS.items()}
