@@ -21,7 +21,7 @@ from proofroll.core.plugins import load_element_kinds
 from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
-from proofroll_drill.mutants import ball_models, joint_laws
+from proofroll_drill.mutants import ball_models, contact_models, joint_laws
 from proofroll_drill.mutants.drilling import ENOUGH, tried
 
 
@@ -44,6 +44,32 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
     assert [row["mutant"] for row in rows if not row["detected"]] == []
     assert sum(row["named"] for row in rows) == found["named"] >= ENOUGH * len(rows)
     assert all(row["said"] for row in rows if row["named"])
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        "OtherBody",
+        "PyramidForCone",
+        *(
+            pytest.param(name, marks=pytest.mark.drill)
+            for name in (
+                "FrictionOff",
+                "FrictionOnePercent",
+                "ContactLeftOut",
+                "FootMoved",
+                "NormalTurned",
+                "RestitutionSwapped",
+                "LateImpact",
+            )
+        ),
+    ],
+)
+def test_every_fault_of_contacts_is_detected_and_named(fault: str) -> None:
+    """Friction, its law, geometry, pairs, forces and impacts that are not the scene's: each is found, and its cause."""
+    found = tried(getattr(contact_models, fault))
+    assert found.detected
+    assert found.named, found.said
 
 
 @pytest.mark.parametrize(

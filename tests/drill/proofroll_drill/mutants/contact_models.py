@@ -10,8 +10,11 @@ import numpy as np
 
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contacts.acting import Acting, heading_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.contacts.touching import Touching
+from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll.truth.hybrid import follow, states_of
 from proofroll.truth.mechanism.contact_tree import ContactTree
@@ -29,11 +32,12 @@ class ContactMutant(MechanismMutant):
     scene: ClassVar[Any] = SLED
     until, every = 0.05, 0.005  # its faults show at once
     honest: ClassVar[bool] = False  # reads back what it built
+    law: ClassVar[type[ContactDynamics]] = ContactDynamics
 
     def __init__(self, scene: Scene, settings: Any) -> None:  # noqa: ARG002 -- it has no settings
         self.scenes, self.t = scene, 0.0
         self.mechanism = self.other(mechanism_of(scene))
-        self.dynamics = ContactDynamics(self.mechanism)
+        self.dynamics = self.law(self.mechanism)
         self.tree = ContactTree(self.dynamics, _TOLERANCE, 1.0)
         self.path = follow(self.tree, self.until + 4 * STEP)
 
@@ -103,6 +107,25 @@ class FrictionOnePercent(ContactMutant):
     def other(self, mechanism: Mechanism) -> Mechanism:
         """A hundredth more of each pair."""
         return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.01 * pair.friction))
+
+
+class Pyramid(ContactDynamics):
+    """Friction of most work among the corners of a square, whose axes are x and y."""
+
+    @staticmethod
+    def heading(own: Acting, found: Touching) -> Array:
+        """The axis that the slip is nearest to."""
+        direction = heading_of(own, found)
+        most = np.argmax(np.abs(direction))
+        return np.asarray(np.sign(direction[most]) * np.eye(3)[most])
+
+
+class PyramidForCone(ContactMutant):
+    """Friction is bounded by a square."""
+
+    fault = "a pyramid of friction in place of the cone"
+    named = ("friction pyramid",)
+    law = Pyramid
 
 
 class ContactLeftOut(ContactMutant):

@@ -14,7 +14,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.analysis import RANK
-from proofroll.elements.mechanism.contacts.acting import OPEN, ContactMode, acting, heading_of, held_directions
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, acting, heading_of, held_directions
 from proofroll.elements.mechanism.contacts.coulomb import sure
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
@@ -127,7 +127,7 @@ class ContactDynamics:
             owner += [k] * len(directions)
             if own.kind == "slip":
                 bias[-1] = bias[-1] + found.normal_rate @ found.slide
-                heading = heading_of(own, found) if self.friction[k] or self._bounds[k] else np.zeros(3)
+                heading = self.heading(own, found) if self.friction[k] or self._bounds[k] else np.zeros(3)
                 force[k] = -self._bounds[k] * heading
                 directions = directions - self.friction[k] * heading
             along += list(directions)
@@ -149,6 +149,11 @@ class ContactDynamics:
                 known[k] &= np.abs(cross(found.normal, np.array(own.along))) <= RANK
         response = 1.0 if weak.any() else float(np.linalg.det(S) / np.linalg.det(smooth))
         return self._solution(state, free + state.W @ D.T @ z, force, known, response)
+
+    @staticmethod
+    def heading(own: Acting, found: Touching) -> Array:
+        """Direction in which a contact slips; its friction is against it."""
+        return heading_of(own, found)
 
     @staticmethod
     def _solution(

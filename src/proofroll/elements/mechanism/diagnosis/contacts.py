@@ -25,6 +25,7 @@ from proofroll.elements.mechanism.model import Mechanism
 _FORCE, _SUNK = 1e-4, 1e-3
 _OFF = 1e-3  # factor of friction that is none
 _TURNS = 0.3  # rad: slip and friction that turn less tell no shape of a cone
+_FEW = 3  # frictions that one angle does not bring to a square by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _HELD = 1e-6  # part of a mechanism's speed below which the truth sticks
 _DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
@@ -191,23 +192,65 @@ def pyramid(evidence: Evidence) -> Iterator[Cause]:
     """A pyramid in place of the cone, about axes that one angle tells."""
     for touch in touch_of(evidence):
         at = touch.slides & (touch.friction > 0)
-        n, T, u, bound = touch.found.normal[at], touch.T[at], touch.across[at], (touch.friction * touch.N)[at]
-        if len(T) < 4 or np.abs(n - n[0]).max() > _FORCE:
-            continue
-        e1 = np.eye(3)[np.argmin(np.abs(n[0]))]
-        e1 = np.cross(n[0], e1) / np.linalg.norm(np.cross(n[0], e1))
-        e2 = np.cross(n[0], e1)
-        plane = np.array([e1, e2])
-        turned_by = max(np.ptp(np.unwrap(np.arctan2(*(each @ plane.T).T[::-1]))) for each in (u, T))
-        against = np.abs(T - touch.against[at]).max()
-        if turned_by < _TURNS or against <= _FORCE * evidence.element.force:
-            continue
-        turned = np.array([[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in _ANGLES])
-        sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
-        after = float(np.abs(sides - bound).max(axis=1).min())
-        says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
-        remedy = "choose the elliptic cone"
-        yield Cause("pyramid", says, "friction of what slides", "N", float(against), after, remedy, 1, _COVERS)
+        if at.sum() > _FEW:
+            forces = touch.T[at], touch.against[at], (touch.friction * touch.N)[at]
+            yield from _of_a_square(touch.found.normal[at], touch.across[at], *forces, evidence.element.force)
+
+
+def _of_a_square(
+    n: FloatArray, u: FloatArray, T: FloatArray, full: FloatArray, bound: FloatArray, least: float
+) -> Iterator[Cause]:
+    """The cause that friction is bounded by a square.
+
+    Args:
+        n: normals, (samples, 3).
+        u: slips [m/s], (samples, 3).
+        T: friction [N], (samples, 3).
+        full: Coulomb's friction for these slips [N], (samples, 3).
+        bound: its size [N], (samples,).
+        least: natural force [N]; a small part of it is none.
+    """
+    if np.abs(n - n[0]).max() > _FORCE:
+        return
+    e1 = np.eye(3)[np.argmin(np.abs(n[0]))]
+    e1 = np.cross(n[0], e1) / np.linalg.norm(np.cross(n[0], e1))
+    plane = np.array([e1, np.cross(n[0], e1)])
+    turned_by = max(np.ptp(np.unwrap(np.arctan2(*(each @ plane.T).T[::-1]))) for each in (u, T))
+    against = float(np.abs(T - full).max())
+    if turned_by < _TURNS or against <= _FORCE * least:
+        return
+    turned = np.array([[[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]] for a in _ANGLES])
+    sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
+    after = float(np.abs(sides - bound).max(axis=1).min())
+    says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
+    yield Cause("pyramid", says, "friction of what slides", "N", against, after, "choose the elliptic cone", 1, _COVERS)
+
+
+@hypothesis(
+    "contact forces at time 0", "as along the run, for the forces of the certificate: sign and axes, or a pyramid"
+)
+def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
+    """Forces of contact at time 0."""
+    element, name = evidence.element, "forces of contact"
+    lines = {str(line["quantity"]): line for line in evidence.lines}
+    line, shape = lines.get(name), (len(element.mechanism.contacts), 3)
+    if line is None or line["holds"] or np.size(line["found"]) != np.prod(shape):
+        return
+    said, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
+    known = np.isfinite(said).all(axis=-1) & np.isfinite(true).all(axis=-1)
+    if all(other["holds"] for key, other in lines.items() if key != name) and known.any():
+        what = "the force of a contact on its first body"
+        values = said[None, known], true[None, known], np.zeros(1)
+        yield from Reported("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
+    found = followed(element.start)
+    n, friction = found.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
+    N = np.sum(said * n, axis=-1)
+    slides = known & (PRESSES * element.force < N) & (found.slip[0] > SLIDES * element.speed) & (friction > 0)
+    if slides.sum() >= _FEW:
+        u = (found.slide[0] - n * np.sum(n * found.slide[0], axis=-1)[:, None])[slides]
+        bound, T = (friction * N)[slides], (said - N[:, None] * n)[slides]
+        full = -u * (bound / found.slip[0][slides])[:, None]
+        yield from _of_a_square(n[slides], u, T, full, bound, element.force)
 
 
 @hypothesis(
@@ -376,4 +419,14 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
     )
 
 
-HYPOTHESES = (contact_forces, convex_cone, pyramid, friction_factor, left_out, impacts, creep, at_start)
+HYPOTHESES = (
+    contact_forces,
+    forces_at_start,
+    convex_cone,
+    pyramid,
+    friction_factor,
+    left_out,
+    impacts,
+    creep,
+    at_start,
+)
