@@ -81,6 +81,15 @@ class MovedStop(MechanismMutant):
         return dataclasses.replace(mechanism, joints=tuple(dataclasses.replace(j, limits=at) for j, at in joints))
 
 
+class MovedStopWithRebounds(MovedStop):
+    """It rebounds from there with half of its speed, and does not come to rest in this time."""
+
+    fault = "stop at another place, with rebounds"
+    scene: ClassVar[Any] = ("stop", {"restitution": 0.5})
+    until = 1.0
+    named = ("turns back at -0.01,",)
+
+
 class Driven(MechanismMutant):
     """Base of mutants with actuators and couplings, which are built in Pinocchio.
 

@@ -18,6 +18,8 @@ from proofroll.elements.mechanism.signal import value_at
 Effort = Callable[[Actuator, float, float, float], float]
 _COVERS = ("motion", *COVERED, "effort")
 _STILL = 1e-9
+# A velocity that changes by so many times what it does before and after jumps.
+_JUMPS = 5.0
 
 
 def _effort(kp: float = 1.0, kd: float = 1.0, gear: float = 1.0, limit: float = 1.0, clamps: str = "sum") -> Effort:
@@ -126,25 +128,55 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         yield Cause(f"ratio of {coupling.name}", says, *what, remedy, int(not alone), _COVERS)
 
 
-@hypothesis("stops", "where the true joint rests at its stop the engine's rests at one other place, at every sample")
+@hypothesis(
+    "stops", "the engine's joint rests at one other place than at the true stop, or turns back at one each time"
+)
 def of_stops(evidence: Evidence) -> Iterator[Cause]:
-    """Another place of a stop."""
+    """Another place of a stop, by where the joint rests, or else by where it rebounds."""
     mechanism, found = evidence.element.mechanism, both(evidence)
     if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
         return
-    (seen, _), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in found)
+    (seen, speeds), (true, rates) = (placed_of(mechanism, dataset).of_tree() for dataset in found)
+    times = np.asarray(found[0]["time"], dtype=float)
     for joint in mechanism.joints:
         if not joint.limits:
             continue
         at, rated = mechanism.place_of(joint.name)
-        for limit in joint.limits:
+        turns = _rebounds(times, seen[:, at], speeds[:, rated])
+        for limit, side in zip(joint.limits, (1.0, -1.0), strict=True):
             size = max(abs(limit), float(np.ptp(true[:, at])))
             rests = (np.abs(true[:, at] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
-            off = seen[rests, at] - limit
-            if np.count_nonzero(rests) < 2 or not above_round_off(float(np.max(np.abs(off))), size):
+            does, off = "rests", seen[rests, at] - limit
+            if len(off) < 2:
+                does, off = "turns back", turns[turns[:, 1] == side, 0] - limit
+            if len(off) < 2 or not above_round_off(float(np.max(np.abs(off))), size):
                 continue
             shift = float(np.median(off))
-            says = f"the joint {joint.name} rests at {limit + shift:.6g}, not at its stop at {limit:.6g}"
+            says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
-            what = f"{joint.name} at rest at its stop", "rad, m", float(np.max(np.abs(off)))
+            what = f"{joint.name} at its stop", "rad, m", float(np.max(np.abs(off)))
             yield Cause(f"stop of {joint.name}", says, *what, float(np.max(np.abs(off - shift))), remedy, 1, _COVERS)
+
+
+def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
+    """Places where a coordinate turns back at once between two samples, and the sign of its velocity after, (n, 2).
+
+    Parabolas through the samples before and after, with the accelerations there, meet at the place.
+    """
+    from scipy.optimize import brentq
+
+    found = []
+    steps, changes = np.diff(t), np.diff(v)
+    for k in range(1, len(steps) - 1):
+        if v[k] * v[k + 1] >= 0 or abs(changes[k]) < _JUMPS * max(abs(changes[k - 1]), abs(changes[k + 1])):
+            continue
+        h, before, after = steps[k], changes[k - 1] / steps[k - 1], changes[k + 1] / steps[k + 1]
+        first = np.array([q[k], v[k], before / 2])
+        second = np.array([q[k + 1] - h * v[k + 1] + h * h * after / 2, v[k + 1] - h * after, after / 2])
+
+        def apart(x: float, difference: FloatArray = first - second) -> float:
+            return float(difference @ (1.0, x, x * x))
+
+        if apart(0.0) * apart(h) < 0:
+            found.append((float(first @ (1.0, x := brentq(apart, 0.0, h), x * x)), float(np.sign(v[k + 1]))))
+    return np.array(found).reshape(-1, 2)
