@@ -194,6 +194,20 @@ def test_the_harness_names_no_observable_and_no_failure_of_an_element() -> None:
     assert wrong == ["core/quantity.py names N", "files/scene_file.py names N"]  # the newton
 
 
+def test_the_harness_knows_no_law_of_joints() -> None:
+    """No line of the harness speaks of a servo, a gear, an armature or a stop: they are its elements' alone."""
+    law = re.compile(r"actuator|coupling|armature|\bservo|restitution|dry friction|\bgears?\b|\bmimic", re.IGNORECASE)
+    told = [
+        f"{file.relative_to(ROOT)}:{number}: {line.strip()}"
+        for folder in sorted(HARNESS)
+        for file in sorted((ROOT / folder).rglob("*.[phj]*"))
+        if file.suffix in {".py", ".html", ".js"}
+        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+        if law.search(line)
+    ]
+    assert told == []
+
+
 def test_one_place_makes_cases() -> None:
     """What decides the result of a case is put together in one place, whichever study asks."""
     makers = {

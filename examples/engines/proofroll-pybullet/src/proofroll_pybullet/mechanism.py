@@ -21,6 +21,7 @@ from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.signal import value_at
 from proofroll_pybullet.settings import PybulletSettings
 from proofroll_pybullet.world import World
 
@@ -29,12 +30,16 @@ PROVIDES: frozenset[str] = frozenset(
     {
         _CAPABILITY.FIXED, _CAPABILITY.REVOLUTE, _CAPABILITY.PRISMATIC, _CAPABILITY.SPHERICAL,
         _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT, _CAPABILITY.JOINT_SPRINGS,
+        _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS, _CAPABILITY.JOINT_FRICTION,
     }
 )  # fmt: skip
 LACKING: Mapping[str, str] = {
     _CAPABILITY.SPRINGS: "PyBullet has no springs between points",
     _CAPABILITY.UNIVERSAL: "URDF has no such joint",
-    _CAPABILITY.JOINT_FRICTION: "PyBullet reads dry friction from a URDF and does not use it",
+    _CAPABILITY.ARMATURE: "PyBullet's joints have no inertia of their own",
+    _CAPABILITY.COUPLINGS: "PyBullet's gears have no offset, and this adapter builds none",
+    _CAPABILITY.STOPS: "PyBullet's limits of joints throw back what a step has sunk in, by centimetres at 1 ms",
+    _CAPABILITY.REBOUNDS: "PyBullet's limits of joints have no restitution",
 }
 _TYPES = {"fixed": "fixed", "revolute": "continuous", "prismatic": "prismatic", "spherical": "spherical"}
 _ROWS = "a loop's rows are those of the step's start, and the first step does not yet know that they turn"
@@ -60,7 +65,14 @@ class PybulletMechanism:
         told = [self._world.getJointInfo(self._robot, index) for index in range(count)]
         self._links = {info[12].decode(): index for index, info in enumerate(told)} | {WORLD: -1}
         self._joints = [self._links[joint.child] for joint in mechanism.joints]
-        self._forced = [joint for joint in mechanism.joints if joint.torque or joint.stiffness or joint.damping]
+        motors = {
+            joint.name: [item for item in mechanism.actuators if item.joint == joint.name] for joint in mechanism.joints
+        }
+        self._forced = [
+            (joint, motors[joint.name])
+            for joint in mechanism.joints
+            if joint.torque or joint.stiffness or joint.damping or motors[joint.name]
+        ]
         for joint, index in zip(mechanism.joints, self._joints, strict=True):
             self._start(joint, index)
         for loop in mechanism.loops:
@@ -87,7 +99,8 @@ class PybulletMechanism:
             )  # fmt: skip
         if joint.nv == 1:
             self._world.resetJointState(robot, index, joint.q0[0], joint.v0[0])
-            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=0)
+            # a motor that wants rest with no more than a force is dry friction; that of a URDF is read and not used
+            self._world.setJointMotorControl2(robot, index, self._world.VELOCITY_CONTROL, force=joint.friction)
         elif joint.nv == 3:
             q = [*joint.q0[1:], joint.q0[0]]
             self._world.resetJointStateMultiDof(robot, index, q, list(joint.v0))
@@ -106,10 +119,12 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`."""
         dt = self._settings.dt
         for _ in range(whole_steps(self._steps * dt, t, dt)):
-            for joint in self._forced:
+            now = self._steps * dt
+            for joint, motors in self._forced:
                 index = self._links[joint.child]
                 q, v, *_ = self._world.getJointState(self._robot, index)
-                force = joint.torque - joint.stiffness * (q - joint.rest) - joint.damping * v
+                force = float(value_at(joint.torque, now)) - joint.stiffness * (q - joint.rest) - joint.damping * v
+                force += sum(item.effort(now, q, v) for item in motors)
                 self._world.setJointMotorControl2(self._robot, index, self._world.TORQUE_CONTROL, force=force)
             self._world.stepSimulation()
             self._steps += 1
@@ -133,7 +148,16 @@ class PybulletMechanism:
         """See :class:`proofroll.core.engine.Engine`; PyBullet's reactions of chains are not those, so none is given."""
         motion = self._tree.at(*self._state())
         turned = np.array([to_quaternion(R) for R in motion.R_WB[:-1]])
-        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
+        return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned, effort=self._efforts())
+
+    def _efforts(self) -> Any:
+        """Efforts of the actuators at the present state, which the next step has; None: there are none."""
+        (q, v), mechanism = self._state(), self._mechanism
+        places = [(item, *mechanism.place_of(item.joint)) for item in mechanism.actuators]
+        now = self._steps * self._settings.dt
+        return (
+            np.array([item.effort(now, float(q[at]), float(v[rate])) for item, at, rate in places]) if places else None
+        )
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
