@@ -82,7 +82,7 @@ class MovedStop(MechanismMutant):
 
 
 class MovedStopWithRebounds(MovedStop):
-    """It rebounds from there with half of its speed, and does not come to rest in this time."""
+    """Rebounds from there with half of its speed, without coming to rest in this time."""
 
     fault = "stop at another place, with rebounds"
     scene: ClassVar[Any] = ("stop", {"restitution": 0.5})
