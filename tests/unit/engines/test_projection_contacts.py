@@ -9,8 +9,14 @@ import pytest
 
 from proofroll.core.errors import Refused
 from proofroll.core.plugins import load_engine
+from proofroll.elements.mechanism.contacts.geometry import Geometry, Pair
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.sampling import mechanism_of
+from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 
 PROJECTION = load_engine("projection")
@@ -111,6 +117,27 @@ def test_a_clamped_servo_pushes_through_a_contact(engine: str, formulation: str,
     sample = run.sample()
     assert sample.p_WB[1, 0] == pytest.approx(0.07318356288203501, abs=bound)
     assert sample.effort == pytest.approx([0.6], abs=1e-6)
+
+
+def test_a_limit_of_an_effort_is_not_stepped_across() -> None:
+    """Steps of 0.03 s, one of which an effort's limit splits, follow a cubic and then a parabola of time exactly."""
+    joints = (
+        Joint("rail", "prismatic", "world", "cart", axis=(1, 0, 0), v0=(1.0,)),
+        Joint("shaft", "prismatic", "cart", "foot", axis=(0, 0, 1), q0=(0.1,)),
+    )
+    dragged = Mechanism(
+        bodies=tuple(Body(name, mass, inertia=(1.0, 1.0, 1.0)) for name, mass in (("cart", 0.5), ("foot", 1.5))),
+        joints=joints,
+        actuators=(Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0),),
+        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
+        pairs=(Pair("sole", ("ball", "floor"), friction=0.2),),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    run = PROJECTION.build(dragged, replace(DEFAULT, dt=0.03))
+    run.advance(0.24)
+    slowed, left = 0.2 * 1.5 * 9.81 / 2, 0.04
+    moved = 0.24 - slowed * 0.24**2 / 2 + 10 * (0.2**3 / 6 + 0.2**2 / 2 * left) + 2.0 * left**2 / 2
+    assert run.sample().p_WB[0, 0] == pytest.approx(moved, abs=1e-13)
 
 
 def test_feet_that_hold_together_share_their_friction() -> None:

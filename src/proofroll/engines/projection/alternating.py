@@ -7,7 +7,7 @@ that it is as accurate as these.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from proofroll.core.errors import Diverged
 from proofroll.core.events import Event
 from proofroll.core.integrators import Integrator
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.engines.projection.dependent import DependentCoordinates
 
@@ -38,6 +39,20 @@ class Excess(NamedTuple):
     kind: str
     size: float
     closing: bool
+
+
+def ends_of_efforts(
+    motors: Iterable[Actuator], modes: Sequence[str], wanted: Sequence[float], first: int
+) -> list[Excess]:
+    """Excess of the modes of efforts with a limit over their ends; these are numbered from ``first`` on."""
+    found = list[Excess]()
+    for k, (motor, mode, effort) in enumerate(zip(motors, modes, wanted, strict=True), first):
+        over, under = effort - motor.bound, -motor.bound - effort
+        if mode == "linear":
+            found += [Excess(k, "least", under, True), Excess(k, "greatest", over, True)]
+        else:
+            found.append(Excess(k, "linear", -over if mode == "greatest" else -under, True))
+    return found
 
 
 class AlternatingMotion(ABC, Generic[ModeT]):

@@ -26,7 +26,7 @@ from proofroll.elements.mechanism.contacts.touching import Moving, Touching, tou
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import SETTLED
-from proofroll.engines.projection.alternating import AlternatingMotion, Excess
+from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
@@ -69,7 +69,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         self._faint = max(STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
+        self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
+        wanted = zip(self._motors.items(), equations.wanted(self._at(start)), strict=True)
+        equations.applied.modes = {k: motor.mode_of(effort) for (k, motor), effort in wanted}
         now = self.at(start)
         closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= STILL for each in now.touching]
         still = [bool(np.linalg.norm(each.slide) <= STILL) for each in now.touching]
@@ -226,10 +229,15 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                     )
                     beyond = -beyond if held[k].kind == "stick" else beyond
                 found.append(Excess(k, "slip", beyond, True))
-        return found
+        modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
+        return found + ends_of_efforts(self._motors.values(), modes, wanted, len(self.mode))
 
     def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
+        if k >= len(was):
+            motor = list(self._motors)[k - len(was)]
+            self._equations.applied.modes = {**self._equations.applied.modes, motor: kind}
+            return x, was, happened
         now, closed = self.at(x), [own.kind != "open" for own in was]
         still = [own.kind == "stick" for own in was]
         if kind == "impact":

@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, changes, held_by, switched_joints
-from proofroll.engines.projection.alternating import AlternatingMotion, Excess
+from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 
 _DEPENDENT = 1e-12  # of the largest response: directions that respond less hold one degree of freedom together
@@ -160,14 +160,8 @@ class SwitchedMotion(AlternatingMotion[Mode]):
             if own != "free":
                 found.append(Excess(k, "still", -rate if own == "forward" else rate, True))
             found += [Excess(k, "low", joint.low - place, rate < 0), Excess(k, "high", place - joint.high, rate > 0)]
-        efforts = zip(self._motors.values(), self._equations.wanted(self._at(y)), strict=True)
-        for k, (motor, wanted) in enumerate(efforts, len(self._joints)):
-            over, under = wanted - motor.bound, -motor.bound - wanted
-            if self.mode[k] == "linear":
-                found += [Excess(k, "least", under, True), Excess(k, "greatest", over, True)]
-            else:
-                found.append(Excess(k, "linear", -over if self.mode[k] == "greatest" else -under, True))
-        return found
+        count, wanted = len(self._joints), self._equations.wanted(self._at(y))
+        return found + ends_of_efforts(self._motors.values(), self.mode[count:], wanted, count)
 
     def _next(self, y: Array, k: int, kind: str) -> tuple[Array, Mode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
