@@ -28,8 +28,9 @@ _UNFIT = frozenset({"failed", "refused", "another-scene"})
 
 
 def point_name(parameters: Mapping[str, float | Edge]) -> str:
-    """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``."""
-    return ", ".join(f"{key}={value:.12g}" for key, value in parameters.items() if not isinstance(value, Edge))
+    """A point of the parameters as text, e.g. ``speed=4, rolling_resistance=0.0005``; an edge by its two ends."""
+    ends = {key: value.edge_between if isinstance(value, Edge) else (value,) for key, value in parameters.items()}
+    return ", ".join(f"{key}={'…'.join(f'{end:.12g}' for end in each)}" for key, each in ends.items())
 
 
 def at_point(parameters: dict[str, float]) -> str:

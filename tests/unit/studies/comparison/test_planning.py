@@ -6,7 +6,7 @@ import dataclasses
 
 import pytest
 
-from proofroll.core.comparison import Row
+from proofroll.core.comparison import Edge, Row
 from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
@@ -70,3 +70,10 @@ def test_a_formulation_is_offered_for_what_it_is_made_for() -> None:
     assert {"mujoco[formulation=geoms]", "exudyn[formulation=spheres]"} <= set(touching)
     assert not {"mujoco[formulation=geoms]", "exudyn[formulation=spheres]"} & set(swinging)
     assert "mujoco[formulation=joints]" in swinging
+
+
+def test_a_point_with_an_edge_is_named_by_its_ends() -> None:
+    """Two points that differ only in where an edge is looked for have names of their own."""
+    near, far = ({"speed": 4.0, "mu_static": Edge((0.1, end))} for end in (0.2, 0.3))
+    assert planning.point_name(near) == "speed=4, mu_static=0.1…0.2"
+    assert planning.point_name(far) == "speed=4, mu_static=0.1…0.3"
