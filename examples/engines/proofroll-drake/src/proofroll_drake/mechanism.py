@@ -25,6 +25,7 @@ from proofroll.elements.mechanism import WORLD, Joint, Mechanism
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.loop_points import held_points
 from proofroll.elements.mechanism.sampling import WITH_AXIS, MechanismBuilt, MechanismSample, mechanism_of
+from proofroll.elements.mechanism.signal import value_at
 from proofroll_drake.contact import DrakeContacts
 from proofroll_drake.joints import connect, start
 from proofroll_drake.settings import DrakeSettings
@@ -32,15 +33,21 @@ from proofroll_drake.settings import DrakeSettings
 _CAPABILITY = MechanismCapability
 CONTINUOUS: frozenset[str] = ALL_JOINTS | FORCES | {_CAPABILITY.ARMATURE}
 DISCRETE: frozenset[str] = CONTINUOUS | {
-    _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT
+    _CAPABILITY.FIXED_LOOP, _CAPABILITY.REVOLUTE_LOOP, _CAPABILITY.SPHERICAL_LOOP, _CAPABILITY.REDUNDANT,
+    _CAPABILITY.COUPLINGS, _CAPABILITY.STOPS, _CAPABILITY.ACTUATORS, _CAPABILITY.SATURATION, _CAPABILITY.SIGNALS,
 }  # fmt: skip
 CONTACT: frozenset[str] = CONTINUOUS | {_CAPABILITY.CONTACT, _CAPABILITY.CONTACT_FRICTION}
-_LOOPS = "a continuous plant of Drake has no constraints; take formulation=discrete"
+_LOOPS = "a continuous plant of Drake has no constraints, and its drives are constant here; take formulation=discrete"
+_BESIDE = "Drake has loops and laws of joints beside its SAP solver alone"
+_NOWHERE = {
+    _CAPABILITY.JOINT_FRICTION: "Drake reads dry friction and does not use it",
+    _CAPABILITY.REBOUNDS: "Drake's limits of joints have no restitution",
+}
 LACKING: Mapping[str, Mapping[str, str]] = {
-    "continuous": dict.fromkeys(DISCRETE - CONTINUOUS, _LOOPS),
-    "contact": dict.fromkeys(DISCRETE - CONTINUOUS, "Drake has loops beside its SAP solver alone")
+    "continuous": dict.fromkeys(DISCRETE - CONTINUOUS, _LOOPS) | _NOWHERE,
+    "contact": dict.fromkeys(DISCRETE - CONTINUOUS, _BESIDE)
     | {_CAPABILITY.CONTACT_REBOUNDS: "Drake's points of contact only dissipate"},
-    "discrete": {_CAPABILITY.JOINT_FRICTION: "Drake reads dry friction and does not use it"},
+    "discrete": _NOWHERE,
 }
 _SOFT = "Drake's SAP solver makes constraints as stiff as its step can carry, and no stiffer; the first step shows it"
 _AT_ITS_END = "a discrete plant takes the forces of springs and dampers as they are at the end of the step"
@@ -65,6 +72,7 @@ class DrakeMechanism:
         self._joints = [connect(plant, self._bodies, joint) for joint in mechanism.joints]
         self._add_forces()
         self._close_loops()
+        self._add_laws()
         self._contacts = (
             DrakeContacts(mechanism, plant, scene_graph, self._bodies, settings) if mechanism.pairs else None
         )
@@ -73,12 +81,11 @@ class DrakeMechanism:
         self._simulator = None if settings.dt else Simulator(self._diagram)
         self._root = self._simulator.get_mutable_context() if self._simulator else self._diagram.CreateDefaultContext()
         self._context = plant.GetMyMutableContextFromRoot(self._root)
-        drive = np.zeros(plant.num_velocities())
         for joint, built in zip(mechanism.joints, self._joints, strict=True):
             start(plant, self._context, joint, built)
-            if joint.torque:
-                drive[built.velocity_start()] = joint.torque
-        plant.get_applied_generalized_force_input_port().FixValue(self._context, drive)
+        moving = any(not isinstance(joint.torque, float) for joint in mechanism.joints)
+        self._driven = bool(mechanism.actuators) or moving
+        self._drive(0.0)
         if self._simulator:
             integrator = ResetIntegratorFromFlags(self._simulator, settings.integrator or "runge_kutta5", 0.1)
             integrator.set_target_accuracy(settings.rtol)
@@ -115,6 +122,35 @@ class DrakeMechanism:
             ends = (self._bodies[spring.body_a], spring.position_a, self._bodies[spring.body_b], spring.position_b)
             plant.AddForceElement(LinearSpringDamper(*ends, spring.length, spring.stiffness, spring.damping))
 
+    def _add_laws(self) -> None:
+        """Couplings and stops, which discrete plants have."""
+        number = self._mechanism.joint_index
+        for item in self._mechanism.couplings:
+            a, b = (self._joints[number[name]] for name in (item.joint_a, item.joint_b))
+            self._plant.AddCouplerConstraint(b, a, item.ratio, item.offset)
+        for joint, built in zip(self._mechanism.joints, self._joints, strict=True):
+            if joint.limits:
+                built.set_position_limits([joint.limits[0]], [joint.limits[1]])
+
+    def _efforts(self, t: float) -> Any:
+        """Efforts of the actuators at the present state: explicit, as a controller outside of the plant."""
+        q, v = self._plant.GetPositions(self._context), self._plant.GetVelocities(self._context)
+        found = []
+        for item in self._mechanism.actuators:
+            built = self._joints[self._mechanism.joint_index[item.joint]]
+            found.append(item.effort(t, float(q[built.position_start()]), float(v[built.velocity_start()])))
+        return np.array(found)
+
+    def _drive(self, t: float) -> None:
+        """Sets drives of joints and efforts of actuators along the velocities."""
+        drive = np.zeros(self._plant.num_velocities())
+        for joint, built in zip(self._mechanism.joints, self._joints, strict=True):
+            if joint.nv == 1:
+                drive[built.velocity_start()] = float(value_at(joint.torque, t))
+        for item, effort in zip(self._mechanism.actuators, self._efforts(t), strict=True):
+            drive[self._joints[self._mechanism.joint_index[item.joint]].velocity_start()] += effort
+        self._plant.get_applied_generalized_force_input_port().FixValue(self._context, drive)
+
     def _close_loops(self) -> None:
         bodies = dict(self._bodies)
         if any(WORLD in (loop.body_a, loop.body_b) for loop in self._mechanism.loops):
@@ -148,6 +184,8 @@ class DrakeMechanism:
                 self._simulator.AdvanceTo(t)
                 return
             for _ in range(whole_steps(self._steps * dt, t, dt)):
+                if self._driven:
+                    self._drive(self._steps * dt)
                 self._context.SetDiscreteState(self._plant.EvalUniquePeriodicDiscreteUpdate(self._context))
                 self._steps += 1
                 self._root.SetTime(self._steps * dt)
@@ -172,6 +210,7 @@ class DrakeMechanism:
             joint_force=force,
             joint_torque=torque,
             contact_force=pressed,
+            effort=self._efforts(context.get_time()) if self._mechanism.actuators else None,
         )
 
     def _reactions(self) -> tuple[Any, Any]:
@@ -201,7 +240,7 @@ class DrakeMechanism:
             found = [plant.EvalBodySpatialAccelerationInWorld(context, body) for body in bodies]
             rates["acceleration"] = np.array([rate.translational() for rate in found])
             rates["angular_acceleration"] = np.array([rate.rotational() for rate in found])
-        loops = bool(self._mechanism.loops)
+        loops = bool(self._mechanism.loops or self._mechanism.couplings)
         soft = {name: Regularised(1.0, _SOFT) for name in ("acceleration", "angular_acceleration") if loops}
         sprung = self._mechanism.springs or any(one.stiffness or one.damping for one in self._mechanism.joints)
         if self._settings.dt and sprung and not loops:
