@@ -103,7 +103,7 @@ class DrakeContacts:
         return found
 
     def built(self, found: MechanismBuilt, settings: DrakeSettings) -> MechanismBuilt:
-        """What was built, with the law of contact."""
+        """Model that was built, with the law of its contacts."""
         count = len(self._mechanism.pairs)
         friction = self._mechanism.pairs[0].friction
         return replace(
