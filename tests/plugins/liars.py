@@ -13,6 +13,7 @@ from typing import Any, ClassVar, Self
 
 from scipy.spatial.transform import Rotation
 
+from proofroll.conformance.subject import truth_scenes
 from proofroll.core.events import Event
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism.element import MechanismElement
@@ -45,10 +46,12 @@ _SCENES: Mapping[str, tuple[Callable[[], Scene], float]] = {
     "tree": (lambda: load_scene("double_pendulum"), 0.12),
     "loop": (lambda: load_scene("slider_crank"), 0.12),
     "driven": (_driven, 0.12),
+    "servo": (lambda: truth_scenes()["double_pendulum-limit"], 0.12),
+    "sled": (lambda: load_scene("sled"), 0.12),
 }
 UNTIL = {name: until for name, (_, until) in _SCENES.items()}
-BALLS, MECHANISMS = ("rolls", "slips"), ("tree", "loop", "driven")
-ALL = (*BALLS, *MECHANISMS)
+BALLS, MECHANISMS = ("rolls", "slips"), ("tree", "loop", "driven", "servo")
+ALL = (*BALLS, *MECHANISMS, "sled")
 
 
 @cache

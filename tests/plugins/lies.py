@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from liars import ALL, AT_ONCE, BALLS, EVERY, MECHANISMS, Lie, Moment, of_mechanism
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.events import Event
 from proofroll.core.gravity import Gravity
@@ -58,22 +59,25 @@ _PLACES, _FIRST, _MODEL = (
 )
 _V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes is")
 _FORCES, _EVENTS = ("N is", "F3 is", "forces is"), ("event_times is", "first_slip is", "event_order is", "creep is")
-_TURNED = ("rolls", *MECHANISMS)
+_TURNED = ("rolls", *MECHANISMS, "sled")
 _STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")
-_LATE, _FACTOR, _AXES, _SIGN, _OMITTED = ("0.003 s late",), ("times",), ("other axes",), ("wrong sign",), ("left out",)
+_LATE, _FACTOR, _AXES, _SIGN, _OMITTED = ("s late",), ("times",), ("other axes",), ("wrong sign",), ("left out",)
 
 
 def _times() -> Iterator[Lie]:
     yield Lie("3 ms late from the start", ALL, _FIRST, lambda m: m.at(max(m.t - 0.003, 0)), begins=AT_ONCE)
     yield Lie("3 ms late", ALL, _PLACES, lambda m: m.at(m.t - 0.003), ("late",))
     yield Lie("3 ms early", ALL, _PLACES, lambda m: m.at(m.t + 0.003), ("early",))
-    yield Lie("a clock 1 % slow from the start", ALL, _FIRST, lambda m: m.at(0.99 * m.t), begins=AT_ONCE)
-    yield Lie("a clock 1 % slow", ALL, _PLACES, lambda m: m.at(0.99 * m.t), ("0.99 times as fast",))
+    slow, known = lambda m: m.at(0.99 * m.t), ("0.99 times as fast",)
+    yield Lie("a clock 1 % slow from the start", (*BALLS, *MECHANISMS), _FIRST, slow, begins=AT_ONCE)
+    yield Lie("a clock 1 % slow from the start of a slide", ("sled",), _PLACES, slow, known, begins=AT_ONCE)
+    yield Lie("a clock 1 % slow", ALL, _PLACES, slow, known)
     yield Lie("frozen at the start", ALL, _PLACES, lambda m: m.at(0.0), _OMITTED)  # all was at rest
     yield Lie("frozen from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until / 2)))
     yield Lie("every other sample repeated", ALL, _PLACES, lambda m: m.at(int(m.t / EVERY / 2 + 1e-9) * 2 * EVERY))
     yield Lie("back again from the middle on", ALL, _PLACES, lambda m: m.at(min(m.t, m.until - m.t)))
     yield Lie("right on the grid alone", ALL, _PLACES, _off_grid(lambda m: m.at(m.t - 0.002)))
+    yield Lie("two steps late and places 1 % too large", ALL, _PLACES, _late_and_larger)
 
 
 def _places() -> Iterator[Lie]:
@@ -88,6 +92,13 @@ def _places() -> Iterator[Lie]:
     yield Lie("places not finite", ALL, ("p_WB is not finite",), lambda m: {"p_WB": np.nan * m.right.p_WB})
     yield Lie("bodies swapped", MECHANISMS, _PLACES, lambda m: {n: getattr(m.right, n)[::-1] for n in _STATE})
     yield Lie("the last body frozen", MECHANISMS, _PLACES, _last_frozen, _OMITTED)  # all was at rest, the first one is
+
+
+def _frames() -> Iterator[Lie]:
+    yield Lie("the world turned by 0.3 rad", ALL, _PLACES, _in_axes(_SLANTED))
+    yield Lie("the world turned by 0.3 rad from the start", ALL, (*_PLACES, *_MODEL), _in_axes(_SLANTED), begins=0.0)
+    yield Lie("the world's axes in another order", ALL, _PLACES, _in_axes(_CYCLED), _AXES)
+    yield Lie("bodies' frames turned by 0.3 rad", _TURNED, _Q, lambda m: {"q_WB": _quaternions(m.turns * _SLANTED)})
 
 
 def _velocities() -> Iterator[Lie]:
@@ -181,6 +192,38 @@ def _reactions_of_joints() -> Iterator[Lie]:
     yield Lie("moments + 5 N m", MECHANISMS, ("torques is",), lambda m: {"joint_torque": m.right.joint_torque + 5})
 
 
+def _efforts() -> Iterator[Lie]:
+    def lie(name: str, change: Callable[[Moment], Any], *causes: str) -> Lie:
+        return Lie(name, ("servo",), ("effort.servo is",), lambda m: {"effort": change(m)}, causes)
+
+    yield lie("efforts x 1.02", lambda m: 1.02 * m.right.effort)
+    yield lie("efforts of nothing", lambda m: 0 * m.right.effort)
+    yield lie("efforts backwards", lambda m: -m.right.effort)
+    yield lie("efforts of the start", lambda m: m.at(0.0).effort)
+    yield lie("efforts 3 ms late", lambda m: m.at(m.t - 0.003).effort)
+    yield lie("efforts not finite", lambda m: np.nan * m.right.effort)
+
+
+def _forces_of_contacts() -> Iterator[Lie]:
+    def lie(name: str, change: Callable[[Moment], Any], *causes: str) -> Lie:
+        return Lie(
+            name,
+            ("sled",),
+            ("contact_forces is", "this trajectory has"),
+            lambda m: {"contact_force": change(m)},
+            causes,
+        )
+
+    yield lie("contacts x 1.02", lambda m: 1.02 * m.right.contact_force, *_FACTOR)
+    yield lie("contacts of nothing", lambda m: 0 * m.right.contact_force, *_OMITTED)
+    yield lie("contacts on the other body", lambda m: -m.right.contact_force, *_SIGN)
+    yield lie("contacts of another foot", lambda m: m.right.contact_force[[1, 2, 0]])
+    yield lie("contacts without friction", lambda m: m.right.contact_force * [0, 0, 1], "friction")
+    yield lie("contacts of the start", lambda m: m.at(0.0).contact_force)
+    yield lie("contacts 3 ms late", lambda m: m.at(m.t - 0.003).contact_force, *_LATE)
+    yield lie("contacts not finite", lambda m: np.nan * m.right.contact_force)
+
+
 def _slips() -> Iterator[Lie]:
     def each(**change: Callable[[Event, float], Any]) -> Callable[[list[Event], float], list[Event]]:
         return lambda right, until: [
@@ -248,13 +291,38 @@ def _small() -> Iterator[Lie]:
 
 def table() -> list[Lie]:
     """All lies."""
-    parts = _times, _places, _velocities, _spins, _orientations, _forces_of_balls, _reactions_of_joints, _slips, _models
-    return [lie for part in (*parts, _small) for lie in part()]
+    states = _times, _places, _frames, _velocities, _spins, _orientations
+    forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts
+    return [lie for part in (*states, *forces, _slips, _models, _small) for lie in part()]
 
 
 def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:
     """The change between samples, and no lie at them."""
     return lambda m: {} if abs(m.t / EVERY - round(m.t / EVERY)) < 1e-6 else change(m)
+
+
+# Frames that somebody else may have: slanted against the world's, and with its axes in another order.
+_SLANTED, _CYCLED = Rotation.from_rotvec([0.1, 0.2, 0.2]), Rotation.from_matrix(np.roll(np.eye(3), 1, axis=0))
+
+
+def _quaternions(turns: Rotation) -> Any:
+    return turns.as_quat(scalar_first=True)
+
+
+def _in_axes(turn: Rotation) -> Callable[[Moment], Any]:
+    """All vectors and orientations as an engine says them whose world is turned."""
+
+    def sample(m: Moment) -> dict[str, Any]:
+        given = {item.name: getattr(m.right, item.name) for item in dataclasses.fields(m.right)}
+        vectors = {k: v @ turn.as_matrix().T for k, v in given.items() if np.shape(v)[-1:] == (3,) and k != "effort"}
+        return vectors | ({"q_WB": _quaternions(turn * m.turns)} if m.right.q_WB is not None else {})
+
+    return sample
+
+
+def _late_and_larger(m: Moment) -> Any:
+    late = m.at(m.t - 0.002)
+    return dataclasses.replace(late, p_WB=1.01 * late.p_WB)
 
 
 def _last_frozen(m: Moment) -> dict[str, Any]:

@@ -126,8 +126,8 @@ class Reported:
         ):
             tried = list(causes)
             yield from tried
-            if any(cause.proven for cause in tried):
-                return  # what is simple goes first, and is enough
+            if any(cause.proven and cause.left <= _EXACT for cause in tried):
+                return  # what is simple goes first, and is enough where it leaves nothing
 
     def _frames(self) -> Iterator[Cause]:
         remedy = f"give {self.name} along the axes of the world"
