@@ -167,6 +167,8 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
         return np.asarray(np.einsum("tij,tj->ti", body.surface.frame(body.surface.locate(p - delay * v)), local))
 
     delay = fitted(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
+    if 2 * apart(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
+        return  # the ball itself is as far off, and its force with it
     moment = said_delay(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
     after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
