@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping
 from types import MappingProxyType
 
@@ -20,7 +20,8 @@ class TimeBudget:
     """Processor time of the cases of one study; what it does not suffice for is left out.
 
     Cases belong to groups, as the comparisons of a report. A group that begins may take an equal share of what is left
-    among the groups that wait; what it does not take is for those after it. No case takes more than is left divided by
+    among the groups that wait; what it does not take is for those after it. A case may take a whole share, for a worker
+    that is ended must start anew, but none is begun when the share is used. No case takes more than is left divided by
     the cases that run side by side, so that all together never take more, however long each of them does.
 
     Args:
@@ -36,6 +37,7 @@ class TimeBudget:
         self._begun: dict[str, tuple[float, float]] = {}
         self._unfinished: Counter[int] = Counter()
         self._shares: dict[int, float] = {}
+        self._used: defaultdict[int, float] = defaultdict(float)
         self._lock = threading.Lock()
 
     @property
@@ -71,6 +73,7 @@ class TimeBudget:
             left = self._left()
             share = self._shares.setdefault(group, left / len(self._unfinished))
             seconds = min(left / max(1, min(abreast, self._unfinished.total())), share)
+            seconds = seconds if self._used[group] < share else 0.0
             seconds = seconds if seconds > _LEAST else 0.0
             self._begun[case] = time.monotonic(), seconds
             return seconds
@@ -88,7 +91,7 @@ class TimeBudget:
             passed = self._passed(case) if lost else 0.0
             del self._begun[case]
             self._lost += passed
-            self._shares[group] -= passed or used
+            self._used[group] += passed or used
             self._unfinished[group] -= 1
             if not self._unfinished[group]:
-                del self._unfinished[group], self._shares[group]
+                del self._unfinished[group], self._shares[group], self._used[group]

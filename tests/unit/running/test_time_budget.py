@@ -69,7 +69,7 @@ def test_each_group_has_an_equal_share(monkeypatch: pytest.MonkeyPatch) -> None:
         used += min(first, spent)
         budget.end(f"a{number}", min(first, spent))
         second = budget.begin(f"b{number}", 1)
-        assert second == pytest.approx(first - spent if spent < 20.0 else 0.0)
+        assert second == pytest.approx(min(first, 90.0 - used) if spent < 20.0 else 0.0)
         budget.end(f"b{number}")
 
 
