@@ -138,14 +138,19 @@ class MechanismElement:
         """Round-off of the first accelerations [m/s², rad/s²]."""
         return self._equations.sensitivity()[1]
 
-    @cached_property
+    @property
     def length(self) -> float:
+        """Its :attr:`extent`, or where that is zero 1 m."""
+        return self.extent or 1.0
+
+    @cached_property
+    def extent(self) -> float:
         """Largest distance between joints, centres of mass, tracked points and contacts at the start [m]."""
         joints = [self.start.point(joint.child, joint.child_position) for joint in self.mechanism.joints]
         masses = [self.start.point(body.name, body.com) for body in self.mechanism.bodies]
         touching = [each.place[None] for each in touches(self.mechanism, self._solution.motion)]
         places = np.concatenate([*joints, *masses, *self.start.points.swapaxes(0, 1), *touching])
-        return float(np.max(np.linalg.norm(places[:, None] - places[None], axis=-1))) or 1.0
+        return float(np.max(np.linalg.norm(places[:, None] - places[None], axis=-1)))
 
     @property
     def natural_time(self) -> float:

@@ -214,8 +214,8 @@ class ContactEquations:
         return np.array([m.wanted(state[-1], *at) for m, *at in zip(self._limited.values(), q, v, strict=True)])
 
     def excess(self, state: Array) -> Array:
-        """Efforts that are wanted beyond their limits, of those that have one [N m, N]."""
-        return np.abs(self._wanted(state)) - [motor.bound for motor in self._limited.values()]
+        """Efforts that are wanted beyond their limits, as parts of these."""
+        return np.abs(self._wanted(state)) / [motor.bound for motor in self._limited.values()] - 1
 
     def clamped(self, state: Array) -> Switched:
         """Efforts that are at their limits."""

@@ -14,15 +14,15 @@ from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.truth.mechanism.two_paths import CLOSE
+from proofroll.truth.mechanism.two_paths import moment
 
-# Speeds [m/s, rad/s] below which nothing moves, and accelerations [m/s², rad/s²] below which nothing will: both routes
-# stop there, so that they integrate no round-off of a state at rest.
+# In natural units (natural_units.py): speeds below which nothing moves, and accelerations below which nothing will.
+# Both routes stop there, so that they integrate no round-off of a state at rest.
 AT_REST, STANDS = 1e-13, 1e-9
-STOPPED = 1e-11  # m/s: what is left of a slip that has come to rest, in a straight line from what is faint
+STOPPED = 1e-11  # what is left of a slip that has come to rest, in a straight line from what is faint
 # Part of a normal force's answer without friction below which Painlevé's measure is taken to come to zero.
 _LEAST_RESPONSE = 1e-3
-_DIGITS = 1e-14  # m, times the size of the mechanism: round-off of a gap that has just opened
+_DIGITS = 1e-14  # of the size of the mechanism: round-off of a gap that has just opened
 
 
 Touchable = BodyContact | JointContact
@@ -89,11 +89,11 @@ def _stopping(own: Acting, found: Touching) -> float:
 
 
 def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: float) -> list[int]:
-    """Contacts that close at the same time [s] as one does, but for :data:`CLOSE` of that time, with it."""
+    """Contacts that close at the same time as one does, or nearer to it than times are known, with it."""
 
     def closes(found: Touching) -> bool:
         closing = -float(found.normal @ found.slide)
-        return closing > 0 and found.gap <= closing * CLOSE * time
+        return closing > 0 and found.gap <= closing * moment(time)
 
     return [
         k

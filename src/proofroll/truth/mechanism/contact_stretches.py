@@ -31,8 +31,8 @@ from proofroll.truth.mechanism.contact_guards import (
 )
 from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
 
-_AHEAD = 1e-9  # s: after a stretch has begun, whether an effort is at its limit
-_CLAMPED = 1e-9  # N m, N: an effort as near to its limit comes from it
+_AHEAD = 1e-9  # of the natural time: after a stretch has begun, whether an effort is at its limit
+_CLAMPED = 1e-9  # of a limit: an effort as near to it comes from it
 
 
 class SolvedContacts(NamedTuple):
@@ -71,10 +71,10 @@ class ContactStretches(Stretches[ContactMode]):
     See :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
-    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
-        """Takes the length of a state without time, the tolerance of each step, and the size of the mechanism [m]."""
+    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float, touching: float) -> None:
+        """Takes the length of a state without time, the tolerance of each step, the mechanism's size, the least gap."""
         super().__init__(length + 1, tolerance)
-        self._given, self.contacts, self._size = equations, equations.contacts, size
+        self._given, self.contacts, self._size, self._least_gap = equations, equations.contacts, size, touching
         self._timed = any(map(varies, equations.mechanism.signals))
 
     @abstractmethod
@@ -104,7 +104,7 @@ class ContactStretches(Stretches[ContactMode]):
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
         guards, equations = guards_of(self.contacts, mode), self._given
         # an effort comes to its limit, or back from it
-        side = np.sign(equations.excess(state + _AHEAD * equations.rate(state, mode)))
+        side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
         noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
         return StretchLaw(
             lambda y: equations.rate(y, mode),

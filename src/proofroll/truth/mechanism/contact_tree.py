@@ -21,13 +21,13 @@ from proofroll.truth.mechanism.contact_stretches import ContactStretches, Solved
 class ContactTree(ContactStretches):
     """The stretches of a mechanism in the coordinates of its tree. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
-    def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
+    def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float, touching: float) -> None:
         self.dynamics = dynamics
-        super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
+        super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size, touching)
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
-        mode, margin = self.dynamics.begin()
+        mode, margin = self.dynamics.begin(self._least_gap)
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 

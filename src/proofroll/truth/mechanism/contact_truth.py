@@ -6,6 +6,7 @@ import numpy as np
 
 from proofroll.elements.mechanism.contacts.acting import kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
@@ -15,6 +16,7 @@ from proofroll.truth.mechanism.contact_bodies import ContactBodies
 from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCE, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, matched
 
@@ -28,13 +30,21 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
         Diverged: a route stopped.
     """
     refuse_uncovered(mechanism)
-    dynamics, second = ContactDynamics(mechanism), MaximalCoordinates(mechanism)
-    check_start(dynamics.equations, second)
-    size = _size(dynamics)
-    tree = ContactTree(dynamics, TOLERANCE, size)
-    equations = ContactEquations(mechanism, second.lean)
-    bodies = ContactBodies(equations, TOLERANCE, size)
-    until, kinks = float(times[-1]), breaks(mechanism.signals)
+    units = natural_units(mechanism)
+    with units.said_in_seconds():
+        return _in_units(mechanism, units, times / units.time)
+
+
+def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotion:
+    """The truth at times in natural units, by routes that are in these units."""
+    own = units.mechanism(mechanism)
+    dynamics, second = ContactDynamics(own), MaximalCoordinates(own)
+    check_start(dynamics.equations, second, units.length)
+    size, touching = _size(dynamics), TOUCHING / units.length
+    tree = ContactTree(dynamics, TOLERANCE, size, touching)
+    equations = ContactEquations(own, second.lean)
+    bodies = ContactBodies(equations, TOLERANCE, size, touching)
+    until, kinks = float(times[-1]), breaks(own.signals)
     paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = paths[0].leg_at(times)
     others = [min(number, len(paths[1].legs) - 1) for number in legs]
@@ -49,17 +59,18 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     switched = [
         equations.switched(state, paths[1].legs[number].mode) for state, number in zip(states, others, strict=True)
     ]
-    two = matched(mechanism, one, second.recorded(times, states[:, :-1], switched, wrenches))
+    two = matched(own, one, second.recorded(times, states[:, :-1], switched, wrenches))
     routes = (
         "joint coordinates, DOP853, contacts by Coulomb's law at all of them at once",
         "bodies alone, DOP853, contacts by trial of what they can do",
     )
     reason = "it hangs on less than the parameters are known to which contacts hold, slide or open"
-    forces = pressed, np.array([force for force, _ in applied])
-    return two_route_motion(mechanism, paths, one, two, routes, reason, kinds=kinds, pressed=forces, size=size)
+    forces = pressed * units.force, np.array([force for force, _ in applied]) * units.force
+    one, two = units.record(mechanism, one), units.record(mechanism, two)
+    return two_route_motion(mechanism, paths, one, two, routes, reason, units, kinds=kinds, pressed=forces)
 
 
 def _size(dynamics: ContactDynamics) -> float:
-    """Largest distance of a contact from the origin at the start, at least 1 m."""
+    """Largest distance of a contact from the origin at the start, at least the natural length, which is 1."""
     touching = dynamics.at(*dynamics.mechanism.start()).touching
     return max(1.0, *(float(np.abs(each.place).max()) for each in touching))

@@ -17,7 +17,7 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, Mode, SwitchedJoint, changes, left_by
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.stretches import Stretches
-from proofroll.truth.mechanism.two_paths import CLOSE
+from proofroll.truth.mechanism.two_paths import CLOSE, moment
 
 Motors = tuple[Actuator, ...]
 _NEAR = 1e-12  # relative: a coordinate this close to a stop is at it
@@ -144,10 +144,10 @@ def order_decides(
 ) -> bool:
     """True if less than parameters are known to decides which of two stops is hit first, and it matters.
 
-    Another joint would come to its stop within :data:`CLOSE` of the time that has passed, and the impact moves it.
+    Another joint would come to its stop nearer in time than times are known to, and the impact moves it.
     ``q`` are coordinates at the impact, ``before`` and ``after`` rates beside it, of the switched joints.
     """
-    speed, within = abs(float(before[hit])), CLOSE * leg.end
+    speed, within = abs(float(before[hit])), moment(leg.end)
     for k, kind in guards_of(joints, leg.mode):
         if k >= len(joints) or k == hit or kind not in {"low", "high"}:
             continue

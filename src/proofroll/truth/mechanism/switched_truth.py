@@ -17,10 +17,13 @@ from proofroll.truth.mechanism.body_switching import SwitchedBodies
 from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
+from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCE, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
 
-_GRAZED = 1e-8  # rad, m or part by which a stop or a limit must be passed to act; more than the look ahead is wrong by
+# rad, natural lengths, or part of a limit by which a stop or a limit must be passed to act; more than the look ahead is
+# wrong by
+_GRAZED = 1e-8
 _SCOUT = 1e-9  # of a look ahead: whether any stop is reached
 
 
@@ -42,11 +45,16 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     equations, kinks = JointCoordinates(mechanism), breaks(mechanism.signals)
     if not (equations.switches or kinks) or mechanism.unmodelled:
         return find_truth(mechanism, times)
+    units = natural_units(mechanism)
+    own = units.mechanism(mechanism)
     if not kinks and not any(joint.friction for joint in equations.switched):
-        look = follow(SwitchedTree(JointCoordinates(_wider(mechanism)), _SCOUT), float(times[-1]))
+        with units.said_in_seconds():
+            look = follow(SwitchedTree(JointCoordinates(_wider(own)), _SCOUT), float(times[-1]) / units.time)
         if not look.happenings and not any(own in {"least", "greatest"} for own in look.legs[0].mode):
             return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
-    return _switched(mechanism, equations, times)
+    refuse_uncovered(mechanism)
+    with units.said_in_seconds():
+        return _switched(mechanism, units, own, times / units.time)
 
 
 def _unlimited(mechanism: Mechanism) -> Mechanism:
@@ -67,12 +75,12 @@ def _wider(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, joints=tuple(joints), actuators=tuple(actuators))
 
 
-def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -> TwoRouteMotion:
-    refuse_uncovered(mechanism)
-    second = MaximalCoordinates(mechanism)
-    check_start(equations, second)
+def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) -> TwoRouteMotion:
+    """The truth at times in natural units, by routes of the mechanism in these units, its ``own``."""
+    equations, second = JointCoordinates(own), MaximalCoordinates(own)
+    check_start(equations, second, units.length)
     tree, bodies = SwitchedTree(equations, TOLERANCE), SwitchedBodies(second.lean, equations.switched, TOLERANCE)
-    until, kinks = float(times[-1]), breaks(mechanism.signals)
+    until, kinks = float(times[-1]), breaks(own.signals)
     paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
     q_and_v = states_of(tree, paths[0], times, paths[0].leg_at(times))
@@ -85,7 +93,8 @@ def _switched(mechanism: Mechanism, equations: JointCoordinates, times: Array) -
         ],
     )
     modes = [bodies.switched(paths[1].legs[number].mode) for number in legs]
-    two = matched(mechanism, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
+    two = matched(own, one, second.recorded(times, states_of(bodies, paths[1], times, legs)[:, :-1], modes))
     routes = ("joint coordinates, DOP853, modes by complementarity", "maximal coordinates, DOP853, modes by trial")
     reason = "it hangs on less than the parameters are known to which joints hold"
-    return two_route_motion(mechanism, paths, one, two, routes, reason)
+    one, two = units.record(mechanism, one), units.record(mechanism, two)
+    return two_route_motion(mechanism, paths, one, two, routes, reason, units)

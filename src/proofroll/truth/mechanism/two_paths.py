@@ -15,9 +15,10 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close
+from proofroll.truth.mechanism.natural_units import Units
 from proofroll.truth.mechanism.two_routes import FACTOR, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
 
-TOLERANCE = 1e-14  # of each step
+TOLERANCE = 1e-14  # of each step, in natural units
 # Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
 CLOSE = 1e-9
 
@@ -43,25 +44,25 @@ def two_route_motion(
     two: Record,
     routes: tuple[str, str],
     reason: str,
+    units: Units,
     *,
     kinds: Callable[[Any], Any] = lambda mode: mode,
     pressed: tuple[Array, Array] | None = None,
-    size: float = 1.0,
 ) -> TwoRouteMotion:
     """The motion with its error bars.
 
     Args:
         mechanism: what moves.
-        paths: of both routes.
-        one: record of the first, which is taken to be true.
+        paths: of both routes, in their own units.
+        one: record of the first, which is taken to be true, in SI units as all that follows.
         two: of the second, matched to it.
         routes: their names.
         reason: why the question is ill-posed from the horizon on, if it is.
+        units: those of the paths.
         kinds: part of a mode that both routes agree on.
         pressed: forces of contacts by both routes, (times, contacts, 3).
-        size: least size of the mechanism [m].
     """
-    parted, determinate = _parted(*paths, kinds), analysed(mechanism).determinate
+    parted, determinate = _parted(*paths, kinds) * units.time, analysed(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
     fields, others = judged(mechanism, masked), judged(mechanism, two)
     if pressed is not None:
@@ -72,10 +73,10 @@ def two_route_motion(
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
         bars[field] = np.maximum.accumulate(FACTOR * difference + least[field])
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
-    reach = np.maximum(size, np.maximum(largest(placed.p_WB), largest(placed.points)))
+    reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
-    horizon = min(parted, first_close(paths, CLOSE))
-    happened = tuple(event for event in _events(*paths) if event.time < horizon)
+    horizon = min(parted, first_close(paths, CLOSE) * units.time)
+    happened = tuple(event for event in _events(*paths, units.time) if event.time < horizon)
     force = None if pressed is None else pressed[0]
     return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)
 
@@ -99,13 +100,18 @@ def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
 
 def _instant(leg: Stretch[Any]) -> bool:
     """True if a leg is shorter than times are known to."""
-    return bool(leg.end - leg.start <= CLOSE * leg.end)
+    return bool(leg.end - leg.start <= moment(leg.end))
 
 
-def _events(one: Path, two: Path) -> Sequence[Event]:
-    """The changes of both routes, each with a bracket that holds both times and their round-off."""
+def moment(time: float) -> float:
+    """Part of the time that has passed which is less than times are known to; at the start of the unit of time."""
+    return CLOSE * max(1.0, time)
+
+
+def _events(one: Path, two: Path, unit: float) -> Sequence[Event]:
+    """The changes of both routes, each with a bracket that holds both times and their round-off; ``unit`` [s]."""
     found = []
     for a, b in zip(one.happenings, two.happenings, strict=False):  # beyond where they part there may be more of one
-        wide = FACTOR * abs(a.time - b.time) + ROUND_OFF * a.time
-        found.append(Event(a.kind, float(a.time), float(a.time - wide), float(a.time + wide), a.name))
+        time, wide = unit * float(a.time), unit * (FACTOR * abs(a.time - b.time) + ROUND_OFF * a.time)
+        found.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
     return tuple(found)

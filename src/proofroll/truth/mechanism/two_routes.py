@@ -153,8 +153,10 @@ def _apart(one: Record, two: Record) -> Array:
     return np.maximum(largest(one.p_WB - two.p_WB), largest(one.q_WB - two.q_WB))
 
 
-def check_start(first: JointCoordinates, second: MaximalCoordinates) -> None:
+def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float = 1.0) -> None:
     """Both routes place all bodies alike before anything has moved; only their formulas decide that.
+
+    Lengths of the routes are in a ``unit`` [m].
 
     Raises:
         Refused: they do not.
@@ -162,8 +164,8 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates) -> None:
     at = np.zeros(1)
     one, two = gathered(at, [first.sample(*first.mechanism.start())]), second.at_start()
     two = matched(first.mechanism, one, two)
-    apart = max(float(largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
-    if apart > SAME_START * max(1.0, float(largest(one.p_WB)[0])):
+    apart = unit * max(float(largest(getattr(one, name) - getattr(two, name))[0]) for name in ("p_WB", "q_WB"))
+    if apart > SAME_START * unit * max(1.0, float(largest(one.p_WB)[0])):
         raise Refused(
             f"the two routes place the bodies {apart:.3g} m (or 1, of quaternions) apart at t = 0 s, where nothing has "
             "moved yet: an error of proofroll's truth, not a property of the scene; please report it"

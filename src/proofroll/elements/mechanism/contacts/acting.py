@@ -11,7 +11,8 @@ from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 
 Direction = tuple[float, float, float]
-# m/s: a slip in two dimensions that is slower has no direction that is known well; the rest of it is a straight line.
+# m/s, in the truth a natural speed: a slower slip in two dimensions has no direction that is known well; the rest of it
+# is a straight line.
 FAINT = 1e-8
 _LINE = 1e-9  # part of what a force across does of what one along does: the contact can slide along a line only
 _TURNED = 0.5  # cosine by which the line of a slip may turn

@@ -173,9 +173,11 @@ class ContactDynamics:
         return y[:nq], y[nq:-1], float(y[-1])
 
     def excess(self, y: Array) -> Array:
-        """Efforts that are wanted beyond their limits, of those that have one [N m, N]."""
+        """Efforts that are wanted beyond their limits, as parts of these."""
         q, v, time = self.parts(y)
-        return np.array([abs(m.wanted(time, q[at_q], v[at_v])) - m.bound for m, at_q, at_v in self.equations.limited])
+        return np.array(
+            [abs(m.wanted(time, q[at_q], v[at_v])) / m.bound - 1 for m, at_q, at_v in self.equations.limited]
+        )
 
     def eliminated(self, y: Array, mode: ContactMode) -> Array:
         """The state with violations of loops, closed contacts and unit quaternions removed."""
@@ -202,12 +204,12 @@ class ContactDynamics:
         K = np.concatenate(rows)
         return _held(state.W, K, K @ v)
 
-    def begin(self) -> tuple[ContactMode, float]:
-        """Mode at the start, and how far it is from another one, relative."""
+    def begin(self, touching: float = TOUCHING) -> tuple[ContactMode, float]:
+        """Mode at the start, where a gap is closed up to ``touching``, and how far it is from another one, relative."""
         q, v = self.mechanism.start()
         state = self.at(q, v)
         least = least_speed(state.solution.motion, state.touching)
-        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= least for each in state.touching]
+        closed = [each.gap <= touching and float(each.normal @ each.slide) <= least for each in state.touching]
         still = [bool(np.linalg.norm(each.slide) <= least) for each in state.touching]
         return self.decided(q, v, closed, still)
 

@@ -1,0 +1,188 @@
+"""Natural units of a mechanism, in which routes that switch decide: every threshold there is of the scene's own size.
+
+Units are powers of two, so that nothing is rounded on the way to them and back.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Diverged, Refused
+from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.named_forces import named_forces
+from proofroll.elements.mechanism.record import Record
+from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Signal, Table
+
+_COORDINATES = {"planar": (1, 1, 0), "free": (1, 1, 1, 0, 0, 0, 0), "prismatic": (1,)}  # powers of the length
+_VELOCITIES = _COORDINATES | {"free": (1, 1, 1, 0, 0, 0)}
+_TIME = re.compile(r"(?<=\bt = )[\d.e+-]+(?= s\b)")  # in messages of routes
+
+
+@dataclass(frozen=True)
+class _InUnits(Formula):
+    """A formula whose time and value are in other units."""
+
+    second: float = 1.0
+    factor: float = 1.0
+
+    def at(self, time: Any, functions: Any = FUNCTIONS) -> Any:
+        return self.factor * super().at(self.second * time, functions)
+
+
+class Units(NamedTuple):
+    """Units of length [m], mass [kg] and time [s]."""
+
+    length: float
+    mass: float
+    time: float
+
+    @property
+    def force(self) -> float:
+        """Unit of force [N]."""
+        return self.mass * self.length / self.time**2
+
+    def mechanism(self, given: Mechanism) -> Mechanism:
+        """The mechanism in these units."""
+        to, joints = Units(1 / self.length, 1 / self.mass, 1 / self.time), {j.name: j for j in given.joints}
+        length, stiffness = to.length, to.force / to.length
+
+        def placed(item: Any, *names: str) -> Any:
+            return replace(item, **{name: _times(getattr(item, name), length) for name in names})
+
+        bodies = [
+            replace(
+                placed(body, "com"),
+                mass=body.mass * to.mass,
+                inertia=tuple(_times(row, to.mass * length**2) for row in body.inertia),
+            )
+            for body in given.bodies
+        ]
+        springs = [
+            replace(
+                placed(spring, "position_a", "position_b", "length"),
+                stiffness=spring.stiffness * stiffness,
+                damping=spring.damping * stiffness * to.time,
+            )
+            for spring in given.springs
+        ]
+        actuators = []
+        for item in given.actuators:
+            way, effort = to._along(joints[item.joint])
+            target = {"torque": effort, "velocity": way / to.time, "position": way}[item.kind]
+            actuators.append(
+                replace(
+                    item,
+                    target=self._signal(item.target, target),
+                    kp=item.kp * effort / way,
+                    kd=item.kd * effort / way * to.time,
+                    limit=None if item.limit is None else item.limit * effort,
+                )
+            )
+        couplings = []
+        for coupling in given.couplings:
+            (a, _), (b, _) = (to._along(joints[name]) for name in (coupling.joint_a, coupling.joint_b))
+            couplings.append(replace(coupling, ratio=coupling.ratio * b / a, offset=coupling.offset * b))
+        return replace(
+            given,
+            bodies=tuple(bodies),
+            joints=tuple(self._joint(to, placed(joint, "position", "child_position")) for joint in given.joints),
+            loops=tuple(placed(loop, "position_a", "position_b") for loop in given.loops),
+            springs=tuple(springs),
+            points=tuple(placed(point, "position") for point in given.points),
+            geometries=tuple(placed(item, "position", "radius", "axes", "size") for item in given.geometries),
+            actuators=tuple(actuators),
+            couplings=tuple(couplings),
+            gravity=_times(given.gravity, length / to.time**2),
+        )
+
+    def record(self, mechanism: Mechanism, found: Record) -> Record:
+        """The record of a mechanism (in SI units) that was made in these units."""
+        speed, moment = self.length / self.time, self.force * self.length
+        q = [
+            self.length**power for joint in mechanism.joints for power in _COORDINATES.get(joint.kind, (0,) * joint.nq)
+        ]
+        v = [self.length**power for joint in mechanism.joints for power in _VELOCITIES.get(joint.kind, (0,) * joint.nv)]
+        named = [self.force if item.unit == "N" else moment for item in named_forces(mechanism)]
+        return Record(
+            time=found.time * self.time,
+            p_WB=found.p_WB * self.length,
+            v_WB=found.v_WB * speed,
+            q_WB=found.q_WB,
+            w_WB=found.w_WB / self.time,
+            q=found.q * np.array(q[: found.q.shape[1]]),
+            v=found.v * (np.array(v[: found.v.shape[1]]) / self.time),
+            wrench=found.wrench * np.repeat([self.force, moment], 3),
+            named=found.named * np.array(named[: found.named.shape[1]]),
+            residual=found.residual,
+        )
+
+    @contextmanager
+    def said_in_seconds(self) -> Iterator[None]:
+        """Context in which times in messages are in these units; outside they are in seconds."""
+        try:
+            yield
+        except (Refused, Diverged) as error:
+            said = _TIME.sub(lambda found: f"{float(found[0]) * self.time:.6g}", str(error))
+            raise type(error)(said) from None
+
+    def _along(self, joint: Joint) -> tuple[float, float]:
+        """Units of a joint's coordinate and of an effort along it."""
+        return (self.length, self.force) if joint.kind == "prismatic" else (1.0, self.force * self.length)
+
+    def _joint(self, to: Units, joint: Joint) -> Joint:
+        way, effort = to._along(joint)
+        q, v = _COORDINATES.get(joint.kind, (0,) * joint.nq), _VELOCITIES.get(joint.kind, (0,) * joint.nv)
+        return replace(
+            joint,
+            q0=tuple(value * to.length**power for value, power in zip(joint.q0, q, strict=True)),
+            v0=tuple(value * to.length**power / to.time for value, power in zip(joint.v0, v, strict=True)),
+            stiffness=joint.stiffness * effort / way,
+            rest=joint.rest * way,
+            damping=joint.damping * effort / way * to.time,
+            friction=joint.friction * effort,
+            torque=self._signal(joint.torque, effort),
+            armature=joint.armature * effort / way * to.time**2,
+            limits=_times(joint.limits, way),
+        )
+
+    def _signal(self, given: Signal, factor: float) -> Signal:
+        if isinstance(given, Formula):
+            return _InUnits(given.text, given.numbers, self.time, factor)
+        if isinstance(given, Table):
+            return Table(_times(given.times, 1 / self.time), _times(given.values, factor))
+        return given * factor
+
+
+def natural_units(mechanism: Mechanism) -> Units:
+    """Units near the mechanism's own size, mass and time; of the time gravity decides, without it the first motion."""
+    element, start = MechanismElement(mechanism), MechanismElement(mechanism).start
+    ways = [abs(way) for joint in mechanism.joints if joint.kind == "prismatic" for way in (*joint.q0, joint.rest)]
+    radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
+    length = max([element.extent, *ways, *radii]) or 1.0
+    rate = np.sqrt(np.linalg.norm(mechanism.gravity) / length)
+    if not rate:
+        first = element.first_motion
+        pulls, speeds = (first.acceleration / length, first.angular_acceleration), (start.v_WB / length, start.w_WB)
+        rate = max([*(np.sqrt(_largest(pull)) for pull in pulls), *map(_largest, speeds)]) or 1.0
+    mass = sum(body.mass for body in mechanism.bodies)
+    return Units(*(2.0 ** round(np.log2(size)) for size in (length, mass, 1 / rate)))
+
+
+def _largest(values: FloatArray) -> float:
+    return float(np.nanmax(np.abs(values), initial=0.0))
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A number, several, or none of them, times a factor."""
+    if value is None or isinstance(value, float | int):
+        return value if value is None else value * factor
+    return tuple(item * factor for item in value)

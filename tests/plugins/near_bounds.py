@@ -1,0 +1,71 @@
+"""List of bounds by ``pytest.approx`` and ``assert_allclose`` that are within a factor of ten of what is seen.
+
+``python -m pytest -p near_bounds tests/unit/truth`` prints them at the end, the nearest first: on another processor a
+bound near round-off may be crossed (see "Drill" in CONTRIBUTING.md).
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+_NEAR = 0.1
+# Bounds wider than this part of the value are of a method, not of round-off.
+_ROUND_OFF = 1e-6
+_Approx: Any = type(pytest.approx(1.0))  # what it makes of each number
+seen: dict[str, tuple[float, float]] = {}  # by place: difference over bound, and bound over value
+
+
+def note(found: Any, expected: Any, bound: Any) -> None:
+    """Takes a comparison to the list, at the line of the test that makes it."""
+    difference, bound = np.abs(np.asarray(found, dtype=float) - expected), np.abs(np.asarray(bound, dtype=float))
+    with np.errstate(all="ignore"):
+        ratio = np.nan_to_num(difference / bound, nan=0.0, posinf=0.0)
+        inside = np.where(ratio <= 1.0, ratio, 0.0)  # what differs on purpose is no bound
+        size = float(np.max(np.maximum(np.abs(np.asarray(expected, dtype=float)), bound)))
+    frame: Any = sys._getframe(2)
+    while frame and "/tests/" not in frame.f_code.co_filename.replace("\\", "/"):
+        frame = frame.f_back
+    if frame and size:
+        place = f"tests/{frame.f_code.co_filename.partition('/tests/')[2]}:{frame.f_lineno}"
+        largest = float(np.max(inside, initial=0.0))
+        seen[place] = max(seen.get(place, (0.0, 0.0)), (largest, float(np.max(bound)) / size))
+
+
+def near() -> list[tuple[str, float, float]]:
+    """Places whose bound is near, the nearest first: place, difference over bound, bound over value."""
+    found = [(place, *numbers) for place, numbers in seen.items() if numbers[0] > _NEAR and numbers[1] < _ROUND_OFF]
+    return sorted(found, key=lambda item: -item[1])
+
+
+def _noted_equal(self: Any, actual: Any) -> bool:
+    if isinstance(actual, int | float | np.number) and isinstance(self.expected, int | float | np.number):
+        note(actual, self.expected, self.tolerance)
+    return bool(_equal(self, actual))
+
+
+def _noted_allclose(actual: Any, desired: Any, rtol: float = 1e-7, atol: float = 0.0, **more: Any) -> None:
+    note(actual, desired, atol + rtol * np.abs(np.asarray(desired, dtype=float)))
+    _allclose(actual, desired, rtol, atol, **more)
+
+
+_equal, _allclose = _Approx.__eq__, np.testing.assert_allclose
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_sessionstart() -> Iterator[None]:
+    """Watches both comparisons from here on."""
+    _Approx.__eq__ = _noted_equal
+    np.testing.assert_allclose = _noted_allclose
+    return (yield)
+
+
+def pytest_terminal_summary(terminalreporter: Any) -> None:
+    """Prints the list."""
+    terminalreporter.section("bounds within a factor of ten of what is seen")
+    for place, ratio, part in near():
+        terminalreporter.line(f"{place}: {ratio:.2f} of its bound, which is {part:.1g} of the value")

@@ -1,0 +1,155 @@
+"""Scenes of another size, mass and time move as before, and a mechanism in other units is the same mechanism."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from proofroll.core.errors import Refused
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.drives import Actuator, Coupling
+from proofroll.elements.mechanism.joint import Joint
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
+from proofroll.elements.mechanism.model import Mechanism
+from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.record import gathered
+from proofroll.elements.mechanism.signal import Formula, Table
+from proofroll.files.scene_file import load_scene
+from proofroll.truth.mechanism.contact_tree import ContactTree
+from proofroll.truth.mechanism.natural_units import Units, natural_units
+from proofroll.truth.mechanism.switched_truth import truth_of
+
+SAME = 1e-12  # of the size of the scene; 1e-14 is seen
+SMALL, LARGE = (1e-5, 1.0, 1e-5**0.5), (1e4, 1.0, 1e2)
+LIGHT, HEAVY, FAST, SLOW = (1.0, 1e-9, 1.0), (1.0, 1e9, 1.0), (1.0, 1.0, 1e-6), (1.0, 1.0, 1e6)
+
+
+def mechanism_of(scene: str) -> Mechanism:
+    """The mechanism of a scene."""
+    return load_scene(scene).elements[0].mechanism  # type: ignore[attr-defined, no-any-return]
+
+
+def larger(mechanism: Mechanism, scale: tuple[float, float, float]) -> Mechanism:
+    """A mechanism with lengths, masses and times multiplied."""
+    return Units(*(1 / factor for factor in scale)).mechanism(mechanism)
+
+
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(
+    ("scene", "until", "scale"),
+    [
+        ("stop", 1.0, SMALL),
+        ("saturated_servo", 1.0, SLOW),
+        ("falling_rod", 0.9, FAST),
+        ("falling_rod", 0.9, SLOW),
+        ("spring_friction", 0.7, LARGE),
+        *(
+            pytest.param(scene, until, scale, marks=pytest.mark.drill)
+            for scene, until in (("flick", 0.15), ("spinning_bounce", 0.4), ("sled", 0.65), ("spring_friction", 2.0))
+            for scale in (SMALL, LARGE, LIGHT, HEAVY, FAST, SLOW)
+        ),
+    ],
+)
+def test_a_scene_of_another_size_has_the_same_events(
+    scene: str, until: float, scale: tuple[float, float, float]
+) -> None:
+    """Lengths, masses and times that are multiplied change nothing but the units of the answer."""
+    mechanism, (length, _, time) = mechanism_of(scene), scale
+    one = truth_of(mechanism, np.array([0.0, until]))
+    two = truth_of(larger(mechanism, scale), np.array([0.0, until * time]))
+    assert [(event.kind, event.name) for event in two.events] == [(event.kind, event.name) for event in one.events]
+    assert [event.time / time for event in two.events] == pytest.approx([event.time for event in one.events], rel=SAME)
+    assert two.record.p_WB / length == pytest.approx(one.record.p_WB, abs=SAME)
+    assert two.horizon / time == pytest.approx(one.horizon)
+
+
+def everything() -> Mechanism:
+    """A mechanism that has every quantity with a unit."""
+    turn, slide = Formula("a*sin(3*t) + 0.2", (("a", 0.7),)), Table((0.0, 1.0), (0.3, 0.8))
+    bodies = [
+        Body("arm", 1.3, (0.1, 0.05, -0.2), ((0.02, 0.001, 0.0), (0.001, 0.03, 0.0), (0.0, 0.0, 0.04))),
+        Body("slider", 0.6, (0.02, 0.0, 0.0), ((0.01, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.02))),
+        Body("wheel", 0.4, (0.0, 0.01, 0.0), ((0.01, 0.0, 0.0), (0.0, 0.01, 0.0), (0.0, 0.0, 0.02))),
+        Body("loose", 0.9, (0.0, 0.0, 0.03), ((0.03, 0.0, 0.0), (0.0, 0.02, 0.0), (0.0, 0.0, 0.02))),
+    ]
+    laws = {"damping": 0.3, "stiffness": 2.0, "rest": 0.1, "armature": 0.05}
+    joints = [
+        Joint("hinge", "revolute", "world", "arm", (0.1, 0.0, 0.4), axis=(0, 1, 0), q0=(0.4,), v0=(1.1,), **laws),  # type: ignore[arg-type]
+        Joint("rail", "prismatic", "arm", "slider", (0.0, 0.1, 0.0), q0=(0.2,), v0=(-0.6,), torque=slide, **laws),  # type: ignore[arg-type]
+        Joint("axle", "revolute", "slider", "wheel", child_position=(0.0, 0.02, 0.0), torque=turn),
+        Joint("free", "free", "world", "loose", q0=(0.5, 0.1, 0.2, 1, 0, 0, 0), v0=(0.3, 0.2, 0.1, 1.0, 2.0, 3.0)),
+    ]
+    motors = [
+        Actuator("servo", "hinge", "position", turn, 3.0, 0.4, 2.0, 5.0),
+        Actuator("drive", "rail", "velocity", slide, 0.0, 0.7),
+        Actuator("push", "axle", "torque", 0.3),
+    ]
+    return Mechanism(
+        tuple(bodies),
+        tuple(joints),
+        springs=(Spring("rubber", "wheel", "loose", (0.0, 0.05, 0.0), (0.01, 0.0, 0.0), 4.0, 0.2, 0.3),),
+        points=(Point("tip", "arm", (0.3, 0.0, 0.0)),),
+        actuators=tuple(motors),
+        couplings=(Coupling("rack", "axle", "rail", 0.05, 0.2),),
+    )
+
+
+def test_a_mechanism_in_other_units_has_the_same_equations() -> None:
+    """Accelerations and forces that are computed in other units are those in SI units, of every law at once."""
+    mechanism, units, time = everything(), Units(0.125, 8.0, 0.25), 0.3
+    own = units.mechanism(mechanism)
+    records = []
+    for one, at in ((mechanism, time), (own, time / units.time)):
+        sample = JointCoordinates(one).sample(*one.start(), (), at)
+        records.append(gathered(np.array([at]), [sample]))
+    found = units.record(mechanism, records[1])
+    for name in ("time", "p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named"):
+        assert getattr(found, name) == pytest.approx(getattr(records[0], name), rel=1e-12, abs=1e-12, nan_ok=True), name
+    energy = found.placed(mechanism).energy()
+    assert energy == pytest.approx(records[0].placed(mechanism).energy(), rel=1e-12)
+
+
+def test_loops_and_shapes_have_lengths_too() -> None:
+    """Places of loops, and places, radii, axes and edges of shapes are in the unit of length."""
+    loop = Loop("pin", "revolute", "arm", "loose", (0.2, 0.0, 0.0), (0.0, 0.4, 0.0))
+    own = Units(0.5, 1.0, 1.0).mechanism(replace(everything(), loops=(loop,)))
+    assert (own.loops[0].position_a, own.loops[0].position_b) == ((0.4, 0.0, 0.0), (0.0, 0.8, 0.0))
+    sled = Units(0.5, 1.0, 1.0).mechanism(mechanism_of("sled"))
+    assert sled.geometries[1].radius == 2 * 0.02
+    assert own.joints[1].limits is None
+
+
+def test_natural_units_follow_the_scene() -> None:
+    """They are powers of two near the extent, the mass, and the time of a fall by the extent or of the first motion."""
+    rod = mechanism_of("falling_rod")
+    units = natural_units(rod)
+    assert units.length in {0.5, 1.0}
+    assert units.time == pytest.approx(np.sqrt(units.length / 9.81), rel=0.5)
+    spring = mechanism_of("spring_friction")
+    slow = natural_units(larger(spring, (1.0, 1.0, 1024.0)))
+    assert slow == natural_units(spring)._replace(time=1024.0 * natural_units(spring).time)
+    for number in (*units, *slow):
+        assert np.log2(number) == round(np.log2(number))
+
+
+def test_messages_of_routes_have_seconds() -> None:
+    """A time in a message of a route in natural units is said in seconds."""
+    with (
+        pytest.raises(Refused, match=r"^stopped at t = 0\.75 s: step 3 of 4 s$"),
+        Units(1.0, 1.0, 0.25).said_in_seconds(),
+    ):
+        raise Refused("stopped at t = 3 s: step 3 of 4 s")
+
+
+def test_an_effort_that_starts_at_its_limit_passes_it() -> None:
+    """A stretch that begins with an effort exactly at its limit ends where the effort passes it."""
+    flick = mechanism_of("flick")
+    servo = replace(flick.actuators[0], kind="torque", target=Formula("0.5 + t^3"), kp=0.0, kd=0.0, limit=0.5)
+    mechanism = replace(flick, actuators=(servo,))
+    tree = ContactTree(ContactDynamics(mechanism), 1e-14, 1.0, 1e-9)
+    begun = tree.begin()
+    law = tree._law(begun.state, begun.mode)
+    assert law.guards(begun.state)[-1] <= 0.0
+    assert law.guards(begun.state + np.append(np.zeros(len(begun.state) - 1), 0.1))[-1] > 0.0
