@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import near_bounds
 import numpy as np
 import pytest
 import yaml
@@ -106,6 +107,10 @@ def test_a_run_out_of_time_is_no_difference(changes: dict[str, Any], tmp_path: P
     for records in ((record(), late_one), (late_one, record())):
         assert list(differences("no-heyoka", tmp_path, tmp_path, records)) == []
         assert late(records) == ["claim: engine point 0 #0"]
+    truths = record(), record()
+    truths[0]["claim"]["truths"]["point 0"] = {"decisions": {"ill_posed": False}, "file": "none"}
+    truths[1]["claim"]["late"] = ["truth at point 0"]
+    assert list(differences("no-heyoka", tmp_path, tmp_path, truths)) == []
     tried = Tried("no-heyoka", "without heyoka", late=late((record(), late_one)))
     assert list(arithmetic_lines([tried])) == [
         "no-heyoka: claim: engine point 0 #0: ran out of time, so it is compared with nothing"
@@ -141,6 +146,10 @@ def test_what_a_comparison_decides_is_recorded(tmp_path: Path) -> None:
     slow = replace(run.rungs[0], result=replace(run.rungs[0].result, status=Status.TIMEOUT))
     rungs = replace(run, rungs=[slow, *run.rungs[1:]])
     assert decided(replace(outcome, runs=[rungs]), runner.store)["late"] == list(found["decisions"])
+    ((name, point),) = outcome.points.items()
+    unknown = {name: replace(point, result=replace(point.result, status=Status.TIMEOUT))}
+    said = decided(replace(outcome, points=unknown), runner.store)["late"]
+    assert said == [*found["decisions"], "truth at point 0"]
     ((place, run),) = found["decisions"].items()
     assert (run["status"], run["verdict"]) == ("done", outcome.runs[0].verdict)
     assert found["truths"]["point 0"]["decisions"]["events"] == {"ball": ["slip"]}
@@ -239,6 +248,17 @@ def test_tests_that_fail_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     (found,) = matrix([BY_NAME["reference"]], [], "sensitive", tmp_path)
     assert (found.failed, found.same) == (["no tests collected"], False)
     assert Tried("x", "y").same
+
+
+def test_bounds_near_what_is_seen_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bounds near round-off that a difference comes near to are listed; wide ones, and what differs on purpose, not."""
+    monkeypatch.setattr(near_bounds, "seen", {})
+    for difference, bound in ((0.5, 1e-9), (0.05, 1e-9), (2.0, 1e-9), (0.5, 1e-3)):
+        near_bounds.note(1.0 + difference * bound, 1.0, bound)  # each line keeps its nearest
+    near_bounds.note(np.array([1.0, 2.0]), np.array([1.0, 2.0]), 1e-9)
+    ((place, ratio, part),) = near_bounds.near()
+    assert place.startswith("tests/drill/test_arithmetic.py:")
+    assert (ratio, part) == (pytest.approx(0.5, abs=1e-3), pytest.approx(1e-9))
 
 
 def test_every_comparison_is_in_the_matrix() -> None:

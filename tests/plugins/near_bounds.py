@@ -22,23 +22,23 @@ seen: dict[str, tuple[float, float]] = {}  # by place: difference over bound, an
 
 def note(found: Any, expected: Any, bound: Any) -> None:
     """Takes a comparison to the list, at the line of the test that makes it."""
-    difference, bound = np.abs(np.asarray(found, dtype=float) - expected), np.abs(np.asarray(bound, dtype=float))
+    found, expected, bound = (np.asarray(item, dtype=float) for item in (found, expected, bound))
     with np.errstate(all="ignore"):
-        ratio = np.nan_to_num(difference / bound, nan=0.0, posinf=0.0)
-        inside = np.where(ratio <= 1.0, ratio, 0.0)  # what differs on purpose is no bound
-        size = float(np.max(np.maximum(np.abs(np.asarray(expected, dtype=float)), bound)))
-    frame: Any = sys._getframe(2)
-    while frame and "/tests/" not in frame.f_code.co_filename.replace("\\", "/"):
+        ratio = np.nan_to_num(np.abs(found - expected) / bound, nan=0.0, posinf=0.0)
+        size = float(np.max(np.maximum(np.abs(expected), bound), initial=0.0))
+    inside = np.where(ratio <= 1.0, ratio, 0.0)  # what differs on purpose is no bound
+    part = float(np.max(bound, initial=0.0)) / size if size else 1.0
+    frame: Any = sys._getframe(1)
+    while frame and ("/tests/" not in frame.f_code.co_filename or frame.f_code.co_filename == __file__):
         frame = frame.f_back
-    if frame and size:
+    if frame and part < _ROUND_OFF:
         place = f"tests/{frame.f_code.co_filename.partition('/tests/')[2]}:{frame.f_lineno}"
-        largest = float(np.max(inside, initial=0.0))
-        seen[place] = max(seen.get(place, (0.0, 0.0)), (largest, float(np.max(bound)) / size))
+        seen[place] = max(seen.get(place, (0.0, 0.0)), (float(np.max(inside, initial=0.0)), part))
 
 
 def near() -> list[tuple[str, float, float]]:
     """Places whose bound is near, the nearest first: place, difference over bound, bound over value."""
-    found = [(place, *numbers) for place, numbers in seen.items() if numbers[0] > _NEAR and numbers[1] < _ROUND_OFF]
+    found = [(place, *numbers) for place, numbers in seen.items() if numbers[0] > _NEAR]
     return sorted(found, key=lambda item: -item[1])
 
 

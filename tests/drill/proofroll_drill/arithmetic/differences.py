@@ -11,6 +11,7 @@ import numpy as np
 
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import Status
+from proofroll_drill.arithmetic.record import TRUTH
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ def _in_both(one: Any, two: Any) -> tuple[Any, Any]:
         gone |= {name for name, said in record.get("decisions", {}).items() if said["status"] == Status.MISSING}
     left = [
         {
-            part: {name: said for name, said in record.get(part, {}).items() if name not in gone}
-            for part in ("decisions", "limits")
+            part: {name: said for name, said in record.get(part, {}).items() if not gone & {name, f"{TRUTH} {name}"}}
+            for part in ("decisions", "limits", "truths")
         }
         for record in both
     ]
@@ -69,7 +70,7 @@ def _in_both(one: Any, two: Any) -> tuple[Any, Any]:
 
 def _decisions(record: Any) -> dict[str, Any]:
     """Decisions of the runs and of the truths."""
-    truths = {f"truth at {point}": item["decisions"] for point, item in record.get("truths", {}).items()}
+    truths = {f"{TRUTH} {point}": item["decisions"] for point, item in record.get("truths", {}).items()}
     return {**record.get("decisions", {}), **truths}
 
 
@@ -98,7 +99,7 @@ def _numbers(mine: Any, its: Any, reference: Path, other: Path) -> Iterator[tupl
             continue
         files = reference / "store" / truth["file"], other / "store" / its["truths"][point]["file"]
         for name, gap, allowed in beyond_bars(*map(read, files)):
-            yield f"truth at {point}: {name}", gap, allowed
+            yield f"{TRUTH} {point}: {name}", gap, allowed
 
 
 def beyond_bars(one: Any, two: Any) -> Iterator[tuple[str, float, float]]:

@@ -26,6 +26,7 @@ from proofroll.studies.comparison.compare import compare
 from proofroll.studies.comparison.outcome import Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
+TRUTH = "truth at"
 WRONG = "one that the truth does not have"
 
 
@@ -47,7 +48,7 @@ def main(folder: str, threads: str, jobs: str, *comparisons: str) -> None:
 def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
     """``decisions`` and ``limits`` of each run; ``truths``: what they decide, and in which files their numbers lie.
 
-    ``late``: runs that ran out of time, themselves, a rung of their ladder or the truth that they are held against.
+    ``late``: truths that ran out of time, and runs, themselves, in a rung of their ladder or in their truth.
     """
     late = []
     points = {name: f"point {number}" for number, name in enumerate(outcome.points)}  # an edge is a found number
@@ -67,6 +68,8 @@ def decided(outcome: Outcome, store: Store) -> dict[str, Any]:
         }
     truths = {}
     for name, point in outcome.points.items():
+        if point.result.status == Status.TIMEOUT:
+            late.append(f"{TRUTH} {points[name]}")
         if point.reference is not None:
             said = {"ill_posed": point.reference.ill_posed, "events": _events(point.scene, point.reference.dataset)}
             truths[points[name]] = {"decisions": said, "file": point.trajectory.file.name}
