@@ -75,6 +75,22 @@ def test_rebounds_come_to_rest_after_infinitely_many() -> None:
     assert found.record.q[1, 0] == pytest.approx(9.81 * fall / 8 * after - 9.81 * after**2 / 2, abs=1e-10)
 
 
+@pytest.mark.arithmetic
+@pytest.mark.parametrize(("restitution", "impacts"), [(0.1, 6), (0.01, 3), (0.001, 2)])
+@pytest.mark.parametrize("height", [0.3, 0.5, 0.7])
+def test_which_rebound_is_the_last_hangs_on_no_digit(restitution: float, impacts: int, height: float) -> None:
+    """A restitution of which a power is 1e-6 leaves as many rebounds at any height, and both routes agree on them."""
+    box = Body("box", 1.0, inertia=(0.01, 0.02, 0.02))
+    rail = {"axis": (0.0, 0.0, 1.0), "limits": (0.0, 10.0), "restitution": restitution}
+    found = truth_of(
+        Mechanism((box,), (Joint("rail", "prismatic", "world", "box", q0=(height,), **rail),)), np.array([0.0, 1.0])
+    )
+    assert np.isinf(found.horizon)
+    assert [event.kind for event in found.events] == ["impact"] * impacts + ["settle"]
+    rests = np.sqrt(2 * height / 9.81) * (1 + restitution) / (1 - restitution)
+    assert found.events[-1].time == pytest.approx(rests, rel=1e-12)
+
+
 def test_friction_that_holds_does_not_creep() -> None:
     """A mass that its friction can hold stays, and friction carries the load."""
     held = Mechanism(

@@ -16,6 +16,10 @@ from proofroll.elements.mechanism.model import Mechanism
 
 # Of the switched joints, then of the actuators whose effort has a limit.
 Mode = tuple[str, ...]
+# Part of the largest speed at which a joint hit its stop, or two bodies each other, below which only the time of
+# rebounds is summed: they have 1e-12 of the way of the first, which drowns in the round-off of the coordinate. It is no
+# power of a restitution that a file would have, or round-off would decide which rebound is the last.
+SETTLED = math.exp(-13.5)
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
 # Of the largest speed at which a joint hit its stop, or bodies each other: slower rebounds are left out but for their
