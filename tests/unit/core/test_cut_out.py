@@ -46,6 +46,15 @@ def test_a_statement_stands_once_with_what_it_is() -> None:
     assert "# No smooth motion needs such steps." in CutOut([StepWatch], ["took"]).text
 
 
+def test_of_docstrings_the_first_line_is_kept() -> None:
+    """A program is read beside a bug report: it has one line for each definition, and no blank pairs of lines."""
+    text = CutOut([RungeKutta4], ["begin", "advance", "x"]).text
+    assert "Moves a state in time" in text
+    assert "Attributes:" not in text
+    assert "Args:" not in text
+    assert "\n\n\n" not in text
+
+
 def test_methods_that_nothing_calls_are_left_out() -> None:
     """Of a wall the program has what it asks for, and not the rest."""
     wall: Surface = load_scene("sphere_in_cylinder").elements[0].surface

@@ -1,7 +1,8 @@
 """Dry friction, stops and limits of efforts: which law holds, when that ends, and what comes next.
 
 A joint that is held is locked: a row more of the constraints, whose multiplier is the force that holds it. Of joints at
-rest, those that hold follow from a quadratic program with bounds.
+rest, those that hold follow from a quadratic program with bounds. Decisions and impacts are stated here again beside
+:mod:`proofroll.elements.mechanism.complementarity`, by which the truth decides: neither can hide an error of the other.
 """
 
 from __future__ import annotations
