@@ -22,9 +22,6 @@ Mode = tuple[str, ...]
 SETTLED = math.exp(-13.5)
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
-# Of the largest speed at which a joint hit its stop, or bodies each other: slower rebounds are left out but for their
-# time. They have 1e-12 of the way of the first, which drowns in the round-off of the coordinate.
-SETTLED = 1e-6
 
 
 @dataclass(frozen=True)
