@@ -1,4 +1,4 @@
-# Two commands do everything: `make report` (all comparisons and studies, on one page) and `make test`. Each makes .venv itself; another
+# Two commands do everything: `make report` (the main comparisons and studies, on one page) and `make test`. Each makes .venv itself; another
 # Python beside it: make test PYTHON=python3.12 VENV=.venv-3.12
 PYTHON ?= python3
 VENV ?= .venv

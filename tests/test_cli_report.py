@@ -198,12 +198,12 @@ def test_what_no_report_has_is_one_line(proofroll: Proofroll, tmp_path: Path) ->
 def test_a_page_after_the_first_comparison(
     proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A report without names shows the first comparison before it runs the others, those of folders inside, too."""
+    """A report without names shows the first comparison before it runs the others, names those, and is brief."""
     text = COMPARISON.replace('"oracle"', '"reduced[formulation=closed_form]"')
     varied = text.replace("{ speed = [4] }", "{ speed = [2, 4] }\nbrief = { speed = [4] }")
     files(tmp_path, first=f"order = 1\n{varied}", second=text.replace("A claim", "Another claim"))
     (tmp_path / "balls").mkdir()
-    (tmp_path / "balls" / "third.toml").write_text(text.replace("A claim", "A third claim"), encoding="utf-8")
+    (tmp_path / "balls" / "third.toml").write_text(text, encoding="utf-8")
     for module in ("comparison_file", "toml"):
         monkeypatch.setattr(f"proofroll.files.{module}.study_folders", lambda: (tmp_path,))
     pages = []
@@ -214,15 +214,18 @@ def test_a_page_after_the_first_comparison(
         pages.append((out / "report.html").read_text(encoding="utf-8"))
 
     monkeypatch.setattr(Report, "write", noted)
-    code, _, err = proofroll("report", "--out", str(tmp_path / "out"))
+    code, said, err = proofroll("report", "--out", str(tmp_path / "out"))
     assert code == 0, err
     first, *_, last = pages
-    assert "This page is not whole yet.</b> Still being run: Another claim; A third claim." in first
+    assert "This page is not whole yet.</b> Still being run: Another claim." in first
     assert "not whole yet" not in last
+    assert "1 further combinations of parameters are left out here; <code>proofroll compare first</code>" in last
     content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     assert content["awaited"] == []
-    assert [run["parameters"]["speed"] for run in content["comparisons"][0]["runs"]] == [2.0, 4.0]
-    assert [item["name"] for item in content["comparisons"]] == ["first", "second", "third"]
+    assert [run["parameters"] for run in content["comparisons"][0]["runs"]] == [{"speed": 4.0}]
+    assert content["left_out"] == ["balls/third"]
+    assert "leaves out: 1. <code>proofroll report balls/third</code> runs them" in first
+    assert "Comparisons left out: 1. proofroll report balls/third runs them." in " ".join(said.split())
 
 
 def test_a_budget_is_spent_briefly_first_and_grows(

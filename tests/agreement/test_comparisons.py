@@ -28,6 +28,9 @@ LATE = {
     ("accuracy", "mujoco[formulation=free,friction_damping=1.9,dt=1e-4]"): 1.5,
 }
 
+# Their motions are as long as their verdicts need, which takes a minute.
+OF_CONTACT = {"sled", "two_spheres"}
+
 
 def loaded(name: str) -> Comparison:
     """A comparison, no longer than its verdicts need."""
@@ -41,7 +44,12 @@ def until(comparison: Comparison, row: Row) -> float:
 
 
 ROWS = [
-    pytest.param(comparison, row, id=f"{comparison.name}-{row.engine}")
+    pytest.param(
+        comparison,
+        row,
+        id=f"{comparison.name}-{row.engine}",
+        marks=[pytest.mark.drill] if comparison.name in OF_CONTACT else [],
+    )
     for comparison in map(loaded, comparison_names())
     for row in comparison.rows
 ]

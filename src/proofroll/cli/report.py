@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.comparison.outcome import Outcome
 
-# Processor time of the comparisons of a report without names [s]: with its further studies some 400.
-BUDGET = 200.0
 # Part of the time that writing unfinished pages may take.
 _WRITING = 0.05
 
@@ -45,11 +43,11 @@ def report(
     scheduler: options.Scheduler = None,
     budget: Annotated[
         float | None,
-        typer.Option(min=1, help=f"Processor-seconds of all comparisons; {BUDGET:g} without names, else no limit."),
+        typer.Option(min=1, help="Processor-seconds of all comparisons; without names all there are, in folders too."),
     ] = None,
     only: Annotated[
         str | None,
-        typer.Option(help="Groups of scenes, as loops,contact: comparisons of these, and no studies."),
+        typer.Option(help="Groups of scenes, as loops,contact: all comparisons of these, and no studies."),
     ] = None,
     against: Annotated[
         Path | None,
@@ -63,13 +61,13 @@ def report(
 ) -> None:
     """Run the comparisons and the further studies, and write report.html and report.json.
 
-    Without names it makes all comparisons, and all further studies but those on request, within a few minutes. Within a
-    budget every comparison is brief first, with an equal share, and grows while there is time; what is left out is
-    named, and the same command goes on with it.
+    Without names it makes those that lie in the folder of studies itself: the main comparisons, and all further studies
+    but those on request. The comparisons of folders inside, as mechanisms/pendulum, it leaves out and names.
     The files are there after the first comparison, and are written again now and then, after all of them and after each
     further study. A report that is stopped (Ctrl-C) keeps what has ended; the same command goes on from there. A study
-    that is kept and still holds is used as it is; otherwise it is made briefly, and the report names the command that
-    makes it whole. --set is for scenes and robot files.
+    that is kept and still holds is used as it is; otherwise it is made briefly, as is a comparison that says so, and
+    the report names the command that makes it whole. With --budget every comparison is brief first, and grows while
+    there is time; what is left out is named, and the same command goes on with it. --set is for scenes and robot files.
     """
     from dataclasses import replace
 
@@ -89,7 +87,8 @@ def report(
     workers, assigned = Workers(), options.assignments(settings)
     if budget and scheduler:
         raise InputError("--budget", budget, "what runs on a cluster has none; drop --scheduler")
-    known = [*comparison_names(), *further_comparison_names()]
+    left_out = [] if studies or only or budget else further_comparison_names()
+    known = [*comparison_names(), *([] if left_out else further_comparison_names())]
     names, parts = parts_of(studies, engine or []) if studies else (known, all_parts(engine or [], out))
     if only:
         names, parts = _of_groups(names, only), []
@@ -98,8 +97,8 @@ def report(
             "--set", next(iter(assigned)), "studies have their own points; name scenes or robot files alone"
         )
     loaded = [asked(name, assigned, workers, None, scheduler) for name in names]
-    if limit := budget or (None if studies or scheduler else BUDGET):
-        loaded = [replace(item, budget=None) for item in loaded]
+    if budget or not studies:
+        loaded = [replace(item, budget=None) if budget else item.briefly() for item in loaded]
     options.require_pages()
     templates()  # read before the work, while which the code may change
     runner = options.new_runner(out, fresh, jobs, scheduler, workers)
@@ -108,11 +107,11 @@ def report(
     total = len(keys) + bool(loaded)
     command = _command(studies or [], engine or [], settings or [], budget, out, only)
     with alone_in(out, lambda: options.complain(f"another report is being made in {out}; this one waits for it")):
-        growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited))
+        growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
         with growing.told_if_stopped():
             stage = _begin(1, total, "comparisons") if loaded else ""
-            outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, limit) if loaded else []
-        made = begun(outcomes, command)
+            outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget) if loaded else []
+        made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
         made.write(out)
@@ -254,4 +253,7 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     yield from change_lines(content.against)
     if content.beyond_budget:
         yield content.beyond_budget
+    if content.left_out:
+        names = " ".join(content.left_out)
+        yield f"Comparisons left out: {len(content.left_out)}. proofroll report {names} runs them."
     yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."

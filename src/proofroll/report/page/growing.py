@@ -107,18 +107,19 @@ class Report:
             self.pictures |= _drawn(prefix, lambda: part.pictures(prefix))
 
 
-def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = ()) -> Report:
+def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()) -> Report:
     """A report of comparisons, to which further studies can be added.
 
     Args:
         outcomes: what was compared.
         command: that makes the report again.
         awaited: titles of comparisons that are still being run.
+        left_out: names of comparisons that are not in it.
     """
     replay = _replay(outcomes)
     described = [case.described for case in replay.cases] if replay else []
     content = report_content(outcomes, command)
-    content = replace(content, replay=described, awaited=list(awaited))
+    content = replace(content, replay=described, awaited=list(awaited), left_out=list(left_out))
     return Report(content, [point_curves(outcome) for outcome in outcomes], replay)
 
 

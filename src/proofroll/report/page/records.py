@@ -100,6 +100,7 @@ class ReportContent:
         date: when it was written.
         comparisons: in their order.
         awaited: titles of comparisons that are still being run.
+        left_out: names of the comparisons that a report of all studies leaves out.
         engine_findings: what is known of engines.
         entries: of further studies, by the key of their kind.
         environment: where and with what it was made.
@@ -111,6 +112,7 @@ class ReportContent:
     date: str
     comparisons: list[ReportedComparison]
     awaited: list[str]
+    left_out: list[str]
     engine_findings: list[KnownFinding]
     entries: Mapping[str, Sequence[PartEntry]] = field(metadata=MERGED)
     environment: MadeWith
@@ -172,6 +174,7 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
     content = ReportContent(
         datetime.now(UTC).isoformat(timespec="seconds"),
         comparisons,
+        [],
         [],
         [KnownFinding(item.name, item.engine, item.title, item.seen, item.gone) for item in load_findings()],
         entries,
