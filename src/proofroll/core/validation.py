@@ -54,6 +54,8 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
         content_of_kind: _T = _adapter(kind).validate_python({**content, **own})  # type: ignore[arg-type]  # any class can be hashed
     except ValidationError as error:
         raise _first_problem(error, where, kind, content, own) from None
+    except OverflowError:
+        raise InputError(where, content, "a product or power of its numbers is too large; give smaller ones") from None
     for place, given in _turned(content, content_of_kind):
         raise InputError(f"{where}: {'.'.join(place)}", given, "this is not a number; give one")
     return content_of_kind

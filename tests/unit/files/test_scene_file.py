@@ -119,6 +119,12 @@ def test_bad_parameters(parameters: dict[str, Any], field: str, advice: str) -> 
     assert advice in error.advice
 
 
+def test_a_number_whose_square_overflows_is_refused() -> None:
+    """A radius whose square is beyond double precision is wrong input, not a traceback."""
+    with pytest.raises(InputError, match="too large; give smaller ones"):
+        load_scene("cone", radius=1e300)
+
+
 def test_the_value_that_was_given_is_blamed() -> None:
     """A huge value is shown, and shown briefly."""
     error = problem(CYLINDER, speed="x" * 500)
