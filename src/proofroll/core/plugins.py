@@ -18,6 +18,8 @@ from proofroll.core.errors import InputError, Missing, ProofrollError, place, re
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
+# Members of every engine; see proofroll.core.engine.Engine.
+_OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build", "advance", "sample", "built")
 
 
 def engine_names() -> list[str]:
@@ -41,7 +43,7 @@ def load_engine(name: str) -> Any:
     Raises:
         InputError: no installed package announces such an engine, or it is one of another interpreter.
         Missing: it is announced, but what it needs is not installed, or older than its adapter supports.
-        ProofrollError: it is announced, but what the entry point or an import names does not exist.
+        ProofrollError: it is announced, but what the entry point or an import names does not exist, or is no engine.
     """
     if place_of(name):
         advice = "an engine of another interpreter cannot be loaded into this one; use the command line, or leave @ out"
@@ -55,11 +57,20 @@ def load_engine(name: str) -> Any:
         if place(error):  # arose inside the adapter
             raise
         raise ProofrollError(f"{name} is announced as {point.value}, but {error}: correct the entry point") from None
+    if lacking := lacking_of(kind):
+        raise ProofrollError(
+            f"{name} is announced as {point.value}, which is no engine: it has no {', '.join(lacking)}"
+        )
     oldest = kind.oldest if isinstance(kind, SupportsFrom) else ""
     if oldest and release(kind.version()) < release(oldest):
         said = f"{name} {kind.version()} is older than its adapter supports, {oldest}"
         raise Missing(f"{said}; install a later {name}")
     return kind
+
+
+def lacking_of(kind: object) -> list[str]:
+    """Names of the members of an engine's class that an object lacks."""
+    return [name for name in _OF_AN_ENGINE if not hasattr(kind, name)]
 
 
 def release(version: str) -> tuple[int, ...]:

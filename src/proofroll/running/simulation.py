@@ -10,7 +10,7 @@ from proofroll.core.certificate import first_difference
 from proofroll.core.engine import fixed_step
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.first_steps import certificate
-from proofroll.core.plugins import load_engine, parse_engine, resolve_settings
+from proofroll.core.plugins import lacking_of, load_engine, parse_engine, resolve_settings
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import EVERY, off_grid, require_whole_steps, sampling_interval, time_grid
 from proofroll.core.turns import samples_between
@@ -21,10 +21,6 @@ from proofroll.running.recording import record
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-# What a class needs to be one; see proofroll.core.engine.Engine.
-_OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build", "advance", "sample", "built")
 
 
 def build(scene: Scene, engine: Any, **settings: Any) -> Any:
@@ -47,8 +43,7 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
     """The engine's class, and its complete settings."""
     if not isinstance(engine, str):
-        lacking = [name for name in _OF_AN_ENGINE if not hasattr(engine, name)]
-        if lacking:
+        if lacking := lacking_of(engine):
             shown = engine.__name__ if isinstance(engine, type) else repr(engine)
             raise InputError("engine", shown, f"give a name, or a class that has {', '.join(lacking)} too")
         return engine, resolve_settings(engine, settings, scene.requires)

@@ -161,8 +161,10 @@ def test_missing_engine_says_what_is_missing(install_engines: Callable[[Mapping[
         ("import nupmy", "Engine", Missing, ["imports nupmy (site/mine.py:1 in <module>)", "if it is misspelt"]),
         ("import numpy.linlag", "Engine", ProofrollError, ["numpy is installed, but has no such module"]),
         ("", "Enigne", ProofrollError, ["mine is announced as mine:Enigne", "correct the entry point"]),
+        ("Engine = 5", "Engine", ProofrollError, ["mine is announced as mine:Engine, which is no engine", "build"]),
+        ("class Engine: name = 'mine'", "Engine", ProofrollError, ["it has no provides, settings, presets, version"]),
     ],
-    ids=["module", "submodule", "class"],
+    ids=["module", "submodule", "class", "number", "members"],
 )
 def test_a_misspelt_name_is_not_a_library_that_is_missing(
     tmp_path: Path,
@@ -172,7 +174,7 @@ def test_a_misspelt_name_is_not_a_library_that_is_missing(
     kind: type[ProofrollError],
     words: list[str],
 ) -> None:
-    """Where all that a package requires is installed, a name that leads nowhere is said to be that, with its line."""
+    """A wrong entry point, of a package that has all it requires, gives one line that says what it leads to."""
     info = tmp_path / "site" / "mine-1.0.dist-info"
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\nRequires-Dist: numpy\n")
