@@ -22,22 +22,25 @@ _AXES = ("xyz", "wxyz")
 
 def csv_text(trajectory: xr.Dataset) -> str:
     """All numbers of a trajectory over time, to the last bit."""
-    columns = {"time": trajectory["time"], **trajectory.data_vars}
+    columns = [trajectory["time"], *trajectory.data_vars.values()]
     header, values = [], []
-    for name, item in columns.items():
+    for item in columns:
         if item.dims[:1] != ("time",) or item.dtype.kind not in "fiub":
             continue
-        labels = [
-            item[dim].to_numpy().tolist() if dim in item.coords else range(item.sizes[dim]) for dim in item.dims[1:]
-        ]
         unit = f" [{item.attrs['units']}]" if "units" in item.attrs else ""
-        header += ["/".join(map(str, (name, *at))) + unit for at in itertools.product(*labels)]
+        header += [column + unit for column in column_names(item)]
         numbers = item.to_numpy()
         numbers = numbers.astype(np.int8) if numbers.dtype == bool else numbers
         values += list(numbers.reshape(len(numbers), -1).T.tolist())
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([header, *zip(*values, strict=True)])
     return text.getvalue()
+
+
+def column_names(item: xr.DataArray) -> list[str]:
+    """Names of the numbers that a variable has at each time: ``p_WB/rod/x``."""
+    labels = [item[dim].to_numpy().tolist() if dim in item.coords else range(item.sizes[dim]) for dim in item.dims[1:]]
+    return ["/".join(map(str, (item.name, *at))) for at in itertools.product(*labels)]
 
 
 def read_csv(text: str) -> xr.Dataset:

@@ -96,7 +96,7 @@ def point_curves(outcome: Outcome) -> list[PointCurves]:
     """The curves of a comparison, one entry for each point of the parameters."""
     entries = []
     for name, point in outcome.points.items():
-        if point.reference is None:
+        if point.reference is None or name in outcome.laws_alone:
             continue
         scene, truth, sizes = point.scene, point.reference.dataset, point.reference.sizes
         kind = kind_of(scene)

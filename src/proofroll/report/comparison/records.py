@@ -11,6 +11,7 @@ from proofroll.core.diagnosis.of_scene import Diagnosis
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
+from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names, unit
 from proofroll.running.case import Status
 from proofroll.running.timing import Timing
@@ -176,7 +177,7 @@ class ReportedComparison:
     """Content of a comparison: ``rows`` summarise each engine with settings, ``runs`` say everything of each run.
 
     ``group`` is that of its scene (:func:`proofroll.report.kinds.group_of`), ``shown_by`` the kind of element that
-    shows more of it.
+    shows more of it; ``spread`` is that of the points at which runs are held to laws of mechanics alone.
     """
 
     name: str
@@ -199,7 +200,13 @@ class ReportedComparison:
     hosts: dict[str, int]
     budget: float | None = None
     beyond_budget: list[str] = field(default_factory=list)
+    spread: list[Spread] = field(default_factory=list)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
+
+    @property
+    def laws_alone(self) -> bool:
+        """True if runs are held to laws of mechanics alone at all points, since no motion is unique."""
+        return bool(self.spread) and {run.point for run in self.runs} == {item.point for item in self.spread}
 
     def runs_of(self, row: int) -> list[ReportedRun]:
         """Runs of one row."""

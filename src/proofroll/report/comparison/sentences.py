@@ -10,6 +10,7 @@ from proofroll.core.events import EVENT_ORDER
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import closest, furthest_off, scores
+from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
 from proofroll.report.labels import names, off_by, unjudged, with_caveat
 from proofroll.report.page.candidates import Candidate
@@ -28,11 +29,12 @@ def conclusions(
     content: ReportedComparison, choice: ChoiceMatrix, truths: Sequence[Any], kind: type[ReportKind] | None
 ) -> Conclusions:
     """Conclusions of a comparison and of its matrix; its kind of scene adds a sentence about its truths."""
+    nearness = [] if content.laws_alone else [_closest(content, choice), _obvious(content, scores(content, choice))]
     return Conclusions(
         _answer(content, choice),
         [
-            _closest(content, choice),
-            _obvious(content, scores(content, choice)),
+            *nearness,
+            *(item.sentence for item in content.spread),
             *_order(content),
             *(kind.sentences(truths) if kind is not None else ()),
             _surprises(content),
@@ -42,7 +44,7 @@ def conclusions(
 
 def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     """Sentence: what agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
-    rows = content.rows
+    rows, alone = content.rows, content.laws_alone
     said = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
         "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
@@ -55,6 +57,9 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         "differs": ("differs", "differ", "at some points, with no limit of small steps shown to be the truth"),
         "failed": ("gives", "give", "no result at some points"),
     }
+    if alone:
+        said["agrees"] = ("keeps", "keep", "the laws that are judged in every case")
+        said["differs"] = ("breaks", "break", "a law at some points, with no limit of small steps shown to keep it")
     parts = []
     for verdict, (one, many, rest) in said.items():
         count = sum(row.verdict == verdict for row in rows)
@@ -65,6 +70,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
     if content.as_expected:
         expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
     text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
+    text = f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
     for column in choice.columns:
         forces = not choice.unjudged[True].issuperset(column.studies)
         for _, cell in choice.ranked(column, FIRST_TOLERANCE, forces)[:1]:
@@ -153,8 +159,10 @@ def _surprises(content: ReportedComparison) -> str:
         return f"Not expected: {contradictions[0]}{more}."
     known = [row for row in content.rows if row.verdict != "agrees"]
     if not known:
-        return "Nothing contradicts what the comparison expects, and nothing disagrees with the truth."
+        nothing = "no law is broken" if content.laws_alone else "nothing disagrees with the truth"
+        return f"Nothing contradicts what the comparison expects, and {nothing}."
+    agree = "show that they keep the laws" if content.laws_alone else "agree"
     return (
         f"Nothing contradicts what the comparison expects; {len(known)} of {counted(len(content.rows), 'settings')} do "
-        "not agree, each for the reason that its row tells."
+        f"not {agree}, each for the reason that its row tells."
     )

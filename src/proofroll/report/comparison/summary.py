@@ -20,6 +20,7 @@ from proofroll.report.comparison.records import (
     WorstJudgement,
     in_words,
 )
+from proofroll.report.comparison.spread import spread_of
 from proofroll.report.kinds import group_of, kind_name
 from proofroll.report.labels import precision_words
 from proofroll.running.case import EngineFacts, Status, hosts
@@ -64,6 +65,12 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
         rows=reported_rows(outcome),
         runs=[_run(run, numbers[id(run.row)]) for run in outcome.runs],
         hosts=hosts(run.result for run in outcome.runs),
+        spread=[
+            spread_of(
+                name, outcome.points[name], {row: own.dataset for row, _, own in runs_at(outcome, name)}, len(rows)
+            )
+            for name in outcome.laws_alone
+        ],
         budget=comparison.budget,
         beyond_budget=outcome.beyond_budget,
     )

@@ -11,6 +11,7 @@ from proofroll.core.certificate import Standing, not_reported
 from proofroll.core.number_format import number
 from proofroll.core.verdict import Judgement
 from proofroll.report.comparison.records import Claims, Cost, ReportedComparison, ReportedRow, ReportedRun
+from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names, symbol
 
 # Errors of two rows that differ by less than this part are those of one scheme, where they are seen above so many bars
@@ -153,6 +154,12 @@ def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
     """Remarks on each row, with its name."""
     return [(name, text) for name, row, _ in content.lines() for text in row.remarks]
+
+
+def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int, str]]:
+    """Number and name of each row that a spread has numbers of."""
+    known = {row for line in spread.lines for row, value in enumerate(line.values) if value is not None}
+    return [(row, name) for row, name in enumerate(names(content.rows)) if row in known]
 
 
 def one_scheme(content: ReportedComparison) -> list[str]:

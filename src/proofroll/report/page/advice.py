@@ -59,8 +59,10 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
 
 def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
     """Fewest formulations with which as many studies as possible hold the tolerance, the most useful one first."""
-    alone = [column for column in matrix.columns if len(column.studies) == 1]
-    columns = {column.studies[0]: column for column in alone}
+    alone = {column.studies[0]: column for column in matrix.columns if len(column.studies) == 1}
+    columns = {name: column for name, column in alone.items() if name not in matrix.unjudged[forces]}
+    if alone and not columns:
+        return Advised("all", f"Over all: {'forces are' if forces else 'motion is'} judged in no study.")
     costs = {
         row.name: {
             name: cell.cost

@@ -26,6 +26,7 @@ ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DE
 NEEDS = ("motion", "motion and forces")
 UNIT = "in seconds of computing per second of motion"
 NOTHING = "nothing that was run and timed holds it for"
+UNJUDGED = "no scene that was run is judged by that"
 NOT_RUN = "none"
 SEVERITY = list(map(str, Verdict))
 _WHY = {
@@ -154,7 +155,7 @@ class ChoiceMatrix:
         nothing = f"{NOTHING} {', '.join(without)}" if without else ""
         asked = f"{NEEDS[forces]} to {number(tolerance)}"
         if not held:
-            return f"To hold {asked}: {nothing or 'nothing was run'}."
+            return f"To hold {asked}: {nothing or (UNJUDGED if groups else 'nothing was run')}."
         return f"The cheapest to hold {asked}, {UNIT}: {', '.join(held)}{f'; {nothing}' if nothing else ''}."
 
     def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import closest, furthest_off
+from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
 from proofroll.report.parts import PartEntry
@@ -31,6 +32,26 @@ def three_sentences(
 def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
     if not comparisons:
         return "Nothing was compared with the truth in this report."
+    known, alone = ([item for item in comparisons if item.laws_alone is either] for either in (False, True))
+    said = "; ".join(filter(None, (_near(known, choice), _lawful(alone))))
+    return f"{said[0].upper()}{said[1:]}."
+
+
+def _lawful(comparisons: Sequence[ReportedComparison]) -> str:
+    """Clause on comparisons whose motion is not unique; empty: there are none."""
+    if not comparisons:
+        return ""
+    rows = [row for comparison in comparisons for row in comparison.rows]
+    kept, refused = (sum(row.verdict == verdict for row in rows) for verdict in ("agrees", "refused"))
+    said = f"of {counted(len(rows), 'settings')} {ALONE} ({', '.join(item.name for item in comparisons)}), {kept}"
+    said += f" {'keeps' if kept == 1 else 'keep'} them"
+    return f"{said}, {refused} {'refuses' if refused == 1 else 'refuse'} the scene" if refused else said
+
+
+def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
+    """Clause on comparisons with a truth; empty: there are none."""
+    if not comparisons:
+        return ""
     rows = [row for comparison in comparisons for row in comparison.rows]
     counts = Counter(row.verdict.value for row in rows)
     agree = "agrees" if counts["agrees"] == 1 else "agree"
@@ -48,11 +69,11 @@ def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> 
         said += f"; {counts['refused']} {'refuses' if counts['refused'] == 1 else 'refuse'} the scene or a case of it"
     best = closest(comparisons[0], choice)
     if best is None:
-        return f"{said}; none gave motion and forces in every case of the first comparison."
+        return f"{said}; none gave motion and forces in every case of the first comparison"
     first = " in the first" if len(comparisons) > 1 else ""
     return (
         f"{said}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
-        f"whose forces within {number(best.forces)} of the largest."
+        f"whose forces within {number(best.forces)} of the largest"
     )
 
 
@@ -61,14 +82,18 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
     wrong = [item for comparison in comparisons for item in _wrong(comparison)]
     silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
+    alone = [comparison.laws_alone for comparison in comparisons]
+    laws, truth = "a law of mechanics" if any(alone) else "", "from the truth" if not all(alone) or not alone else ""
     if not wrong:
-        nothing = "No setting that ran to its end differs from the truth"
+        off = " or ".join(filter(None, (truth and f"differs {truth}", laws and f"breaks {laws}")))
+        nothing = f"No setting that ran to its end {off}"
         if not comparisons:
             return f"{passed}." if maps else "Nothing that was run could be silently wrong: nothing was compared."
         return f"{nothing}; {passed}." if maps else f"{nothing}."
     _, name, text = max(wrong)
-    verbs = ("differ", "run") if len(wrong) > 1 else ("differs", "runs")
-    said = f"{len(wrong)} {verbs[0]} from the truth and {verbs[1]} to the end without a word, worst {name}: {text}"
+    differ, breaks, run = ("differ", "break", "run") if len(wrong) > 1 else ("differs", "breaks", "runs")
+    off = " or ".join(filter(None, (truth and f"{differ} {truth}", laws and f"{breaks} {laws}")))
+    said = f"{len(wrong)} {off} and {run} to the end without a word, worst {name}: {text}"
     return f"{said}; {passed}." if maps else f"{said}."
 
 
@@ -81,5 +106,6 @@ def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
         worst = furthest_off(comparison, runs)
         relative = 0.0 if worst is None else worst.error / worst.scale
         text = "a reaction or an event is wrong" if worst is None else off_by(worst)
+        text = row.reason if comparison.laws_alone else text
         wrong.append((relative, with_caveat(name, row.caveat), text))
     return wrong

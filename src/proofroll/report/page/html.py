@@ -17,9 +17,19 @@ from proofroll.core import number_format
 from proofroll.files.json_data import plain
 from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
+from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
 from proofroll.report.page.advice import advice
-from proofroll.report.page.choice_matrix import ASKED, DECADES, FIRST, FIRST_TOLERANCE, NEEDS, NOTHING, UNIT
+from proofroll.report.page.choice_matrix import (
+    ASKED,
+    DECADES,
+    FIRST,
+    FIRST_TOLERANCE,
+    NEEDS,
+    NOTHING,
+    UNIT,
+    UNJUDGED,
+)
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -129,6 +139,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "detail": labels.detail,
         "setting": labels.setting,
         "caveats": labels.caveat_lines,
+        "alone_words": ALONE,
         "symbols": labels.SYMBOLS,
         "meanings": labels.MEANINGS,
         "outlines": OUTLINES,
@@ -139,6 +150,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
             "needs": NEEDS,
             "unit": UNIT,
             "nothing": NOTHING,
+            "unjudged": UNJUDGED,
             "tolerances": [number_format.number(10.0**-decade) for decade in DECADES],
         },
         "again": _again,

@@ -36,7 +36,8 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     """
     shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
-        for name, point in outcome.points.items():
+        known = {name: point for name, point in outcome.points.items() if name not in outcome.laws_alone}
+        for name, point in known.items():
             if point.reference is not None and np.isfinite(point.reference.dataset["p_WB"]).all():
                 shown_in.setdefault(point.case.key, (point, []))[1].append((outcome, name))
     looks = {id(outcome): _looks(outcome) for outcome in outcomes}

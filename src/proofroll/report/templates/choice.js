@@ -28,12 +28,12 @@
   const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
   // The cheapest of the engines that are chosen, as `ChoiceMatrix.answer` says it of all.
   function sentence(best, { groups, judged }, place) {
-    const { needs, unit, nothing, tolerances } = {{ answer_words|tojson }};
+    const { needs, unit, nothing, unjudged, tolerances } = {{ answer_words|tojson }};
     const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
     const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
     const lacking = without.length ? `${nothing} ${without.join(", ")}` : "";
     const asked = `${needs[+forces.checked]} to ${tolerances[Number(slider.value) - first]}`;
-    const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || "nothing was run"}.`;
+    const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.length ? unjudged : "nothing was run")}.`;
     return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
   }
   async function show() {

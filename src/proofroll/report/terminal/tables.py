@@ -11,8 +11,9 @@ from rich.text import Text
 
 from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Verdict
+from proofroll.report.comparison.spread import ALONE
 from proofroll.report.comparison.tables import observables, one_scheme, remarks, seconds_before
-from proofroll.report.labels import SYMBOLS, caveat_lines, step, unjudged, verdict_text
+from proofroll.report.labels import SYMBOLS, caveat_lines, step, unit, unjudged, verdict_text
 from proofroll.report.parts import part_kinds
 from proofroll.report.terminal.screen import Screen, numeric, plain_table, unbroken
 from proofroll.running.case import Status, told_hosts
@@ -22,9 +23,11 @@ if TYPE_CHECKING:
 
     from proofroll.report.against import Against
     from proofroll.report.comparison.records import ReportedComparison, WorstJudgement
+    from proofroll.report.comparison.spread import Spread
     from proofroll.report.page.records import ReportContent
 
 WIDTH = 100
+_WIDEST = 8  # spreads that are listed
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
 STYLES = {
     "agrees": "green",
@@ -106,8 +109,23 @@ def columns(content: ReportedComparison) -> list[tuple[str, str]]:
 def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
     """A comparison: the table of verdicts, and what came of it in words."""
     yield verdict_table(content)
+    for item in content.spread:
+        yield from spread_parts(item)
     yield from closing_lines(content)
     yield ""
+
+
+def spread_parts(spread: Spread) -> Iterator[Table | str]:
+    """Range of where the settings end at a point without a unique truth, the widest numbers first."""
+    where = f" at {spread.point}" if spread.point else ""
+    yield f"{ALONE[0].upper()}{ALONE[1:]}{where}: {spread.because}."
+    if spread.lines:
+        table = plain_table(Column("spread of the settings"), *numeric("lowest", "highest"), *unbroken("unit"))
+        for line in sorted(spread.lines, key=lambda line: -line.part)[:_WIDEST]:
+            table.add_row(line.name, number(line.low, 4), number(line.high, 4), unit(line.unit))
+        yield table
+    if len(spread.lines) > _WIDEST:
+        yield f"Narrower spreads, in the report and its JSON: {len(spread.lines) - _WIDEST}."
 
 
 def closing_lines(content: ReportedComparison) -> list[str]:

@@ -9,6 +9,7 @@ from functools import cached_property
 from proofroll.core.comparison import Comparison, Row
 from proofroll.core.diagnosis.of_scene import Diagnosis
 from proofroll.core.number_format import number
+from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.scene_file import SceneFile
@@ -139,6 +140,20 @@ class Outcome:
     def contradictions(self) -> list[str]:
         """Unexpected results of the comparison, as sentences."""
         return [sentence for run in self.runs for sentence in run.contradictions]
+
+    @cached_property
+    def laws_alone(self) -> list[str]:
+        """Points without a unique truth at which residuals alone are judged: runs are held to laws of mechanics."""
+        from proofroll.studies.comparison.planning import point_name
+
+        found = []
+        for name, point in self.points.items():
+            runs = [run for run in self.runs if point_name(run.parameters) == name]
+            judged = {item.observable for run in runs for item in run.judgements}
+            roles = {point.scene.observables[key].role for key in judged}
+            if roles == {Role.RESIDUAL} and point.reference is not None and point.reference.ill_posed:
+                found.append(name)
+        return found
 
     @property
     def lost(self) -> list[Run]:

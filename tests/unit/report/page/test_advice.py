@@ -76,3 +76,10 @@ def test_over_all_few_formulations_cover_what_can_be_covered() -> None:
     )
     coarse = replace(LINE, study="chain", scene="chain")
     assert said([*ARM, coarse], 1e-6)[-1].endswith("alpha joints holds it in 1; nothing holds it for A chain.")
+
+
+def test_a_study_without_judged_motion_is_no_part_of_all() -> None:
+    """Where laws alone are judged nothing is said not to hold the tolerance, and the studies are counted without it."""
+    laws = replace(LINE, role="residual", study="chain", scene="chain")
+    assert said([*ARM, laws], 1e-3)[-1] == said(ARM, 1e-3)[-1]
+    assert said([laws], 1e-3)[-1] == "Over all: motion is judged in no study."

@@ -1,0 +1,99 @@
+"""Spread of the settings where no motion is unique: where each of them ends, and the range, without a ranking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from proofroll.core.number_format import counted, number
+from proofroll.core.observable import Role
+from proofroll.report.labels import unit
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from proofroll.studies.comparison.outcome import ComparedPoint
+
+# How runs are judged there.
+ALONE = "held to laws of mechanics alone, for there is no unique truth"
+# Numbers in which all settings are alike to this part of the largest one of their observable are not listed.
+ALIKE = 1e-6
+
+
+@dataclass(frozen=True)
+class SpreadLine:
+    """A number at the end of the runs.
+
+    Attributes:
+        name: as a column of a CSV file: ``v_WB/rod/x``.
+        unit: of all numbers.
+        values: of each row; None: it has no result.
+        low: least of them.
+        high: largest of them.
+        part: range in parts of the largest number of the observable.
+    """
+
+    name: str
+    unit: str
+    values: list[float | None]
+    low: float
+    high: float
+    part: float
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Ends of the runs at a point without a unique truth; ``because``: why there is none; ``time`` [s]."""
+
+    point: str
+    because: str
+    time: float
+    lines: list[SpreadLine]
+
+    @property
+    def sentence(self) -> str:
+        """The widest line, in words."""
+        where = f"At {self.point} there" if self.point else "There"
+        head = f"{where} is no unique truth, so no setting is the closest to it"
+        if not self.lines:
+            return f"{head}; all settings end alike."
+        widest = max(self.lines, key=lambda line: line.part)
+        size = f"{number(widest.low)} to {number(widest.high)} {unit(widest.unit)}".rstrip()
+        many = counted(sum(value is not None for value in widest.values), "settings")
+        return f"{head}: at {number(self.time)} s the {many} spread most in {widest.name}, from {size}."
+
+
+def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], rows: int) -> Spread:
+    """Spread at a point.
+
+    Args:
+        name: of the point.
+        point: without a unique truth.
+        runs: by the number of their row.
+        rows: of the comparison.
+    """
+    from proofroll.files.csv_table import column_names  # imports xarray, which no other comparison needs by now
+
+    assert point.reference is not None  # else no law was judged
+    truth, lines = point.reference.dataset, list[SpreadLine]()
+    end = float(truth["time"].to_numpy()[-1])
+    for key, item in point.scene.observables.items():
+        if item.role is not Role.MOTION or not (item.headline or item.watched) or key not in truth:
+            continue
+        last = {row: np.ravel(run[key].to_numpy()[-1]) for row, run in runs.items() if key in run and _ends(run, end)}
+        finite = {row: values for row, values in last.items() if np.all(np.isfinite(values))}
+        size = max((float(np.max(np.abs(values))) for values in finite.values()), default=0.0)
+        for place, column in enumerate(column_names(truth[key]) if size else ()):
+            values = {row: float(numbers[place]) for row, numbers in finite.items()}
+            low, high = min(values.values()), max(values.values())
+            if high - low > ALIKE * size:
+                shown = [values.get(row) for row in range(rows)]
+                lines.append(SpreadLine(column, item.unit, shown, low, high, (high - low) / size))
+    return Spread(name, str(truth.attrs["ill_posed"]), end, lines)
+
+
+def _ends(run: xr.Dataset, end: float) -> bool:
+    return bool(run["time"].to_numpy()[-1] == end)
