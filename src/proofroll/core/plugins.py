@@ -18,8 +18,8 @@ from proofroll.core.errors import InputError, Missing, ProofrollError, place, re
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
-# Members of every engine; see proofroll.core.engine.Engine.
-_OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build", "advance", "sample", "built")
+# Members of an engine's class, whose `build` gives what has the others; see proofroll.core.engine.Engine.
+_OF_AN_ENGINE = ("name", "provides", "settings", "presets", "version", "build")
 
 
 def engine_names() -> list[str]:
@@ -68,9 +68,9 @@ def load_engine(name: str) -> Any:
     return kind
 
 
-def lacking_of(kind: object) -> list[str]:
-    """Names of the members of an engine's class that an object lacks."""
-    return [name for name in _OF_AN_ENGINE if not hasattr(kind, name)]
+def lacking_of(kind: object, *besides: str) -> list[str]:
+    """Names of the members of an engine's class, and of those ``besides``, that an object lacks."""
+    return [name for name in (*_OF_AN_ENGINE, *besides) if not hasattr(kind, name)]
 
 
 def release(version: str) -> tuple[int, ...]:

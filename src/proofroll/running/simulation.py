@@ -43,7 +43,7 @@ def build(scene: Scene, engine: Any, **settings: Any) -> Any:
 def _resolved(scene: Scene, engine: Any, settings: dict[str, Any]) -> tuple[Any, Any]:
     """The engine's class, and its complete settings."""
     if not isinstance(engine, str):
-        if lacking := lacking_of(engine):
+        if lacking := lacking_of(engine, "advance", "sample", "built"):
             shown = engine.__name__ if isinstance(engine, type) else repr(engine)
             raise InputError("engine", shown, f"give a name, or a class that has {', '.join(lacking)} too")
         return engine, resolve_settings(engine, settings, scene.requires)

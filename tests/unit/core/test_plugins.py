@@ -204,3 +204,9 @@ def test_a_path_that_changes_during_the_look_up_does_not_change_what_is_found(
 
     monkeypatch.setattr("proofroll.core.announced.distributions", torn)
     assert "late" in engine_names()
+
+
+@pytest.mark.parametrize("name", ["exudyn", "mujoco", "pinocchio", "projection", "reduced"])
+def test_a_class_whose_build_gives_another_is_an_engine(name: str) -> None:
+    """Every engine of this package loads, also where `advance` belongs to what `build` gives."""
+    assert load_engine(name).name == name
