@@ -77,7 +77,8 @@ def richardson(
     curve stands for the limit, trusted to twice what the last refinement changed (more, where the order is below one).
 
     In single precision each step rounds the state, so that smaller steps may be worse. Unless the differences are far
-    above that scatter, an order is that of an asymptotic ladder of one shape; any other shows neither order nor limit.
+    above that scatter, an order is that of an asymptotic ladder of one shape; any other shows neither order nor limit,
+    nor does one below the first, which no scheme has.
 
     Args:
         curves: three arrays of one shape.
@@ -92,7 +93,8 @@ def richardson(
         return Limit(fine, first, float("nan"))
     order = observed_order(first, last, h)
     one_law = _one_law(order, declared, (middle - coarse) / first, (fine - middle) / last) if first else False
-    if min(first, last) <= _FAR_ABOVE * scatter and not one_law:
+    below_any = order < 1 - _ASYMPTOTIC  # where the motion is unstable it enlarges round-off beyond what it was
+    if scatter and not one_law and (min(first, last) <= _FAR_ABOVE * scatter or below_any):
         bar = max(first, last, _walked(middle - coarse, fine - middle))
         return Limit(fine, bar, float("nan"), shown=False, rounded=True)
     if not np.isfinite(order) or order < _NO_CONVERGENCE:

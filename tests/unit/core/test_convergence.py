@@ -100,6 +100,16 @@ def test_curves_that_do_not_converge() -> None:
     assert not found.shown
 
 
+def test_round_off_that_an_unstable_motion_enlarges_shows_no_order() -> None:
+    """In single precision differences far above round-off show no order below the first; in doubles they do."""
+    curves = [curve(h, 0.49) for h in (4e-3, 2e-3, 1e-3)]
+    assert richardson(curves, (4, 2, 1), 4).order == pytest.approx(0.49, abs=0.01)
+    single = richardson(curves, (4, 2, 1), 4, scatter=1e-6)
+    assert math.isnan(single.order)
+    assert single.rounded
+    assert not single.shown
+
+
 def test_equal_curves() -> None:
     """Curves that do not depend on the step are their own limit, with no order."""
     found = richardson([LIMIT, LIMIT, LIMIT], (4, 2, 1))
