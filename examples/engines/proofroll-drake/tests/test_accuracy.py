@@ -37,7 +37,7 @@ def test_loops_of_discrete_plants_are_of_first_order(scene, until):
 
 
 def rest(contact, dt):
-    """How far from its true place of rest a sled on three feet ends [m]."""
+    """Distance of the place where a sled on three feet ends from its true place of rest [m]."""
     found = proofroll.simulate(
         proofroll.load_scene("sled"), "drake[formulation=contact]", until=0.7, every=0.35, dt=dt, contact=contact
     )
@@ -53,7 +53,7 @@ def test_a_sled_rests_where_coulomb_says(contact):
 
 
 def test_a_convex_cone_has_another_limit():
-    """With SAP, whose cone is convex, the sled ends a centimetre off."""
+    """SAP, whose cone is convex, leaves the sled a centimetre off."""
     assert 5e-3 < rest("sap", 1e-3) < 2e-2
 
 
