@@ -10,6 +10,7 @@ from proofroll.core.diagnosis.fitting import any_gravity
 from proofroll.core.diagnosis.lines import built_otherwise
 from proofroll.elements.mechanism.diagnosis import contacts
 from proofroll.elements.mechanism.diagnosis.equations import Change
+from proofroll.elements.mechanism.diagnosis.impacts import impacts
 from proofroll.elements.mechanism.diagnosis.joint_laws import of_actuators, of_couplings, of_stops
 from proofroll.elements.mechanism.diagnosis.numbers import FACTORS_OF_ALL, of_each_body, of_each_joint
 from proofroll.elements.mechanism.diagnosis.reactions import reactions, reactions_at_start
@@ -34,6 +35,7 @@ HYPOTHESES: tuple[Any, ...] = (
     reactions_at_start,
     BUILT,
     *contacts.HYPOTHESES,
+    impacts,
     other_axis,
     axis_of_first_steps,
     *FACTORS_OF_ALL,

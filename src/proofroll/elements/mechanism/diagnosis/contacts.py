@@ -1,4 +1,4 @@
-"""Hypotheses of contacts: another coefficient, a contact left out, another law of friction, late or swapped impacts."""
+"""Hypotheses of contacts: another coefficient, a contact left out, another law of friction."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import once, said_factor
 from proofroll.core.diagnosis.samples import both
 from proofroll.core.diagnosis.vectors import Reported
@@ -28,9 +27,7 @@ _TURNS = 0.3  # rad: slip and friction that turn less tell no shape of a cone
 _FEW = 3  # frictions that one angle does not bring to a square by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _HELD = 1e-6  # part of a mechanism's speed below which the truth sticks
-_DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
-_REAL = 1e-9  # imaginary part of a real root [s]
-_COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
+COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
 
 
 @dataclass(frozen=True)
@@ -140,7 +137,7 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
             says = f"friction of {name} is {'off' if off else said_factor(factor)}"
             after = float(np.abs(T - (0.0 if off else factor) * full).max())
             proof = "friction of what slides", "N", float(np.abs(T - full).max()), after
-            yield Cause("friction", says, *proof, "give each pair its own coefficient", 0 if off else 1, _COVERS)
+            yield Cause("friction", says, *proof, "give each pair its own coefficient", 0 if off else 1, COVERS)
 
 
 @hypothesis("contact left out", "a contact never presses, and its shapes overlap where the truth presses them apart")
@@ -162,7 +159,7 @@ def left_out(evidence: Evidence) -> Iterator[Cause]:
                     after,
                     "let the pair touch",
                     0,
-                    _COVERS,
+                    COVERS,
                 )
 
 
@@ -184,7 +181,7 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
         says, name = "convex cone: the sliding contact hops at u_n = μ|u_t|", "speed along the normal at the start"
         after = float(np.abs(began - rises[which]).max())
         remedy = "no step mends it: correct the normal rows (MuJoCo's preset tuned), or take Coulomb's own law"
-        yield Cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy, 0, _COVERS)
+        yield Cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy, 0, COVERS)
 
 
 @hypothesis("friction pyramid", "friction that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample")
@@ -223,7 +220,7 @@ def _of_a_square(
     sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
     after = float(np.abs(sides - bound).max(axis=1).min())
     says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
-    yield Cause("pyramid", says, "friction of what slides", "N", against, after, "choose the elliptic cone", 1, _COVERS)
+    yield Cause("pyramid", says, "friction of what slides", "N", against, after, "choose the elliptic cone", 1, COVERS)
 
 
 @hypothesis(
@@ -272,92 +269,8 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
         after = float(np.abs(slip - speed * used).max())
         yield Cause(
-            "creep", says, "slip of what sticks", "m/s", float(slip.max()), after, "make that speed smaller", 1, _COVERS
+            "creep", says, "slip of what sticks", "m/s", float(slip.max()), after, "make that speed smaller", 1, COVERS
         )
-
-
-@hypothesis(
-    "impacts", "flights before and after an impact, extended to where they meet, tell its time and its restitution"
-)
-def impacts(evidence: Evidence) -> Iterator[Cause]:
-    """Impacts that come late, or with the restitution of another pair."""
-    for touch in touch_of(evidence):
-        law = [contact.restitution for contact in touch.mechanism.contacts]
-        names = [contact.name for contact in touch.mechanism.contacts]
-        met = [(k, *one) for k in range(len(law)) for one in _met(touch, k)]
-        if not met:
-            continue
-        delays = np.array([delay for _, delay, _ in met])
-        size = float(np.abs(delays).max())
-        if evidence.step and size > _DELAY * evidence.step:
-            steps = np.round(2 * np.mean(delays) / evidence.step) / 2
-            says = f"impacts come {said_delay(float(np.mean(delays)), evidence.step)}"
-            after = float(np.abs(delays - steps * evidence.step).max())
-            yield Cause(
-                "late impact",
-                says,
-                "time of impacts",
-                "s",
-                size,
-                after,
-                "let the impact act in the step in which the gap closes",
-                0,
-                _COVERS,
-            )
-        seen = np.array([ratio for _, _, ratio in met])
-        own = np.array([law[k] for k, _, _ in met])
-        before = float(np.abs(seen - own).max())
-        if before <= _RATIO:
-            continue
-        of_each = sorted({k for k, _, _ in met})
-        for order in itertools.permutations(of_each):
-            moved = dict(zip(of_each, order, strict=True))
-            after = float(np.abs(seen - [law[moved[k]] for k, _, _ in met]).max())
-            swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
-            yield Cause(
-                "restitution",
-                f"restitution is of another pair: {swaps}",
-                "restitution",
-                "1",
-                before,
-                after,
-                "give each pair its own",
-                0,
-                _COVERS,
-            )
-        factor = float(seen @ own / (own @ own)) if own.any() else np.nan
-        says = f"restitution of all pairs is {said_factor(factor)}"
-        after = float(np.abs(seen - factor * own).max())
-        yield Cause(
-            "restitution",
-            says,
-            "restitution",
-            "1",
-            before,
-            after,
-            "look at what the engine makes of it",
-            1,
-            _COVERS,
-            explains=len(met),
-        )
-
-
-def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float]]:
-    """Delay [s] and restitution of each impact of a contact between two flights, of two samples each at least."""
-    t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
-    for k in range(1, len(t) - 2):
-        if not (free[k - 1 : k + 3].all() and rate[k] < 0 < rate[k + 1]):
-            continue
-        flights = []
-        for at, other in ((k, k - 1), (k + 1, k + 2)):
-            a = (rate[at] - rate[other]) / (t[at] - t[other])
-            flights.append(np.poly1d([a / 2, rate[at] - a * t[at], gap[at] - rate[at] * t[at] + a * t[at] ** 2 / 2]))
-        before, after = flights
-        closes = [r.real for r in before.roots if abs(r.imag) < _REAL and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
-        meets = [r.real for r in (before - after).roots if abs(r.imag) < _REAL and t[k] <= r.real <= t[k + 1]]
-        if closes and meets:
-            when = min(meets, key=lambda at: abs(at - min(closes)))
-            yield when - min(closes), float(-after.deriv()(when) / before.deriv()(when))
 
 
 @hypothesis(
@@ -388,7 +301,7 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
     def cause(says: str, after: float, remedy: str, fitted: int = 0) -> Cause:
         name = "acceleration at time 0"
         return Cause(
-            "contacts at time 0", says, name, "m/s^2", before, after, remedy, fitted, _COVERS, explains=found.size
+            "contacts at time 0", says, name, "m/s^2", before, after, remedy, fitted, COVERS, explains=found.size
         )
 
     def scaled(factor: float) -> tuple[Any, ...]:
@@ -426,7 +339,6 @@ HYPOTHESES = (
     pyramid,
     friction_factor,
     left_out,
-    impacts,
     creep,
     at_start,
 )

@@ -1,0 +1,100 @@
+"""Hypotheses of impacts: they come late, or with the restitution of another pair."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis.clocks import said_delay
+from proofroll.core.diagnosis.fitting import said_factor
+from proofroll.elements.mechanism.diagnosis.contacts import COVERS, SeenContact, touch_of
+
+_DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
+_REAL = 1e-9  # imaginary part of a real root [s]
+
+
+@hypothesis(
+    "impacts", "flights before and after an impact, extended to where they meet, tell its time and its restitution"
+)
+def impacts(evidence: Evidence) -> Iterator[Cause]:
+    """Impacts that come late, or with the restitution of another pair."""
+    for touch in touch_of(evidence):
+        law = [contact.restitution for contact in touch.mechanism.contacts]
+        names = [contact.name for contact in touch.mechanism.contacts]
+        met = [(k, *one) for k in range(len(law)) for one in _met(touch, k)]
+        if not met:
+            continue
+        delays = np.array([delay for _, delay, _ in met])
+        size = float(np.abs(delays).max())
+        if evidence.step and size > _DELAY * evidence.step:
+            steps = np.round(2 * np.mean(delays) / evidence.step) / 2
+            says = f"impacts come {said_delay(float(np.mean(delays)), evidence.step)}"
+            after = float(np.abs(delays - steps * evidence.step).max())
+            yield Cause(
+                "late impact",
+                says,
+                "time of impacts",
+                "s",
+                size,
+                after,
+                "let the impact act in the step in which the gap closes",
+                0,
+                COVERS,
+            )
+        seen = np.array([ratio for _, _, ratio in met])
+        own = np.array([law[k] for k, _, _ in met])
+        before = float(np.abs(seen - own).max())
+        if before <= _RATIO:
+            continue
+        of_each = sorted({k for k, _, _ in met})
+        for order in itertools.permutations(of_each):
+            moved = dict(zip(of_each, order, strict=True))
+            after = float(np.abs(seen - [law[moved[k]] for k, _, _ in met]).max())
+            swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
+            yield Cause(
+                "restitution",
+                f"restitution is of another pair: {swaps}",
+                "restitution",
+                "1",
+                before,
+                after,
+                "give each pair its own",
+                0,
+                COVERS,
+            )
+        factor = float(seen @ own / (own @ own)) if own.any() else np.nan
+        says = f"restitution of all pairs is {said_factor(factor)}"
+        after = float(np.abs(seen - factor * own).max())
+        yield Cause(
+            "restitution",
+            says,
+            "restitution",
+            "1",
+            before,
+            after,
+            "look at what the engine makes of it",
+            1,
+            COVERS,
+            explains=len(met),
+        )
+
+
+def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float]]:
+    """Delay [s] and restitution of each impact of a contact between two flights, of two samples each at least."""
+    t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
+    for k in range(1, len(t) - 2):
+        if not (free[k - 1 : k + 3].all() and rate[k] < 0 < rate[k + 1]):
+            continue
+        flights = []
+        for at, other in ((k, k - 1), (k + 1, k + 2)):
+            a = (rate[at] - rate[other]) / (t[at] - t[other])
+            flights.append(np.poly1d([a / 2, rate[at] - a * t[at], gap[at] - rate[at] * t[at] + a * t[at] ** 2 / 2]))
+        before, after = flights
+        closes = [r.real for r in before.roots if abs(r.imag) < _REAL and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
+        meets = [r.real for r in (before - after).roots if abs(r.imag) < _REAL and t[k] <= r.real <= t[k + 1]]
+        if closes and meets:
+            when = min(meets, key=lambda at: abs(at - min(closes)))
+            yield when - min(closes), float(-after.deriv()(when) / before.deriv()(when))
