@@ -98,7 +98,7 @@ def boundary_point(**more: Any) -> BoundaryPoint:
     values: dict[str, Any] = {
         "engine": "good", "settings": {"formulation": "only", "preset": "tuned"}, "curve": "good[formulation=only]",
         "level": None, "caveat": "", "family": "", "resolution": "dt", "axis": "V0", "value": 4.0,
-            "parameters": {"speed": 4.0},
+        "parameters": {"speed": 4.0},
         "until": 2.0, "period": 0.6, "largest_stable": None, "largest_accurate": None, "boundary": "stable",
         "failure": "sank in", "silent": True, "message": "reached 2 s", "sides": {"stable": side, "accurate": side},
         "least_error": 0.9, "finest": 1e-4, "too_slow": None, "timed_out": False, "runs": 7, "problem": None,

@@ -61,7 +61,7 @@ _V, _W, _Q = ("v_WB",), ("w_WB",), ("q_WB", "attitude is", "attitudes is")
 _FORCES, _EVENTS = ("N is", "F3 is", "forces is"), ("event_times is", "first_slip is", "event_order is", "creep is")
 _TURNED = ("rolls", *MECHANISMS, "sled")
 _STATE, _WRENCH = ("p_WB", "v_WB", "w_WB", "q_WB"), ("joint_force", "joint_torque")
-_LATE, _FACTOR, _AXES, _SIGN, _OMITTED = ("s late",), ("times",), ("other axes",), ("wrong sign",), ("left out",)
+_LATE, _FACTOR, _AXES, _SIGN, _OMITTED = ("0.003 s late",), ("times",), ("other axes",), ("wrong sign",), ("left out",)
 
 
 def _times() -> Iterator[Lie]:
@@ -186,7 +186,9 @@ def _reactions_of_joints() -> Iterator[Lie]:
         "reactions in body axes", MECHANISMS, _FORCES, lambda m: {"joint_force": _in_body_axes(m)}, ("body axes",)
     )
     yield Lie("reactions of the start", MECHANISMS, _FORCES, each(lambda m, name: getattr(m.at(0.0), name)))
-    yield Lie("reactions 3 ms late", MECHANISMS, _FORCES, each(lambda m, name: getattr(m.at(m.t - 0.003), name)), _LATE)
+    late = each(lambda m, name: getattr(m.at(m.t - 0.003), name))
+    yield Lie("reactions 3 ms late", tuple(name for name in MECHANISMS if name != "servo"), _FORCES, late, _LATE)
+    yield Lie("reactions of a servo 3 ms late", ("servo",), _FORCES, late, ("0.00287 s late",))
     yield Lie("reactions not finite", MECHANISMS, _FORCES, each(lambda m, name: np.nan * getattr(m.right, name)))
     yield Lie("no reactions", MECHANISMS, _FORCES, each(lambda *_: None), begins=0.0)
     yield Lie("moments + 5 N m", MECHANISMS, ("torques is",), lambda m: {"joint_torque": m.right.joint_torque + 5})

@@ -14,7 +14,7 @@ from proofroll.core.engine_abilities import TellsCaveats
 from proofroll.core.plugins import engine_names, load_engine
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.report.labels import aside, caveat_lines, with_caveat
+from proofroll.report.labels import caveat_lines, family_and_caveat, with_caveat
 from proofroll.report.stability.tables import silent_lines
 from proofroll.report.tradeoff.tables import answer_lines
 from proofroll.running.asking import resolve
@@ -107,8 +107,8 @@ def test_formulations_of_contact_say_which_law_they_have() -> None:
 def test_a_recommendation_says_which_law_a_choice_has() -> None:
     """Family and caveat of a measured point are one clause beside it."""
     point: Any = SimpleNamespace(family="hard contact", caveat="somebody else's steps")
-    assert aside(point) == "hard contact; somebody else's steps"
-    assert aside(SimpleNamespace(family="", caveat="")) == ""
+    assert family_and_caveat(point) == "hard contact; somebody else's steps"
+    assert family_and_caveat(SimpleNamespace(family="", caveat="")) == ""
 
 
 def test_families_stand_under_the_rows() -> None:

@@ -103,13 +103,23 @@ def test_plugin_of_an_actuator(tmp_path: Path) -> None:
         ("<!-- a -- b --->", ""),
         ("  \n<!-- <link/> -->\n<?xml version='1.0'?>", ""),
         ("", "\r\n\0"),
+        ("", "\0\n\0\0 "),
     ],
 )
 def test_loose_xml(head: str, tail: str, tmp_path: Path) -> None:
-    """XML that engines read, although not well-formed, is read: blanks before its head, a null character at the end."""
+    """XML that engines read, although not well-formed, is read: blanks before its head, null characters at the end."""
     path = tmp_path / "robot.urdf"
     path.write_text(head + urdf() + tail)
     assert len(read_urdf(open_robot(path)).moving) == 3
+
+
+@pytest.mark.parametrize("tail", ["\0<robot/>", "\0 no more"])
+def test_nothing_is_dropped_without_a_word(tail: str, tmp_path: Path) -> None:
+    """A file that goes on after a null character is no XML."""
+    path = tmp_path / "robot.urdf"
+    path.write_text(urdf() + tail)
+    with pytest.raises(InputError, match="this is no XML"):
+        open_robot(path)
 
 
 def test_no_log_is_left(proofroll: Proofroll, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -137,7 +137,7 @@ def with_caveat(name: str, caveat: str) -> str:
     return f"{name} ({caveat})" if caveat else name
 
 
-def aside(point: Any) -> str:
+def family_and_caveat(point: Any) -> str:
     """Family and caveat of a measured point, in one clause; empty: none."""
     return "; ".join(filter(None, (point.family, point.caveat)))
 

@@ -103,7 +103,7 @@ def read_xml(path: Path) -> Element:
         try:
             return _parsed(text)
         except ParseError:
-            return _parsed(_COMMENTS.sub(b"", text.partition(b"\0")[0]).lstrip())  # parsers of engines are no stricter
+            return _parsed(_COMMENTS.sub(b"", text.rstrip(b"\0 \t\r\n")).lstrip())  # parsers of engines are no stricter
     except _TooMuch as error:
         raise InputError("file", path, str(error)) from None
     except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that does not exist
@@ -112,7 +112,7 @@ def read_xml(path: Path) -> Element:
         raise InputError("file", path, f"this is no XML: {error}") from None
 
 
-# A comment may hold no "--", nothing may stand before <?xml and no null character at the end: few files keep to that,
+# A comment may hold no "--", nothing may stand before <?xml and no null characters at the end: few files keep to that,
 # and MuJoCo asks for none of it.
 _COMMENTS = re.compile(rb"<!--.*?-->", re.DOTALL)
 

@@ -67,7 +67,7 @@ class Store:
         return self.folder / f"{case.key}{STORED}"
 
     def stored(self, case: Case) -> StoredTrajectory:
-        """Trajectory of a case; the same object as long as anything holds it, so that its file is read once."""
+        """Trajectory of a case; the same object as long as anything holds it, so that all share what was read."""
         return self._held.setdefault(case.key, StoredTrajectory(self.trajectory(case)))
 
     @contextlib.contextmanager

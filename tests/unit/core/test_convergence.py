@@ -173,4 +173,8 @@ def test_changes_of_round_off_are_no_slow_convergence(ratio: float) -> None:
 def test_a_floor_is_told_where_shorter_steps_are_worse(errors: dict[float, float], told: str) -> None:
     """Errors of the size of the motion are no floor, nor are those that hardly rise."""
     assert floor_of(errors, 1.0, "m") == told
-    assert floor_of({2e-3: 0.4, 1e-3: 0.9}, None, "s")  # what has no scale is not small against it
+
+
+def test_a_floor_without_a_scale() -> None:
+    """Errors of what has no scale are large against none, so that a floor is told whatever their size."""
+    assert floor_of({2e-3: 0.4, 1e-3: 0.9}, None, "s") == "best step 2e-3 s, floor 0.4 s: single precision"

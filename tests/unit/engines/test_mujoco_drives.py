@@ -29,6 +29,13 @@ def built(mechanism: Mechanism, preset: str = "matched", **settings: Any) -> Muj
     return MujocoMechanism(mechanism, replace(PRESETS["joints"][preset], **settings))
 
 
+def wrong_in_a_gear(ratio: float, built_ratio: float, preset: str) -> list[Any]:
+    """Lines of a certificate that do not hold of a pair of gears with one ratio that is built with another."""
+    element, kind = load_scene("gear_pair", ratio=ratio).elements[0], load_engine("mujoco")
+    model = kind.build(load_scene("gear_pair", ratio=built_ratio), replace(PRESETS["joints"][preset], dt=1e-3))
+    return [line for line in element.certify(model.built(), model.sample()) if not line.holds]
+
+
 def slider(*actuators: Actuator, gravity: float = 0.0, **more: Any) -> Mechanism:
     """A mass on an upright slide."""
     return Mechanism(
@@ -97,13 +104,15 @@ def test_a_coupling_has_its_ratio_and_its_offset() -> None:
 
 @pytest.mark.parametrize("ratio", [-0.5, 0.01, 100.0])
 @pytest.mark.parametrize("preset", ["default", "matched"])
-def test_a_soft_gear_is_no_wrong_model_and_another_ratio_is(ratio: float, preset: str) -> None:
-    """Forces of a soft gear are granted what softness changes; where that is little, a ratio off by 1 % is found."""
-    scene, kind = load_scene("gear_pair", ratio=ratio), load_engine("mujoco")
-    (element,), settings = scene.elements, replace(PRESETS["joints"][preset], dt=1e-3)
-    one, other = (kind.build(each, settings) for each in (scene, load_scene("gear_pair", ratio=1.01 * ratio)))
-    assert [line for line in element.certify(one.built(), one.sample()) if not line.holds] == []
-    assert any(not line.holds for line in element.certify(other.built(), other.sample())) or preset == "default"
+def test_a_soft_gear_is_no_wrong_model(ratio: float, preset: str) -> None:
+    """Forces of a soft gear are granted what softness changes."""
+    assert not wrong_in_a_gear(ratio, ratio, preset)
+
+
+@pytest.mark.parametrize("ratio", [-0.5, 0.01, 100.0])
+def test_another_ratio_is_a_wrong_model(ratio: float) -> None:
+    """Where softness changes little, a ratio off by 1 % is found."""
+    assert wrong_in_a_gear(ratio, 1.01 * ratio, "matched")
 
 
 def test_friction_and_stops_are_told_apart() -> None:

@@ -20,7 +20,8 @@ def test_laws_are_those_of_the_scene(name: str, error: float) -> None:
     truth = proofroll.simulate(scene, until=0.5, every=0.5)
     found = engine.sample()
     assert np.max(np.abs(found.p_WB - truth["p_WB"].to_numpy()[1])) < error
-    assert np.max(np.abs(found.w_WB - truth["w_WB"].to_numpy()[1])) < 0.02
+    for velocity in ("v_WB", "w_WB"):  # bodies slide but in the gear
+        assert np.max(np.abs(getattr(found, velocity) - truth[velocity].to_numpy()[1])) < 0.02
 
 
 def test_friction_of_joints_is_refused_with_the_reason() -> None:

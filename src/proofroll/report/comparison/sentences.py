@@ -8,7 +8,7 @@ from typing import Any
 
 from proofroll.core.events import EVENT_ORDER
 from proofroll.core.number_format import counted, number
-from proofroll.report.comparison.records import ReportedComparison
+from proofroll.report.comparison.records import ReportedComparison, ReportedRow
 from proofroll.report.comparison.scores import closest, furthest_off, scores
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind
@@ -43,8 +43,24 @@ def conclusions(
 
 
 def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
-    """Sentence: what agrees, what does not, whether that was expected, and what to use for everyday accuracy."""
+    """Sentence: what agrees, what does not, whether that was expected, and what to use at ``FIRST_TOLERANCE``."""
     rows, alone = content.rows, content.laws_alone
+    unexpected = len(content.contradictions)
+    expected = f"Not expected: {counted(unexpected, 'results')}."
+    if content.as_expected:
+        expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
+    text = f"Of {counted(len(rows), 'engine settings')}, {standings(rows, alone)}. {expected}"
+    text = f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
+    for column in choice.columns:
+        forces = not choice.unjudged[True].issuperset(column.studies)
+        for _, cell in choice.ranked(column, FIRST_TOLERANCE, forces)[:1]:
+            text += f" For {NEEDS[forces]} to {number(FIRST_TOLERANCE)}, the cheapest is {cell.name}: {cell.text} s of "
+            text += "computing per simulated second."
+    return text
+
+
+def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
+    """Clause: how many rows have each verdict; ``alone``: they are held to laws of mechanics alone."""
     said = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
         "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
@@ -65,18 +81,7 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
         count = sum(row.verdict == verdict for row in rows)
         if count:
             parts.append(f"{count} {one if count == 1 else many} {rest}")
-    unexpected = len(content.contradictions)
-    expected = f"Not expected: {counted(unexpected, 'results')}."
-    if content.as_expected:
-        expected = "Nothing of it was unexpected." if unjudged(content) else "All of this was expected."
-    text = f"Of {counted(len(rows), 'engine settings')}, {_joined(parts)}. {expected}"
-    text = f"{ALONE[0].upper()}{ALONE[1:]}. {text}" if alone else text
-    for column in choice.columns:
-        forces = not choice.unjudged[True].issuperset(column.studies)
-        for _, cell in choice.ranked(column, FIRST_TOLERANCE, forces)[:1]:
-            text += f" For {NEEDS[forces]} to {number(FIRST_TOLERANCE)}, the cheapest is {cell.name}: {cell.text} s of "
-            text += "computing per simulated second."
-    return text
+    return _joined(parts)
 
 
 def _joined(parts: list[str]) -> str:

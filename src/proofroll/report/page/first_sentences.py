@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from proofroll.core.number_format import counted, number
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.scores import closest, furthest_off
+from proofroll.report.comparison.sentences import standings
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.labels import off_by, with_caveat
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, ChoiceMatrix
@@ -42,10 +43,8 @@ def _lawful(comparisons: Sequence[ReportedComparison]) -> str:
     if not comparisons:
         return ""
     rows = [row for comparison in comparisons for row in comparison.rows]
-    kept, refused = (sum(row.verdict == verdict for row in rows) for verdict in ("agrees", "refused"))
-    said = f"of {counted(len(rows), 'settings')} {ALONE} ({', '.join(item.name for item in comparisons)}), {kept}"
-    said += f" {'keeps' if kept == 1 else 'keep'} them"
-    return f"{said}, {refused} {'refuses' if refused == 1 else 'refuse'} the scene" if refused else said
+    names = ", ".join(item.name for item in comparisons)
+    return f"of {counted(len(rows), 'settings')} {ALONE} ({names}), {standings(rows, alone=True)}"
 
 
 def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:

@@ -127,7 +127,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "values": labels.values,
         "settings": labels.settings_text,
         "name_of": labels.name_of,
-        "aside": labels.aside,
+        "family_and_caveat": labels.family_and_caveat,
         "unbroken": _unbroken,
         "plain": plain,
     }

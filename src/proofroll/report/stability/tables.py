@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from proofroll.core.number_format import counted, number
-from proofroll.report.labels import aside, name_of, step, with_caveat
+from proofroll.report.labels import family_and_caveat, name_of, step, with_caveat
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts
 from proofroll.studies.stability.records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking
@@ -131,5 +131,5 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
             beyond = f"down to {finest}, finer ones have too many steps"
         else:
             beyond = f"at every {'step' if point.resolution == 'dt' else 'tolerance'} down to {finest}"
-        where = f"{with_caveat(name_of(point), aside(point))} at {point.axis} = {point.value:g}"
+        where = f"{with_caveat(name_of(point), family_and_caveat(point))} at {point.axis} = {point.value:g}"
         yield f"{where}: {point.failure} {beyond}{wrong}"

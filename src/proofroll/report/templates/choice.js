@@ -27,13 +27,13 @@
   }
   const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
   // The cheapest of the engines that are chosen, as `ChoiceMatrix.answer` says it of all.
-  function sentence(best, { groups, judged }, place) {
+  function sentence(best, { groups, judged }) {
     const { needs, unit, nothing, unjudged, tolerances } = {{ answer_words|tojson }};
     const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
     const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
     const lacking = without.length ? `${nothing} ${without.join(", ")}` : "";
     const asked = `${needs[+forces.checked]} to ${tolerances[Number(slider.value) - first]}`;
-    const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.length ? unjudged : "nothing was run")}.`;
+    const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.some(Boolean) ? unjudged : "nothing was run")}.`;
     return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
   }
   async function show() {
@@ -43,7 +43,7 @@
     const data = JSON.parse(await unpack("choices"));
     const best = data.ranks[place].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
     rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i)));
-    answer.textContent = sentence(best, data, place);
+    answer.textContent = sentence(best, data);
     const words = JSON.parse(await unpack("all-words"))[place];
     document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
     table.dataset.at = place;

@@ -11,7 +11,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from proofroll.core.number_format import error, number
-from proofroll.report.labels import aside, listed, name_of, step, with_caveat
+from proofroll.report.labels import family_and_caveat, listed, name_of, step, with_caveat
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.pareto import tied
@@ -260,7 +260,7 @@ def _line(choice: Choice, of: str) -> str:
     point = choice.point
     said = ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
     said += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
-    return with_caveat(f"{said}; {choice.reason}", aside(point)) + "."
+    return with_caveat(f"{said}; {choice.reason}", family_and_caveat(point)) + "."
 
 
 def _checked(advice: Recommendation) -> str:

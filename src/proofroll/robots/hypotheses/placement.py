@@ -64,7 +64,7 @@ def first_tree_only(evidence: RobotEvidence) -> Robot | None:
     return robot.change(joints=tuple(joints), bodies=bodies, mimics=mimics)
 
 
-@hypothesis({"pinocchio": "4.1.0"}, "write one <worldbody>; of a scene.xml read the robot's own file")
+@hypothesis({"pinocchio": "4.1.0"}, "write one <worldbody>")
 def tree_read_again(evidence: RobotEvidence) -> Robot | None:
     """The first tree is read once for every <worldbody>: its masses are added again, with joints that carry nothing.
 
