@@ -232,7 +232,7 @@ def test_rows_of_one_scheme_are_no_witnesses_for_one_another(
     outcome = with_runs(made[0], runs)
     content = report_content([outcome], "proofroll report invented")
     said = (
-        "Same errors to three digits, so one scheme, and no evidence for one another: "
+        "Same step and errors to three digits, of one scheme or one wrong model, so no evidence for one another: "
         "alpha fine matched (dt 1e-3 s), beta only (dt 1e-3 s)."
     )
     page_text = " ".join(parse(page(content, [point_curves(outcome)])).text.split())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -190,6 +191,7 @@ class _Comparing:
         self.plans, self.runner, self.limit, self.finished, self.tell = plans, runner, limit, finished, tell
         self.results: dict[str, Result] = {}
         self.ended: dict[int, Outcome] = {}
+        self._judged: dict[int, int] = {}
         self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
         self._truths = {case.key for item in plans for case in item.truths.values()}
         self._start, self._reused = time.monotonic(), runner.reused
@@ -199,8 +201,16 @@ class _Comparing:
         from proofroll.running.case import Result, Status
         from proofroll.studies.comparison.compare import evaluate, left_out
 
+        self._judged[at] = self._known(at)
         so_far = dict.fromkeys(self._keys, Result(Status.LEFT_OUT, "it has not been run yet")) | self.results
-        self.ended[at] = evaluate(self.plans[at].ended(left_out(so_far)), so_far, self.runner)
+        outcome = evaluate(self.plans[at].ended(left_out(so_far)), so_far, self.runner)
+        if self._judged[at] < len(self.plans[at].cases):
+            outcome = replace(outcome, beyond_budget=[])  # what is still to come does not lack time
+        self.ended[at] = outcome
+
+    def _known(self, at: int) -> int:
+        """Number of a comparison's cases that have ended, also as cases of another comparison."""
+        return sum(case.key in self.results for case in self.plans[at].cases)
 
     def run(self, phase: list[tuple[int, list[Case]]], *, last: bool) -> None:
         """Runs cases of comparisons in their order, and judges each comparison once its cases have ended.
@@ -218,7 +228,8 @@ class _Comparing:
         }
         cases = {case.key: case for _, items in phase for case in items if case.key not in self.results}
         missing = {number: {case.key for case in items} & cases.keys() for number, (_, items) in enumerate(phase)}
-        missing = {number: keys for number, keys in missing.items() if keys or phase[number][0] not in self.ended}
+        news = {number for number, (at, _) in enumerate(phase) if self._judged.get(at) != self._known(at)}
+        missing = {number: keys for number, keys in missing.items() if keys or number in news}
 
         def end(key: str = "") -> None:
             for number in [number for number, keys in missing.items() if keys <= {key}]:

@@ -20,9 +20,10 @@ class TimeBudget:
     """Processor time of the cases of one study; what it does not suffice for is left out.
 
     Cases belong to groups, as the comparisons of a report. A group that begins may take an equal share of what is left
-    among the groups that wait; what it does not take is for those after it. A case may take a whole share, for a worker
-    that is ended must start anew, but none is begun when the share is used. No case takes more than is left divided by
-    the cases that run side by side, so that all together never take more, however long each of them does.
+    among the groups that wait; what it does not take is for those after it. A case may take what is left of its group's
+    share, divided by the cases of the group that run side by side, and no more than is left in all divided by all that
+    do: so all together never take more, however long each of them does. A case that was ended begins again with more
+    time alone.
 
     Args:
         seconds: of processor time, that of this process included [s].
@@ -38,6 +39,7 @@ class TimeBudget:
         self._unfinished: Counter[int] = Counter()
         self._shares: dict[int, float] = {}
         self._used: defaultdict[int, float] = defaultdict(float)
+        self._allowed: defaultdict[str, float] = defaultdict(float)
         self._lock = threading.Lock()
 
     @property
@@ -72,10 +74,13 @@ class TimeBudget:
         with self._lock:
             left = self._left()
             share = self._shares.setdefault(group, left / len(self._unfinished))
-            seconds = min(left / max(1, min(abreast, self._unfinished.total())), share)
-            seconds = seconds if self._used[group] < share else 0.0
-            seconds = seconds if seconds > _LEAST else 0.0
+            others = [key for key in self._begun if self._group.get(key, 0) == group]
+            share -= self._used[group] + sum(self._begun[key][1] for key in others)
+            together = min(abreast, self._unfinished[group]) - len(others)
+            seconds = min(left / max(1, min(abreast, self._unfinished.total())), share / max(1, together))
+            seconds = seconds if seconds > max(_LEAST, self._allowed[case]) else 0.0
             self._begun[case] = time.monotonic(), seconds
+            self._allowed[case] = max(seconds, self._allowed[case])
             return seconds
 
     def end(self, case: str, used: float = 0.0, *, lost: bool = False) -> None:

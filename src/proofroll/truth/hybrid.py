@@ -178,7 +178,7 @@ def follow(
             short += 1
         try:
             if still > _STUCK or short > _MANY:
-                raise Diverged(f"the truth makes no progress at {leg.end:g} s, where its modes alternate at once")
+                raise Diverged(f"the truth makes no progress at t = {leg.end:g} s, where its modes alternate at once")
             time, change = leg.end, route.change(leg)
         except (Diverged, Refused):
             if min(margin for _, margin in margins) < close:

@@ -140,6 +140,23 @@ def test_a_limit_of_an_effort_is_not_stepped_across() -> None:
     assert run.sample().p_WB[0, 0] == pytest.approx(moved, abs=1e-13)
 
 
+@pytest.mark.parametrize("dt", [0.01, 0.003])
+def test_an_impact_takes_an_effort_off_its_limit(dt: float) -> None:
+    """A foot that falls with a servo at its limit hits the floor once, and then stands with its whole weight."""
+    dropped = Mechanism(
+        bodies=(Body("foot", 1.5, inertia=(1.0, 1.0, 1.0)),),
+        joints=(Joint("shaft", "prismatic", "world", "foot", axis=(0, 0, 1), q0=(0.2,), v0=(-1.0,)),),
+        actuators=(Actuator("servo", "shaft", "velocity", target=0.0, kd=100.0, limit=20.0),),
+        geometries=(Geometry("ball", "foot", "sphere", radius=0.1), Geometry("floor", "world", "plane")),
+        pairs=(Pair("sole", ("ball", "floor"), friction=0.0),),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    run = PROJECTION.build(dropped, replace(DEFAULT, dt=dt))
+    run.advance(0.3)
+    assert [event.kind for event in run.events()] == ["impact"]
+    assert run.sample().contact_force[0, 2] == pytest.approx(1.5 * 9.81)
+
+
 def test_feet_that_hold_together_share_their_friction() -> None:
     """A sled at rest on a slope stays, though the least share of friction is more than its least loaded foot bears."""
     mechanism = mechanism_of(load_scene("sled_on_slope"))

@@ -69,8 +69,45 @@ def test_each_group_has_an_equal_share(monkeypatch: pytest.MonkeyPatch) -> None:
         used += min(first, spent)
         budget.end(f"a{number}", min(first, spent))
         second = budget.begin(f"b{number}", 1)
-        assert second == pytest.approx(min(first, 90.0 - used) if spent < 20.0 else 0.0)
+        assert second == pytest.approx(first - spent if spent < 20.0 else 0.0)
         budget.end(f"b{number}")
+
+
+@pytest.mark.parametrize("abreast", [2, 8])
+def test_cases_that_run_side_by_side_have_no_more_than_their_group(
+    abreast: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All cases of a group that begin together may take its share in all, and none begins beyond it."""
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: 0.0)
+    monkeypatch.setattr("proofroll.running.time_budget.time.monotonic", lambda: 0.0)
+    names = [f"{group}{number}" for group in "abc" for number in range(8)]
+    budget = TimeBudget(100.0, group={name: ord(name[0]) for name in names})
+    for name in names:
+        budget.wait(name)
+    given = [budget.begin(f"a{number}", abreast) for number in range(abreast)]
+    assert sum(given) == pytest.approx(30.0)
+    assert min(given) > 3.0
+    budget.end("a0", given[0])
+    assert budget.begin("a0", abreast) == 0.0
+
+
+def test_a_case_that_was_ended_begins_again_with_more_time_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A second attempt with less time than the first would be ended as surely."""
+    left = 90.0
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: 0.0)
+    budget = TimeBudget(100.0, group={"b": 1})
+    monkeypatch.setattr(budget, "_left", lambda: left)
+    attempts = []
+    for left, others in ((90.0, True), (40.0, False), (60.0, False)):  # noqa: B007 - read by _left
+        budget.wait("a")
+        if others:
+            budget.wait("b")
+        attempts.append(budget.begin("a", 1))
+        budget.end("a", attempts[-1])
+        if others:
+            budget.begin("b", 1)
+            budget.end("b")
+    assert attempts == [45.0, 0.0, 60.0]
 
 
 def test_a_busy_machine_costs_no_budget(monkeypatch: pytest.MonkeyPatch) -> None:

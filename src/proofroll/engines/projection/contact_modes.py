@@ -71,12 +71,16 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self._faint = max(STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
-        wanted = zip(self._motors.items(), equations.wanted(self._at(start)), strict=True)
-        equations.applied.modes = {k: motor.mode_of(effort) for (k, motor), effort in wanted}
+        self._limit_efforts(start)
         now = self.at(start)
         closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= STILL for each in now.touching]
         still = [bool(np.linalg.norm(each.slide) <= STILL) for each in now.touching]
         self._enter(0.0, start, self._decided(now, closed, still))
+
+    def _limit_efforts(self, y: Array) -> None:
+        """Lets each effort act as it is wanted, or at the limit that it exceeds, from a state on."""
+        wanted = zip(self._motors.items(), self._equations.wanted(self._at(y)), strict=True)
+        self._equations.applied.modes = {k: motor.mode_of(effort) for (k, motor), effort in wanted}
 
     def at(self, y: Array) -> ContactsThere:
         """Contacts at a state, with what forces do to them."""
@@ -242,6 +246,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         still = [own.kind == "stick" for own in was]
         if kind == "impact":
             x, closed = self._struck(x, now, k)
+            self._limit_efforts(x)  # what a servo wants jumps with the velocity
             happened = [("impact", self.contacts[k].name)]
             now = self.at(x)
             still = [bool(np.linalg.norm(across(each)) <= STILL) for each in now.touching]

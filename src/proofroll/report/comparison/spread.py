@@ -57,9 +57,9 @@ class Spread:
     def sentence(self) -> str:
         """The widest line, in words."""
         where = f"At {self.point} there" if self.point else "There"
-        head = f"{where} is no unique truth, so no setting is the closest to it"
+        head = f"{where} is no unique motion, so no setting is called the closest"
         if not self.lines:
-            return f"{head}; all settings end alike."
+            return f"{head}."
         widest = max(self.lines, key=lambda line: line.part)
         size = f"{number(widest.low)} to {number(widest.high)} {unit(widest.unit)}".rstrip()
         many = counted(sum(value is not None for value in widest.values), "settings")

@@ -165,7 +165,7 @@ def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int,
 def one_scheme(content: ReportedComparison) -> list[str]:
     """Sentence that names the rows with one step and the same errors, whoever computed them; nothing if there are none.
 
-    Codes with one scheme print the same digits, right or wrong.
+    Codes with one scheme print the same digits, right or wrong; so do those with one wrong model.
     """
     groups: list[list[tuple[str, ReportedRow]]] = []
     for name, row, _ in content.lines():
@@ -175,9 +175,10 @@ def one_scheme(content: ReportedComparison) -> list[str]:
         else:
             group.append((name, row))
     told = [", ".join(name for name, _ in group) for group in groups if len(group) > 1]
-    return [f"Same errors to three digits, so one scheme, and no evidence for one another: {'; '.join(told)}."] * bool(
-        told
-    )
+    if not told:
+        return []
+    same = "Same step and errors to three digits, of one scheme or one wrong model, so no evidence for one another"
+    return [f"{same}: {'; '.join(told)}."]
 
 
 def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:
@@ -186,4 +187,5 @@ def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:
         return False
     pairs = [(one.observables[name], other.observables[name]) for name in one.observables.keys() & other.observables]
     seen = [(a.largest, b.largest) for a, b in pairs if max(a.largest, b.largest) > _SEEN * a.truth_error_bar]
-    return len(seen) >= _SEVERAL and all(math.isclose(*both, rel_tol=_SAME) for both in seen)
+    alike = all(math.isfinite(a) and math.isclose(a, b, rel_tol=_SAME) for a, b in seen)
+    return len(seen) >= _SEVERAL and alike

@@ -160,7 +160,10 @@ def _further(
     finer = next((step for step in map(question.step, finer_steps) if step not in curve.tried), None)
     if finer is not None and len(curve.points) > 1:
         now, before = (point.errors.get(question.quantity, np.inf) for point in (finest, curve.points[-2]))
-        known = max(finest.bars.get(question.quantity, 0.0), round_off_of("double", scale))
+        known = max(
+            finest.bars.get(question.quantity, 0.0),
+            round_off_of("double", references[question.every].magnitude(question.quantity)),
+        )
         if known < now < (1 - gain) * before:
             values.append(finer)
     return values

@@ -33,8 +33,8 @@ from proofroll.studies.tradeoff.sweep import FINER, GAIN, curves_of, sweep
 # What makes up most of a study's time is the repetition of measurements. A brief one repeats less: two rounds
 # show how far a cost can be trusted; a run longer than this [s] warms itself up, and is measured once.
 # A shorter measurement scatters more, which the interval of the rounds shows. Any study measures once a run that takes
-# longer than its own motion: it is never the cheapest, and seven rounds of it would last longer than all the others.
-BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS, ONCE = 2, 0.1, 0.02, 1.0
+# ten times as long as its own motion: seven rounds of it would last longer than all the others.
+BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS, ONCE = 2, 0.1, 0.02, 10.0
 # The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval,
 # and only where a step takes off as much of the error as with order 2: with order 1 the curve goes on as it came.
 BRIEF_FINER, BRIEF_GAIN = tuple(part for part in FINER if part >= 1e-3), 0.65

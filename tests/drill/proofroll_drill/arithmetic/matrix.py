@@ -47,8 +47,8 @@ class Tried:
 
     @property
     def same(self) -> bool:
-        """True if nothing depends on this kind of arithmetic, as far as it was tried."""
-        return not self.differences and not self.failed
+        """True if nothing depends on this kind of arithmetic, as far as it was tried: all runs late are no try."""
+        return not self.differences and not self.failed and (bool(self.runs) or not self.late)
 
 
 def comparison_files() -> list[str]:

@@ -101,7 +101,7 @@ def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None
         case = Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
         return CurvePoint(case, Result(Status.DONE, "reached", wall_seconds=seconds), errors={"z": error})
 
-    reference = SimpleNamespace(scale=lambda _: 1.0)
+    reference = SimpleNamespace(scale=lambda _: 1.0, magnitude=lambda _: 1.0)
     found = []
     for slowness in (1.0, 1e3):
         curve.points = [point(2e-4, 4e-4, slowness), point(1e-4, 1e-4, 2 * slowness)]
@@ -119,7 +119,7 @@ def test_a_curve_ends_where_the_truth_or_round_off_shows_no_more(bar: float, err
         case = Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
         return CurvePoint(case, Result(Status.DONE, "reached"), errors={"z": error}, bars={"z": bar})
 
-    reference, found = SimpleNamespace(scale=lambda _: 1.0), []
+    reference, found = SimpleNamespace(scale=lambda _: 1.0, magnitude=lambda _: 1.0), []
     for last in (error, 100 * error):
         curve.points = [point(8 * QUESTION.every, 1.0), point(2e-4, 1600 * error), point(1e-4, last)]
         found.append(_further(QUESTION, curve, {QUESTION.every: reference}))  # type: ignore[dict-item]
