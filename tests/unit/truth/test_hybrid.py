@@ -60,7 +60,7 @@ def test_a_route_that_alternates_without_progress_is_told(length: float) -> None
         def change(self, leg: Stretch[str]) -> Transition[str]:
             return Transition(leg.last, "right" if leg.mode == "left" else "left", (), np.inf)
 
-    with pytest.raises(Diverged, match=r"no progress at 0\.1 s"):
+    with pytest.raises(Diverged, match=r"no progress at t = 0\.1 s"):
         follow(Alternating(), 1.0)
 
 
