@@ -155,6 +155,8 @@ class Units(NamedTuple):
         )
 
     def _signal(self, given: Signal, factor: float) -> Signal:
+        if isinstance(given, _InUnits):
+            return replace(given, second=given.second * self.time, factor=given.factor * factor)
         if isinstance(given, Formula):
             return _InUnits(given.text, given.numbers, self.time, factor)
         if isinstance(given, Table):
