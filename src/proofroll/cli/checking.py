@@ -46,11 +46,7 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
 
 
 def _draw(file: SoundFile, plot: Path) -> None:
-    """Draws a scene at its start to a page.
-
-    Raises:
-        InputError: it is a study, or the file is no page or cannot be written.
-    """
+    """Draws a scene at its start to a page."""
     if file.kind != "scene":
         raise InputError("--plot", plot, f"{file.name} is no scene; name one")
     if plot.suffix.lower() != ".html":

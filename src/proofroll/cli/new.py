@@ -102,11 +102,7 @@ def engine(
 
 
 def _fresh(name: str, path: str) -> Path:
-    """Path of a new file or folder.
-
-    Raises:
-        InputError: the name is not allowed, or the path exists.
-    """
+    """Path of a new file or folder."""
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError("name", name, "write small letters, digits and _, a letter first")
     if keyword.iskeyword(name):

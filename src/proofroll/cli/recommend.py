@@ -95,11 +95,7 @@ def recommend(
 def _from_report(
     names: list[str], tolerance: str, engines: list[str], path: Path, *, forces: bool, as_json: bool
 ) -> None:
-    """Advice for several scenes from the runs of a report; exits with 1 if nothing holds the tolerance in one of them.
-
-    Raises:
-        InputError: the report has no runs of a scene, or of an engine.
-    """
+    """Advice for several scenes from the runs of a report; exits with 1 if nothing holds the tolerance in one."""
     from proofroll.report.against import EarlierReport
     from proofroll.report.page.advice import advice
     from proofroll.report.page.choice_matrix import ChoiceStudy, choice_matrix
@@ -165,9 +161,6 @@ def _stored_study(
     """Stored curves of all engines, or of some that include the engines asked for; new ones if the user agrees.
 
     With ``ranges`` of parameters they must have been checked over these.
-
-    Raises:
-        InputError: no stored curves hold here, and the user did not agree to measure them.
     """
     from proofroll.studies.study_store import kept
     from proofroll.studies.tradeoff.recommend import covers

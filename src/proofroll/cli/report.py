@@ -181,11 +181,7 @@ class _Growing:
 
 
 def _of_groups(names: list[str], only: str) -> list[str]:
-    """Comparisons whose scene belongs to one of the groups: each by its name, or by a word of it.
-
-    Raises:
-        InputError: no comparison is of such a group.
-    """
+    """Comparisons whose scene belongs to one of the groups: each by its name, or by a word of it."""
     from proofroll.core.errors import InputError
     from proofroll.files.comparison_file import load_comparison
     from proofroll.report.kinds import group_of

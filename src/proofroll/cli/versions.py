@@ -124,11 +124,7 @@ def _place(engine: str, text: str) -> str:
 
 
 def _made(engine: str, version: str) -> str:
-    """The environment of a version, made now.
-
-    Raises:
-        ProofrollError: it cannot be made; the text says how a person could.
-    """
+    """The environment of a version, made now."""
     from proofroll.running.make_environment import add, package_of
 
     package = package_of(engine)

@@ -124,11 +124,7 @@ def _as_file(row: ImporterRow) -> ImporterRow:
 
 
 def _matched(robot: Robot, other: Robot, names: Mapping[str, str]) -> dict[str, str]:
-    """Moving joint of the first -> of the second: as given, of the same name, or the only free joint of each.
-
-    Raises:
-        InputError: a name is none of a file's moving joints', or is given twice.
-    """
+    """Moving joint of the first -> of the second: as given, of the same name, or the only free joint of each."""
     ours, theirs = ({joint.name: joint for joint in each.moving} for each in (robot, other))
     for one, two in names.items():
         require_known("--map", one, ours, "no joint of the first file moves under this name; those are", f"{one}={two}")

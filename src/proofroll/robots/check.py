@@ -140,11 +140,7 @@ def check(
 
 
 def _accepted(path: Path, given: Sequence[str]) -> set[str]:
-    """Ids of causes that a user accepts, given or in the file beside the robot's: ``causes = ["..."]``.
-
-    Raises:
-        InputError: one is no cause.
-    """
+    """Ids of causes that a user accepts, given or in the file beside the robot's: ``causes = ["..."]``."""
     beside = path.with_suffix(".accept.toml")
     written = read_toml(beside).get("causes", []) if beside.is_file() else []
     if not isinstance(written, list):

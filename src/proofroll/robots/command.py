@@ -80,11 +80,7 @@ def check(
 
 
 def _partners(given: Sequence[str]) -> dict[str, str]:
-    """Joint of the first file -> joint of the second, from ``joint=joint`` or files of such lines.
-
-    Raises:
-        InputError: one is neither, or a joint is given twice.
-    """
+    """Joint of the first file -> joint of the second, from ``joint=joint`` or files of such lines."""
     from proofroll.files.toml import read_toml
 
     files = [text for text in given if "=" not in text]
@@ -98,11 +94,7 @@ def _partners(given: Sequence[str]) -> dict[str, str]:
 
 
 def _require_none_for_robots(context: typer.Context) -> None:
-    """Refuses the first option of a robot's check that was given, for it would be overlooked.
-
-    Raises:
-        InputError: there is one.
-    """
+    """Refuses the first option of a robot's check that was given, for it would be overlooked."""
     for parameter in context.command.params:
         if parameter.name in {"file", "plot", "as_json", "help"}:
             continue

@@ -65,11 +65,7 @@ def opened(
 def _by_definer(
     kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, defining.Compiler]]
 ) -> tuple[_Answer, defining.Compiler]:
-    """Answer of the engine that defines a format.
-
-    Raises:
-        InputError: it crashed or took too long.
-    """
+    """Answer of the engine that defines a format."""
     asked = _defines.get(kind, kind)
     with lent_workers(workers) as lent:
         try:

@@ -55,12 +55,7 @@ class BallOnSurface:
     sample_type: ClassVar[type[BallSample]] = BallSample
 
     def __post_init__(self) -> None:
-        """Refuses a start without a normal, a slip that nothing could brake, and what a wall that moves does not allow.
-
-        Raises:
-            InputError: the surface has no normal where the ball starts; or the ball starts slipping, and friction
-                without bound would stop it at once; or the wall moves, and the ball does not only roll.
-        """
+        """Refuses a start without a normal, a slip that nothing brakes, and all but rolling on a wall that moves."""
         for name, only in (("mu_static", math.inf), ("rolling_resistance", 0.0)):
             if any(self.surface.wall_rate) and getattr(self.contact, name) != only:
                 advice = f"on a wall that moves a ball only rolls; leave {name} out, or the wall's turning"

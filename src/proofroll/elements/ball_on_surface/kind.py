@@ -125,11 +125,7 @@ def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
 
 
 def _check_names(found: BallTables, where: str) -> None:
-    """Contacts and initial motions name what there is.
-
-    Raises:
-        InputError: the first name that leads nowhere, or that two things have.
-    """
+    """Raises InputError unless contacts and initial motions name what there is, and no two things share a name."""
     balls, surfaces = [ball.name for ball in found.balls], [surface.name for surface in found.surfaces]
     for kind, names in (("balls", balls), ("surfaces", surfaces)):
         for index, name in enumerate(names):

@@ -59,11 +59,6 @@ class Ball:
     shape: Literal["ball"] = "ball"
 
     def __post_init__(self) -> None:
-        """Refuses what no ball has.
-
-        Raises:
-            OutOfBounds: a radius, mass or inertia that is not positive and finite.
-        """
         for name in ("radius", "mass", "inertia_ratio", "inertia"):
             bounded(name, getattr(self, name), above=0)
 
@@ -97,11 +92,6 @@ class Contact:
     tangential_restitution: float = field(default=0.0, metadata={"unit": "1"})
 
     def __post_init__(self) -> None:
-        """Refuses what is no law of contact.
-
-        Raises:
-            OutOfBounds: a negative number, or more friction while slipping than while sticking.
-        """
         bounded("rolling_resistance", self.rolling_resistance, at_least=0)
         bounded("mu_static", self.mu_static, at_least=0, unbounded=True)
         bounded("mu_kinetic", self.mu_kinetic, at_least=0, unbounded=True)
@@ -137,11 +127,6 @@ class InitialMotion:
     gap: float = field(default=0.0, metadata={"unit": "m"})
 
     def __post_init__(self) -> None:
-        """Refuses what is no number.
-
-        Raises:
-            OutOfBounds: a value that is not finite.
-        """
         for name in ("coordinates", "velocity", "tangential_spin"):
             for value in getattr(self, name) or ():
                 bounded(name, value)

@@ -55,22 +55,14 @@ def assembled(mechanism: Mechanism) -> Mechanism:
 
 
 def _finite(rows: Rows) -> Rows:
-    """Rows of loops that can be computed with.
-
-    Raises:
-        InputError: they are beyond all numbers.
-    """
+    """The rows of loops; InputError if they are beyond all numbers."""
     if not all(np.isfinite(part).all() for part in rows):
         raise InputError("loops", "infinite", "lengths, coordinates or velocities are too large to be computed with")
     return rows
 
 
 def _check_inertia(mechanism: Mechanism, M: Array) -> None:
-    """Every velocity moves something that has inertia.
-
-    Raises:
-        InputError: one does not, so that forces do not tell how it changes.
-    """
+    """Raises InputError unless every velocity moves something that has inertia."""
     if not np.isfinite(M).all():
         raise InputError("mass matrix", "infinite", "masses, moments or lengths are too large to be computed with")
     size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))

@@ -51,11 +51,7 @@ _SHAPES = {
 
 
 def _require_readable(built: MechanismBuilt) -> None:
-    """Rejects what is of another shape or kind than the protocol says.
-
-    Raises:
-        Diverged: it is; with the name of the field.
-    """
+    """Raises Diverged, with the name of the field, for what is of another shape or kind than the protocol says."""
     require_shapes(built, _SHAPES)
     if not isinstance(built.contact_family, str | None):
         raise Diverged("the engine's built() gave contact_family that is no text")

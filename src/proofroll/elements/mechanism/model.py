@@ -182,9 +182,6 @@ def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint
     """The joints, each after the joint of its parent and directly before those of its descendants.
 
     Some engines are silently wrong in another order (Pinocchio's crba).
-
-    Raises:
-        InputError: a body with two parents or none, or a cycle.
     """
     holder: dict[str, Joint] = {}
     for joint in joints:
@@ -213,11 +210,7 @@ def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint
 
 
 def _check_masses(bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
-    """Whatever a joint moves has a mass, if not in the body itself, then in one that it carries.
-
-    Raises:
-        InputError: a body that moves carries no mass, and its joint has no armature.
-    """
+    """Raises InputError unless all that a joint moves has a mass, in the body itself or in one that it carries."""
     carried = {body.name: body.mass for body in bodies} | {WORLD: 0.0}
     for joint in reversed(joints):  # sorted: the children come last
         carried[joint.parent] += carried[joint.child]

@@ -73,11 +73,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
 
 
 def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Dataset) -> ReplayKind:
-    """Replay kind that draws an element of the run of a scene; ``alone`` holds no other.
-
-    Raises:
-        InputError: nothing does, or the run has no poses of it.
-    """
+    """Replay kind that draws an element of the run of a scene; ``alone`` holds no other."""
     of = f" of {element.name}" if len(scene.elements) > 1 else ""
     kind = kind_of(alone)
     if kind is None or not kind.replay_script:

@@ -37,11 +37,6 @@ class Bowl(Declared):
     units = ("m", "m")
 
     def __post_init__(self) -> None:
-        """Refuses what is no bowl.
-
-        Raises:
-            OutOfBounds: a radius that is not positive.
-        """
         bounded("radius", self.radius, above=0)
 
     @property

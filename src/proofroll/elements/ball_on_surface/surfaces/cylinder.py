@@ -42,11 +42,6 @@ class Cylinder:
     wall_rate = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        """Refuses what is no cylinder.
-
-        Raises:
-            OutOfBounds: a radius that is not positive, or a number that is not finite.
-        """
         bounded("radius", self.radius, above=0)
         bounded("tilt", self.tilt)
 

@@ -38,11 +38,6 @@ class Plane:
     length_scales = (1.0, 1.0)
 
     def __post_init__(self) -> None:
-        """Refuses what is no plane.
-
-        Raises:
-            OutOfBounds: a number that is not finite.
-        """
         bounded("tilt", self.tilt)
         bounded("height", self.height)
         bounded("turning", self.turning)

@@ -108,11 +108,7 @@ class Parallel(Revolved):
     apart: float
 
     def __post_init__(self) -> None:
-        """Takes over what the surface says of itself.
-
-        Raises:
-            InputError: somewhere the surface is curved more than a ball of this radius.
-        """
+        """Takes over names and periods of the surface; InputError if it is curved more than the ball somewhere."""
         for said in ("name", "kind", "coordinates", "units", "periods"):
             object.__setattr__(self, said, getattr(self.of, said))
         bends = float(np.linalg.eigvalsh(self.of.normal_gradient(self.of.position(self.of.places()))).max())
@@ -171,11 +167,6 @@ class Cone(Revolved):
     coordinates = ("gamma", "s")
 
     def __post_init__(self) -> None:
-        """Refuses what is no cone.
-
-        Raises:
-            OutOfBounds: a slope that is not between 0 and a right angle, or a length that is not positive.
-        """
         bounded("slope", self.slope, above=0)
         if not self.slope < math.pi / 2:
             raise OutOfBounds("slope", self.slope, "the value must be below a right angle")
@@ -226,11 +217,6 @@ class Torus(Revolved):
     extent = (-math.pi, math.pi)
 
     def __post_init__(self) -> None:
-        """Refuses what is no ring.
-
-        Raises:
-            OutOfBounds: a radius that is not positive, or a wire that fills its ring.
-        """
         bounded("ring_radius", self.ring_radius, above=0)
         bounded("wire_radius", self.wire_radius, above=0)
         if not self.wire_radius < self.ring_radius:
