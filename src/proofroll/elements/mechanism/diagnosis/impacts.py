@@ -7,13 +7,15 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from proofroll.core.diagnosis import Cause, Evidence, hypothesis
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import said_factor
 from proofroll.elements.mechanism.diagnosis.contacts import COVERS, SeenContact, touch_of
 
 _DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
 _REAL = 1e-9  # imaginary part of a real root [s]
+# A gap with a cubic part misses its parabola by m one interval T back, by 5 m one interval ahead, its rate by 12 m / T.
+_OFF, _OFF_RATE = 5.0, 12.0
 
 
 @hypothesis(
@@ -24,15 +26,15 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
     for touch in touch_of(evidence):
         law = [contact.restitution for contact in touch.mechanism.contacts]
         names = [contact.name for contact in touch.mechanism.contacts]
-        met = [(k, *one) for k in range(len(law)) for one in _met(touch, k)]
+        met = [(k, one) for k in range(len(law)) for one in _met(touch, k)]
         if not met:
             continue
-        delays = np.array([delay for _, delay, _ in met])
+        delays, delay_bars, seen, seen_bars = np.array([one for _, one in met]).T
         size = float(np.abs(delays).max())
         if evidence.step and size > _DELAY * evidence.step:
             steps = np.round(2 * np.mean(delays) / evidence.step) / 2
             says = f"impacts come {said_delay(float(np.mean(delays)), evidence.step)}"
-            after = float(np.abs(delays - steps * evidence.step).max())
+            after = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
             yield Cause(
                 "late impact",
                 says,
@@ -41,18 +43,19 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
                 size,
                 after,
                 "let the impact act in the step in which the gap closes",
-                0,
+                1,
                 COVERS,
+                closes=CLOSES * min(1.0, evidence.step / size),  # any delay is near some multiple of half a step
+                explains=len(met),
             )
-        seen = np.array([ratio for _, _, ratio in met])
-        own = np.array([law[k] for k, _, _ in met])
+        own = np.array([law[k] for k, _ in met])
         before = float(np.abs(seen - own).max())
         if before <= _RATIO:
             continue
-        of_each = sorted({k for k, _, _ in met})
+        of_each = sorted({k for k, _ in met})
         for order in itertools.permutations(of_each):
             moved = dict(zip(of_each, order, strict=True))
-            after = float(np.abs(seen - [law[moved[k]] for k, _, _ in met]).max())
+            after = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
             swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
             yield Cause(
                 "restitution",
@@ -67,7 +70,7 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             )
         factor = float(seen @ own / (own @ own)) if own.any() else np.nan
         says = f"restitution of all pairs is {said_factor(factor)}"
-        after = float(np.abs(seen - factor * own).max())
+        after = float(np.max(np.abs(seen - factor * own) + seen_bars))
         yield Cause(
             "restitution",
             says,
@@ -82,19 +85,25 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
         )
 
 
-def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float]]:
-    """Delay [s] and restitution of each impact of a contact between two flights, of two samples each at least."""
+def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, float]]:
+    """Delay [s] and restitution of each impact of a contact between two flights, each with its error bar.
+
+    A flight is a parabola through two samples; its misfit at the further one is that of a gap that is none.
+    """
     t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
     for k in range(1, len(t) - 2):
         if not (free[k - 1 : k + 3].all() and rate[k] < 0 < rate[k + 1]):
             continue
-        flights = []
+        flights, off, off_rate = [], 0.0, 0.0
         for at, other in ((k, k - 1), (k + 1, k + 2)):
-            a = (rate[at] - rate[other]) / (t[at] - t[other])
+            a, since = (rate[at] - rate[other]) / (t[at] - t[other]), t[other] - t[at]
             flights.append(np.poly1d([a / 2, rate[at] - a * t[at], gap[at] - rate[at] * t[at] + a * t[at] ** 2 / 2]))
+            misfit = abs(gap[at] + rate[at] * since + a * since**2 / 2 - gap[other])
+            off, off_rate = off + _OFF * misfit, off_rate + _OFF_RATE * misfit / abs(since)
         before, after = flights
         closes = [r.real for r in before.roots if abs(r.imag) < _REAL and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
         meets = [r.real for r in (before - after).roots if abs(r.imag) < _REAL and t[k] <= r.real <= t[k + 1]]
         if closes and meets:
             when = min(meets, key=lambda at: abs(at - min(closes)))
-            yield when - min(closes), float(-after.deriv()(when) / before.deriv()(when))
+            fell, rose = before.deriv()(when), after.deriv()(when)
+            yield when - min(closes), off / abs(fell), float(-rose / fell), off_rate / abs(fell)

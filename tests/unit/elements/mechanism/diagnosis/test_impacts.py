@@ -1,0 +1,78 @@
+"""Causes of impacts from made-up gaps: late impacts and wrong restitutions are named, and nothing else."""
+
+from __future__ import annotations
+
+import importlib
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from proofroll.core.arrays import FloatArray
+
+impacts: Any = importlib.import_module("proofroll.elements.mechanism.diagnosis.impacts")
+STEP, EVERY, G = 1e-3, 0.02, 9.81
+
+
+def bounces(late: float = 0.0, e: float = 0.5) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Times, gap and its rate of a ball dropped from 0.3 m, whose three impacts act ``late`` [s]."""
+    t = np.arange(0.0, 0.8, EVERY)
+    gap, rate = 0.3 - G * t**2 / 2, -G * t
+    when, fell = np.sqrt(0.6 / G), np.sqrt(0.6 * G)
+    for _ in range(3):
+        acts, down = when + late, -fell * late - G * late**2 / 2
+        fell = e * (fell + G * late)
+        on = t > acts
+        since = t[on] - acts
+        gap[on], rate[on] = down + fell * since - G * since**2 / 2, fell - G * since
+        back = (fell + np.sqrt(fell**2 + 2 * G * down)) / G  # until the gap is closed again
+        when, fell = acts + back, G * back - fell
+    return t, gap, rate
+
+
+def said(monkeypatch: pytest.MonkeyPatch, t: FloatArray, gap: FloatArray, rate: FloatArray) -> list[str]:
+    """Proven causes of one contact in flight whose restitution is a half."""
+    mechanism = SimpleNamespace(contacts=[SimpleNamespace(restitution=0.5, name="floor")])
+    touch = SimpleNamespace(
+        mechanism=mechanism,
+        time=t,
+        found=SimpleNamespace(gap=gap[:, None]),
+        u_n=rate[:, None],
+        presses=np.zeros((len(t), 1), dtype=bool),
+    )
+    monkeypatch.setattr(impacts, "touch_of", lambda _: [touch])
+    return [cause.says for cause in impacts.impacts.test(SimpleNamespace(step=STEP)) if cause.proven]
+
+
+@pytest.mark.parametrize(
+    ("late", "e", "words"),
+    [
+        (0.0, 0.5, []),
+        (STEP, 0.5, ["impacts come one step (0.001 s) late"]),
+        (0.0, 0.6, ["restitution of all pairs is 1.2 times"]),
+    ],
+)
+def test_the_fault_of_an_impact_is_named(
+    monkeypatch: pytest.MonkeyPatch, late: float, e: float, words: list[str]
+) -> None:
+    """A step that an impact comes late and another restitution are each the one cause; an exact ball has none."""
+    found = said(monkeypatch, *bounces(late, e))
+    assert len(found) == len(words)
+    assert all(cause.startswith(word) for cause, word in zip(found, words, strict=True)), found
+
+
+@pytest.mark.parametrize("part", [0.3, 0.55, 0.8])
+def test_hops_shorter_than_the_samples_resolve_accuse_nobody(monkeypatch: pytest.MonkeyPatch, part: float) -> None:
+    """A sliding foot that hops at one of six samples makes no parabola: when it met the floor is not known."""
+    t = 0.69 + 0.03 * np.arange(6)
+    gap = np.array([2.75e-5, 3.92e-5, 3.11e-5, 5.13e-5, 1.59e-5, 7.2e-6])
+    rate = np.array([6.5e-3, 1.55e-3, -1.7e-2 * part, 1.9e-2, -6.7e-4, 2.4e-3])
+    assert said(monkeypatch, t, gap, rate) == []
+
+
+def test_one_impact_proves_no_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A delay that is fitted to a single impact explains no more than itself."""
+    t, gap, rate = bounces(STEP)
+    first = t < 0.5
+    assert said(monkeypatch, t[first], gap[first], rate[first]) == []
