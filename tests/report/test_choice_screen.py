@@ -107,6 +107,11 @@ def test_the_answer_and_the_frames_are_of_the_chosen_engines(seen: Visit, matrix
     wanted = [at for at in others.best(10.0**-decade, forces) if at is not None]
     assert framed.count() == len(wanted)
     assert framed.locator("xpath=..").evaluate_all("rows => rows.every((row) => row.dataset.engine !== 'alpha')")
+    words = seen.page.locator("#words li").all_inner_texts()
+    vars(others)["unjudged"] = matrix.unjudged  # what is judged in a scene hangs on no choice
+    sentences = [item.sentence for item in advice(others, 10.0**-decade, forces)]
+    assert words[:-1] == sentences[:-1]
+    assert not any("alpha" in word for word in words)
     box.check()
     seen.wait("!document.getElementById('answer').textContent.includes('This is of')")
     assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, forces)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 
 from proofroll.core.number_format import counted, number
-from proofroll.report.page.choice_matrix import SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
+from proofroll.report.page.choice_matrix import ASKED, SEVERITY, ChoiceCell, ChoiceColumn, ChoiceMatrix
 
-_NOTHING = "nothing that was run and timed holds it"
+NOTHING = "nothing that was run and timed holds it"
 
 
 @dataclass(frozen=True)
@@ -36,22 +37,46 @@ def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised
     ]
 
 
+def words(matrix: ChoiceMatrix) -> str:
+    """Sentences for all that can be asked as JSON, and the parts from which a page makes those of some engines.
+
+    Parts are the beginnings of the sentences, and of each column its engines, the cheapest first: engine, cost (null:
+    it does not hold the tolerance), name, and cost as text or why it does not get there.
+    """
+    told = []
+    for forces, tolerance in ASKED:
+        heads, engines = [], []
+        for column in matrix.columns:
+            found = {} if _unjudged(matrix, column, forces) else _engines(matrix, column, tolerance, forces)
+            heads.append(_asked(column, tolerance, forces))
+            engines.append(
+                [
+                    (engine, cell.cost, _named(name, cell), cell.text)
+                    if math.isfinite(cell.cost)
+                    else (engine, None, _other(name, cell, cell), "")
+                    for engine, (name, cell) in found.items()
+                ]
+            )
+        said = [item.sentence for item in advice(matrix, tolerance, forces)]
+        told.append({"said": said, "heads": heads, "engines": engines})
+    return json.dumps(told, ensure_ascii=False, separators=(",", ":"))
+
+
 def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> Advised:
     """Cheapest that holds the tolerance, the best of each other engine beside it, and what forces change."""
-    title = column.title if column.whole else f"“{column.title}”"
-    engines = sorted(_engines(matrix, column, tolerance, forces), key=lambda item: _standing(item[1]))
+    asked = _asked(column, tolerance, forces)
+    engines = _engines(matrix, column, tolerance, forces)
     if not engines:
-        return Advised(column.title, f"For {title} no engine was run.")
-    first, *others = engines
-    asked = f"For {title} to {number(tolerance)}{' with forces' if forces else ''}"
-    if matrix.unjudged[forces].issuperset(column.studies):
+        return Advised(column.title, f"{asked} no engine was run.")
+    first, *others = engines.values()
+    if _unjudged(matrix, column, forces):
         return Advised(column.title, f"{asked}: {'forces are' if forces else 'motion is'} not judged there.")
     said = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
         said.insert(0, f"take {_named(*first)} ({first[1].text} s/s)")
     else:
-        said = [_NOTHING, _other(*first, first[1]), *said]
+        said = [NOTHING, _other(*first, first[1]), *said]
     changed = "" if forces else _with_forces(matrix, column, tolerance, first[1])
     choice = (_named(*first), first[1].cost) if held else (None, None)
     return Advised(column.title, f"{asked} {'; '.join(said)}.{changed}", *choice)
@@ -83,7 +108,7 @@ def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
         said.append(f"{best} {'holds it in' if not said else 'brings it to'} {len(columns) - len(missing)}")
     asked = f"Over all, {counted(len(columns), 'studies')}, to {number(tolerance)}{' with forces' if forces else ''}"
     left = ", ".join(matrix.titles[name] for name in columns if name in missing)
-    sentence = f"{asked}: {'; '.join(said) or _NOTHING}{f'; nothing holds it for {left}' if said and left else ''}."
+    sentence = f"{asked}: {'; '.join(said) or NOTHING}{f'; nothing holds it for {left}' if said and left else ''}."
     return Advised("all", sentence, ", ".join(chosen) or None)
 
 
@@ -93,10 +118,19 @@ def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
     return len(gained), -sum(math.log(costs[name]) for name in gained if costs[name] > 0)
 
 
+def _asked(column: ChoiceColumn, tolerance: float, forces: bool) -> str:
+    title = column.title if column.whole else f"“{column.title}”"
+    return f"For {title} to {number(tolerance)}{' with forces' if forces else ''}"
+
+
+def _unjudged(matrix: ChoiceMatrix, column: ChoiceColumn, forces: bool) -> bool:
+    return matrix.unjudged[forces].issuperset(column.studies)
+
+
 def _engines(
     matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool
-) -> list[tuple[str, ChoiceCell]]:
-    """Best formulation of each engine: the cheapest that holds the tolerance, else the one that comes closest to it."""
+) -> dict[str, tuple[str, ChoiceCell]]:
+    """Best formulation of each engine: the cheapest that holds the tolerance, else the closest; the best one first."""
     best_of: dict[str, tuple[str, ChoiceCell]] = {}
     for row in matrix.models:
         cell = matrix.cell(row, column, tolerance, forces)
@@ -104,7 +138,7 @@ def _engines(
             best = best_of.setdefault(row.engine, (row.name, cell))
             if _standing(cell) < _standing(best[1]):
                 best_of[row.engine] = (row.name, cell)
-    return list(best_of.values())
+    return dict(sorted(best_of.items(), key=lambda item: _standing(item[1][1])))
 
 
 def _standing(cell: ChoiceCell) -> tuple[float, int]:
@@ -124,9 +158,9 @@ def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
 
 def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, without: ChoiceCell) -> str:
     """Sentence about forces, which were not asked for."""
-    if matrix.unjudged[True].issuperset(column.studies):
+    if _unjudged(matrix, column, True):
         return " Forces are not judged there."
-    name, cell = min(_engines(matrix, column, tolerance, True), key=lambda item: item[1].cost)
+    name, cell = next(iter(_engines(matrix, column, tolerance, True).values()))
     judged = [study for study in column.studies if study not in matrix.unjudged[True]]
     if len(judged) < len(column.studies) and math.isfinite(cell.cost):
         return (

@@ -19,17 +19,9 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
-from proofroll.report.page.advice import advice
-from proofroll.report.page.choice_matrix import (
-    ASKED,
-    DECADES,
-    FIRST,
-    FIRST_TOLERANCE,
-    NEEDS,
-    NOTHING,
-    UNIT,
-    UNJUDGED,
-)
+from proofroll.report.page.advice import NOTHING as NOT_HELD
+from proofroll.report.page.advice import advice, words
+from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE, NEEDS, NOTHING, UNIT, UNJUDGED
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -61,7 +53,6 @@ def page(
         pictures: of the further studies, markup by name; what is not there is left out.
         replay: as the comparisons' kind of element gives it; None: the page has none.
     """
-    words = [[item.sentence for item in advice(content.choice, tolerance, forces)] for forces, tolerance in ASKED]
     drawn = {
         "precision": content.precision,
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
@@ -74,8 +65,8 @@ def page(
         curves=curves,
         pictures=pictures,
         choice=content.choice,
-        words=words[FIRST - DECADES.start],
-        all_words=packed(json.dumps(words, ensure_ascii=False).encode("utf-8", "replace")),
+        words=[item.sentence for item in advice(content.choice, FIRST_TOLERANCE, False)],
+        all_words=packed(words(content.choice).encode("utf-8", "replace")),
         styles=[styles(comparison.rows) for comparison in content.comparisons],
         replay=replay,
         replay_scripts=[kind.replay_script for kind in report_kinds().values() if kind.replay_script],
@@ -151,6 +142,7 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
             "unit": UNIT,
             "nothing": NOTHING,
             "unjudged": UNJUDGED,
+            "lacking": NOT_HELD,
             "tolerances": [number_format.number(10.0**-decade) for decade in DECADES],
         },
         "again": _again,

@@ -36,6 +36,19 @@
     const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.some(Boolean) ? unjudged : "nothing was run")}.`;
     return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
   }
+  // Advice for each column of the engines that are chosen, as `of_column` gives it of all, without what forces change.
+  function advised({ said, heads, engines }) {
+    const off = new Set(chosen(false));
+    if (!off.size) return said;
+    const times = (ratio) => ratio === 1 ? "as much" : `${ratio} times that`;
+    return [...heads.map((head, j) => {
+      const own = engines[j].filter(([engine]) => !off.has(engine));
+      if (!own.length) return engines[j].length ? `${head} none of the chosen engines was run.` : said[j];
+      const [[, least, name, text]] = own;
+      const others = own.slice(least === null ? 0 : 1).map(([, cost, other]) => cost === null ? other : `${other} costs ${times(Number((cost / least).toPrecision(2)))}`);
+      return `${head} ${[least === null ? {{ answer_words.lacking|tojson }} : `take ${name} (${text} s/s)`, ...others].join("; ")}.`;
+    }), `This is of ${chosen(true).join(", ") || "no engine"} alone. What serves all scenes, and what forces change, is said of all engines together.`];
+  }
   async function show() {
     const place = (forces.checked ? count : 0) + Number(slider.value) - first;
     told.textContent = `1e-${slider.value}`;
@@ -44,7 +57,7 @@
     const best = data.ranks[place].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
     rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i)));
     answer.textContent = sentence(best, data);
-    const words = JSON.parse(await unpack("all-words"))[place];
+    const words = advised(JSON.parse(await unpack("all-words"))[place]);
     document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
     table.dataset.at = place;
   }
