@@ -11,7 +11,8 @@ from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.errors import InputError
-from proofroll.robots.mjcf_meshes import Shapes, remove_height_fields, remove_meshes
+from proofroll.robots.mjcf_classes import classed
+from proofroll.robots.mjcf_meshes import remove_height_fields, remove_meshes
 from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintRemark, names_files_inside, read_xml, required_file
 
 # How deep files may include files.
@@ -95,7 +96,7 @@ def _add(
     for element in root.iter():
         if element.tag in _UNCOVERED:
             raise InputError("file", path, f"the check does not cover <{element.tag}>")
-    shapes = Shapes(root)
+    shapes = list(classed(root, "geom"))
     for parent in list(root.iter()):
         for child in list(parent):
             if child.tag in _LOOKS:

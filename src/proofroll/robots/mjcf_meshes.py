@@ -3,61 +3,24 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 from proofroll.core.number_format import counted
-from proofroll.robots.mjcf_classes import MAIN
+from proofroll.robots.mjcf_classes import Classed
 from proofroll.robots.robot_file import LintRemark, file_inside, required_file
 
 
-class Shapes:
-    """Shapes in bodies and the world, with attributes that default classes give.
-
-    Attributes:
-        found: each shape, the element that it stands in, and its body or the world.
-    """
-
-    def __init__(self, root: Element) -> None:
-        self._classes: dict[str, dict[str, str]] = {MAIN: {}}
-        for top in root.findall("default"):
-            self._read(top, MAIN, MAIN)
-        self._inherited: dict[Element, str] = {}
-        self.found: list[tuple[Element, Element, Element]] = []
-        for world in root.iter("worldbody"):
-            self._walk(world, world, MAIN)
-
-    def _read(self, default: Element, name: str, above: str) -> None:
-        self._classes[name] = dict(self._classes[above])
-        for geom in default.findall("geom"):
-            self._classes[name] |= geom.attrib
-        for child in default.findall("default"):
-            self._read(child, child.get("class", ""), name)
-
-    def _walk(self, parent: Element, body: Element, inherited: str) -> None:
-        inherited = parent.get("childclass", inherited)
-        for child in parent:
-            if child.tag == "geom":
-                self._inherited[child] = inherited
-                self.found.append((child, parent, body))
-            self._walk(child, child if child.tag == "body" else body, inherited)
-
-    def of(self, shape: Element, attribute: str) -> str | None:
-        """An attribute of a shape."""
-        name = shape.get("class", self._inherited.get(shape, MAIN))
-        return shape.get(attribute, self._classes.get(name, {}).get(attribute))
-
-
-def remove_height_fields(root: Element, shapes: Shapes) -> None:
+def remove_height_fields(root: Element, shapes: Sequence[Classed]) -> None:
     """Leaves out height fields, which weigh nothing."""
-    for geom, parent, _ in shapes.found:
-        if shapes.of(geom, "hfield"):
-            parent.remove(geom)
+    for shape in shapes:
+        if shape.given.get("hfield"):
+            shape.parent.remove(shape.element)
     _forget(root, "hfield", set())
 
 
-def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> Iterator[LintRemark]:
+def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside: Path) -> Iterator[LintRemark]:
     """Leaves out meshes that weigh nothing or do not exist; others are named by their whole path.
 
     Args:
@@ -79,8 +42,8 @@ def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> 
     files = {name: file_inside(place, mesh.get("file", ""), inside) for name, mesh in named.items()}
     used: set[str] = set()
     lost: Counter[Element] = Counter()
-    for geom, parent, body in shapes.found:
-        wanted = shapes.of(geom, "mesh")
+    for shape in shapes:
+        wanted, body = shape.given.get("mesh"), shape.body
         if wanted is None:
             continue
         weighed = body.tag == "body" and (inferred or body.find("inertial") is None)
@@ -88,7 +51,7 @@ def remove_meshes(root: Element, shapes: Shapes, folder: Path, inside: Path) -> 
         if weighed and (wanted in given or (target is not None and target.is_file())):
             used.add(wanted)
         else:
-            parent.remove(geom)
+            shape.parent.remove(shape.element)
             lost[body] += weighed
     for body, number in (+lost).items():
         words = f"{counted(number, 'mesh shapes')} that would give it mass: no such file; all engines read it without"
