@@ -170,14 +170,9 @@ def outcomes_of(
 
 
 class _Comparing:
-    """Comparisons whose cases are being run, a phase after the other.
+    """Comparisons whose cases are being run, a phase after the other; ``tell`` takes what a bar says after each case.
 
-    Args:
-        plans: of the comparisons.
-        runner: runs their cases.
-        limit: processor time of all of them, or None.
-        finished: as for :func:`outcomes_of`.
-        tell: takes what a bar says after each case.
+    ``limit`` is the processor time of all of them; ``finished`` is as for :func:`outcomes_of`.
     """
 
     def __init__(
@@ -213,12 +208,7 @@ class _Comparing:
         return sum(case.key in self.results for case in self.plans[at].cases)
 
     def run(self, phase: list[tuple[int, list[Case]]], *, last: bool) -> None:
-        """Runs cases of comparisons in their order, and judges each comparison once its cases have ended.
-
-        Args:
-            phase: comparisons, by their number, with cases.
-            last: no phase comes after it.
-        """
+        """Runs cases of comparisons, by number, in their order, and judges each when its cases have ended."""
         from proofroll.running.case import Status
 
         place = {

@@ -62,12 +62,7 @@ class ReportKind(Protocol):
 
     @staticmethod
     def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run]) -> Sequence[Any]:  # noqa: ARG004 -- as above
-        """Facts of each run of a comparison besides its verdicts: a record, or None.
-
-        Args:
-            truths: at each point, with their :meth:`truth_facts`.
-            runs: of the comparison.
-        """
+        """Facts of each run of a comparison besides its verdicts: a record or None; truths have :meth:`truth_facts`."""
         return [None] * len(runs)
 
     @staticmethod

@@ -74,11 +74,7 @@ class Part(Protocol):
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
-        """The part that a file asks for.
-
-        Args:
-            path: of the file.
-            engines: to which the study is restricted.
+        """The part that a file asks for, restricted to some engines.
 
         Raises:
             InputError: the file is broken.
@@ -150,12 +146,7 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
 
 
 def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
-    """The parts that the files of all studies ask for, in the order of a report.
-
-    Args:
-        engines: to which studies are restricted.
-        out: folder of all results; what is made on request is a part where it is kept there.
-    """
+    """The parts of all studies' files in the order of a report; those on request only if they are kept in ``out``."""
     parts = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
     return [part for part in parts if not part.on_request or part.keeps(out)]
 

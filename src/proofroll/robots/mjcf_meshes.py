@@ -21,16 +21,10 @@ def remove_height_fields(root: Element, shapes: Sequence[Classed]) -> None:
 
 
 def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside: Path) -> Iterator[LintRemark]:
-    """Leaves out meshes that weigh nothing or do not exist; others are named by their whole path.
-
-    Args:
-        root: of the file.
-        shapes: in it.
-        folder: of the file.
-        inside: folder that meshes must lie in.
+    """Leaves out meshes that weigh nothing or do not exist; others, in ``folder``, are named by their whole path.
 
     Raises:
-        InputError: a mesh that gives mass lies outside.
+        InputError: a mesh that gives mass lies outside the folder ``inside``.
     """
     inferred = any(compiler.get("inertiafromgeom") == "true" for compiler in root.iter("compiler"))
     place, strip = _mesh_folder(root, folder)

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from proofroll.core.arrays import cross
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 
@@ -137,7 +138,7 @@ def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = N
         M = _summed(mass[..., None, None] * Jc, Jc) + _summed(inertia @ Jw, Jw)
         g = -_summed(Jc, np.broadcast_to((mass * robot.gravity)[:, None], ac.shape)[..., None])[..., 0]
         c = _summed(Jc, (mass[..., None] * ac)[..., None])[..., 0]
-        c += _summed(Jw, (Ialpha + _cross(w, Iw))[..., None])[..., 0]
+        c += _summed(Jw, (Ialpha + cross(w, Iw))[..., None])[..., 0]
     return Dynamics(M + np.diag(armature(robot)), g, g + c + turned_armature(robot, v))
 
 
@@ -149,11 +150,6 @@ def _summed(one: Array, other: Array) -> Array:
     for start in range(0, left.shape[1], rows):
         total += left[:, start : start + rows].swapaxes(1, 2) @ right[:, start : start + rows]
     return total
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Vector product a × b along the last axis: numpy's own takes several times longer for few vectors."""
-    return np.asarray(a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]])
 
 
 def armature(robot: Robot) -> Array:
@@ -187,15 +183,15 @@ def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v
     relative = np.einsum("sij,sj->si", u, rate)
     if joint.kind == "prismatic":
         Jv[:, :, columns] = u
-        a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * _cross(parent.w, relative)
+        a = parent.a + _swung(parent.w, parent.alpha, r) + 2 * cross(parent.w, relative)
         return _Motion(Jv, Jw, parent.w, a, parent.alpha)
     anchor = p_parent + _rotate(R_parent, np.broadcast_to(joint.position, p.shape))
     Jw[:, :, columns], Jv[:, :, columns] = u, -skew(p - anchor) @ u
-    w, alpha = parent.w + relative, parent.alpha + _cross(parent.w, relative)
+    w, alpha = parent.w + relative, parent.alpha + cross(parent.w, relative)
     a = parent.a + _swung(parent.w, parent.alpha, anchor - p_parent) + _swung(w, alpha, p - anchor)
     return _Motion(Jv, Jw, w, a, alpha)
 
 
 def _swung(w: Array, alpha: Array, r: Array) -> Array:
     """Acceleration of a point at r of a body that turns so against that of its origin."""
-    return _cross(alpha, r) + _cross(w, _cross(w, r))
+    return cross(alpha, r) + cross(w, cross(w, r))

@@ -100,10 +100,8 @@ def rank_of(values: Array) -> int:
 class RowSign:
     """Sign of the product of the singular values of rows along a motion; it changes where the rows lose rank.
 
-    One matrix has none. From pose to pose the spaces of the singular vectors turn little, and carry it on.
-
-    Args:
-        rank: of the rows at a general pose.
+    One matrix has none. From pose to pose the spaces of the singular vectors turn little, and carry it on. ``rank`` is
+    that of the rows at a general pose.
     """
 
     def __init__(self, rank: int) -> None:

@@ -55,11 +55,9 @@ class Solution:
 
 
 class JointCoordinates:
-    """Equations of motion of a mechanism in the coordinates of its tree.
+    """Equations of motion of a mechanism in the coordinates of its tree; ``rank`` is that of the loops' rows.
 
-    Args:
-        mechanism: any.
-        rank: of the loops' rows; None: that of a general pose.
+    Without it the rank is that of a general pose.
     """
 
     def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
@@ -85,14 +83,10 @@ class JointCoordinates:
     def solve(
         self, q: Array, v: Array, mode: Mode | None = None, load: Array | None = None, time: float = 0.0
     ) -> Solution:
-        """Accelerations and multipliers for coordinates (nq) and velocities (nv).
+        """Accelerations and multipliers for coordinates (nq) and velocities (nv), with drives at ``time`` [s].
 
-        Args:
-            q: coordinates.
-            v: velocities.
-            mode: of the switched joints; None: what the forces make of it, see :meth:`decided`.
-            load: further forces along the velocities, (nv).
-            time: at which drives and targets are taken [s].
+        Without a ``mode`` of the switched joints it follows from the forces, see :meth:`decided`; a ``load`` (nv) acts
+        along the velocities.
 
         Raises:
             Diverged: a velocity moves nothing with inertia in this pose.

@@ -67,14 +67,7 @@ class Spread:
 
 
 def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], rows: int) -> Spread:
-    """Spread at a point.
-
-    Args:
-        name: of the point.
-        point: without a unique truth.
-        runs: by the number of their row.
-        rows: of the comparison.
-    """
+    """Spread at a point without a unique truth, of the runs by the number of their row, for so many ``rows``."""
     from proofroll.files.csv_table import column_names  # imports xarray, which no other comparison needs by now
 
     assert point.reference is not None  # else no law was judged

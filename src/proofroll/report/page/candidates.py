@@ -54,12 +54,9 @@ class Candidate:
 
 
 def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
-    """The candidates of one row of a study, its own step first.
+    """The candidates of one row of a study, its own step first; ``href`` is the id of the study's evidence.
 
-    Args:
-        lines: of the row.
-        href: id of the study's evidence.
-        places: that have an evidence of their own, in their order.
+    Each of the ``places`` has an evidence of its own, in their order.
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step

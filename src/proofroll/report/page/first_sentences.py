@@ -19,13 +19,7 @@ from proofroll.studies.stability.records import StabilityStudy
 def three_sentences(
     comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], choice: ChoiceMatrix
 ) -> list[str]:
-    """Three sentences: the best agreement, silent disagreement, and advice.
-
-    Args:
-        comparisons: of the report.
-        entries: of its further studies by the key of their kind; ``stability`` counts.
-        choice: the matrix of the report.
-    """
+    """Three sentences: the best agreement, silent disagreement (``entries`` of maps, too), and advice."""
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
     return [_agrees(comparisons, choice), _silent(comparisons, maps), choice.answer(FIRST_TOLERANCE, forces=True)]
 

@@ -110,11 +110,8 @@ class Report:
 def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()) -> Report:
     """A report of comparisons, to which further studies can be added.
 
-    Args:
-        outcomes: what was compared.
-        command: that makes the report again.
-        awaited: titles of comparisons that are still being run.
-        left_out: names of comparisons that are not in it.
+    ``command`` makes it again; ``awaited`` are titles of comparisons that are still being run, ``left_out`` names of
+    those that are not in it.
     """
     replay = _replay(outcomes)
     described = [case.described for case in replay.cases] if replay else []

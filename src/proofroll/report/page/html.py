@@ -45,14 +45,7 @@ def page(
     pictures: Mapping[str, str] = MappingProxyType({}),
     replay: Replay | None = None,
 ) -> str:
-    """The HTML page.
-
-    Args:
-        content: from :func:`proofroll.report.page.records.report_content`.
-        curves: from :func:`proofroll.report.comparison.plots.point_curves`, one list for each comparison.
-        pictures: of the further studies, markup by name; what is not there is left out.
-        replay: as the comparisons' kind of element gives it; None: the page has none.
-    """
+    """The HTML page: content, curves of each comparison, markup of further pictures by name, and the replay if any."""
     drawn = {
         "precision": content.precision,
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],

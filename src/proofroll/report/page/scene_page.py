@@ -9,10 +9,5 @@ from proofroll.report.pages import environment, rendered
 
 
 def scene_page(scene: str, start: Sequence[str]) -> str:
-    """The page; everything from the scene's file is escaped.
-
-    Args:
-        scene: its name, or the path of its folder or file.
-        start: sentences about how it starts.
-    """
+    """The page of a scene with sentences on its start; everything from the scene's file is escaped."""
     return rendered(environment(), "scene_page.html", sheet=scene_sheet(scene, []), start=start)

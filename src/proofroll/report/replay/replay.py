@@ -71,12 +71,7 @@ def joined(parts: list[Replay]) -> Replay | None:
 
 
 def frame_times(until: float, fastest: float) -> FloatArray:
-    """Evenly spaced times of frames [s], shape (n,), close enough that the fastest body appears to turn the right way.
-
-    Args:
-        until: the last time [s].
-        fastest: largest angular velocity of the truth [rad/s].
-    """
+    """Evenly spaced times of frames [s], shape (n,), so close that a body of this spin [rad/s] turns the right way."""
     turned = until * fastest
     wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN, LEAST_FRAMES)
     return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))

@@ -18,12 +18,7 @@ from proofroll.truth.collocation import System
 
 AnyArray = npt.NDArray[Any]  # real or complex
 _PLUS_MINUS = np.concatenate([np.eye(3), -np.eye(3)])
-_YZX, _ZXY, _ONES = np.array([1, 2, 0]), np.array([2, 0, 1]), np.ones(3)
-
-
-def _cross(x: AnyArray, y: AnyArray) -> AnyArray:
-    """Product x × y along the last axis; numpy's own takes several times as long for few vectors."""
-    return np.asarray(x[..., _YZX] * y[..., _ZXY] - x[..., _ZXY] * y[..., _YZX])
+_ONES = np.ones(3)
 
 
 def _dot(x: AnyArray, y: AnyArray) -> AnyArray:
@@ -105,9 +100,9 @@ class ContactRates:
         """
         body = self._body
         a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
-        v = u + a * _cross(e1, w)
+        v = u + a * cross(e1, w)
         e1_rate = (bend @ v[..., None])[..., 0]
-        free = body.gravity + a * _cross(w, e1_rate)
+        free = body.gravity + a * cross(w, e1_rate)
         R1 = -m * (_dot(e1, body.gravity) + _dot(e1_rate, v))
         along = free - _dot(e1, free) * e1
         ahead = np.zeros_like(v)
@@ -121,8 +116,8 @@ class ContactRates:
             size = np.sqrt(_dot(u, u))
             T = body.contact.mu_kinetic * R1 * np.divide(u, size, out=np.zeros_like(u), where=size != 0)
         R = R1 * e1 + T
-        turning = a * _cross(e1, T)
+        turning = a * cross(e1, T)
         if f:
-            turning = turning + f * R1 * _cross(ahead, e1)
+            turning = turning + f * R1 * cross(ahead, e1)
         u_rate = np.zeros_like(v) if sticking else along + (1 / m + a * a / J) * T - _dot(e1_rate, u) * e1
         return np.concatenate([v, turning / J, u_rate], axis=-1), R

@@ -46,14 +46,8 @@ def number(
 ) -> Hypothesis:
     """Hypothesis: a number of the scene is another one in the engine.
 
-    Args:
-        name: of the hypothesis.
-        what: the number, in words.
-        value: of the scene; None or 0: the scene has none of it.
-        change: the ball with another value.
-        remedy: what to look at.
-        only: whether the scene has it.
-        signed: whether its sign can be mistaken.
+    ``value`` is that of the scene, 0 if it has none, and ``change`` gives a ball with another one; ``only`` says
+    whether the scene has it, ``signed`` whether its sign can be mistaken.
     """
 
     @hypothesis(name, "one factor on this number of the scene closes accelerations and forces at every sample")
@@ -85,33 +79,27 @@ def _snapped(factor: float) -> tuple[float, int]:
     return (known[0], 0) if known else (factor, 1)
 
 
-def load(name: str, says: str, law: Callable[[RollingBall, float], Law], remedy: str) -> Hypothesis:
-    """Hypothesis: an extra force or moment acts, with one coefficient, in ``says`` as ``{value}``."""
+def damping(what: str, velocity: float, spin: float) -> Hypothesis:
+    """Hypothesis: velocity, spin or both are damped at one rate; 1 for what is, 0 for what is not."""
 
-    @hypothesis(name, "the load with one coefficient closes accelerations and forces at every sample")
+    @hypothesis("damping", "the load with one coefficient closes accelerations and forces at every sample")
     def test(evidence: Evidence) -> Iterator[Cause]:
         body = evidence.element.rolling
+        mass, inertia = velocity * body.ball.mass, spin * body.ball.inertia
+
+        def law(rate: float) -> Law:
+            return Law(body, force=lambda v: -rate * mass * v, moment=lambda _e1, _v, w: -rate * inertia * w)
+
         for held in residuals_of(evidence):
-            value = held.fit(lambda x: law(body, x), 0.0)
-            if value > 0:
-                yield held.cause(name, says.format(value=value), law(body, value), remedy, 1)
+            rate = held.fit(law, 0.0)
+            if rate > 0:
+                says = f"{what} damped at a rate of {rate:.4g} per second"
+                remedy = "find the engine's own damping, drag or sleeping, and switch it off"
+                yield held.cause("damping", says, law(rate), remedy, 1)
 
     return test
 
 
-def _damps_velocity(body: RollingBall, c: float) -> Law:
-    return Law(body, force=lambda v: -c * body.ball.mass * v)
-
-
-def _damps_spin(body: RollingBall, c: float) -> Law:
-    return Law(body, moment=lambda _e1, _v, w: -c * body.ball.inertia * w)
-
-
-def _damps_both(body: RollingBall, c: float) -> Law:
-    return Law(body, force=lambda v: -c * body.ball.mass * v, moment=lambda _e1, _v, w: -c * body.ball.inertia * w)
-
-
-_DAMPING = "find the engine's own damping, drag or sleeping, and switch it off"
 NUMBERS: tuple[Any, ...] = (
     number(
         "inertia",
@@ -152,7 +140,7 @@ NUMBERS: tuple[Any, ...] = (
         "while it slips the friction is the kinetic coefficient times N",
         only=is_bounded,
     ),
-    load("damping", "the velocity is damped at a rate of {value:.4g} per second", _damps_velocity, _DAMPING),
-    load("damping", "the spin is damped at a rate of {value:.4g} per second", _damps_spin, _DAMPING),
-    load("damping", "velocity and spin are damped at a rate of {value:.4g} per second", _damps_both, _DAMPING),
+    damping("the velocity is", 1.0, 0.0),
+    damping("the spin is", 0.0, 1.0),
+    damping("velocity and spin are", 1.0, 1.0),
 )

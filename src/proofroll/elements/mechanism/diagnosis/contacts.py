@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -27,7 +28,10 @@ _TURNS = 0.3  # rad: slip and friction that turn less tell no shape of a cone
 _FEW = 3  # frictions that one angle does not bring to a square by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
 _HELD = 1e-6  # part of a mechanism's speed below which the truth sticks
-COVERS = ("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
+# Contacts move all that there is: another cause of it is not looked for.
+contact_cause = functools.partial(
+    Cause, covers=("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
+)
 
 
 @dataclass(frozen=True)
@@ -137,7 +141,7 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
             says = f"friction of {name} is {'off' if off else said_factor(factor)}"
             after = float(np.abs(T - (0.0 if off else factor) * full).max())
             proof = "friction of what slides", "N", float(np.abs(T - full).max()), after
-            yield Cause("friction", says, *proof, "give each pair its own coefficient", 0 if off else 1, COVERS)
+            yield contact_cause("friction", says, *proof, "give each pair its own coefficient", 0 if off else 1)
 
 
 @hypothesis("contact left out", "a contact never presses, and its shapes overlap where the truth presses them apart")
@@ -150,17 +154,8 @@ def left_out(evidence: Evidence) -> Iterator[Cause]:
             if sunk and not touch.presses[:, k].any():
                 before, after = float(np.nanmax(np.abs(true[1:, k]))), float(np.abs(touch.N[1:, k]).max())
                 says = f"the contact {contact.name} is left out"
-                yield Cause(
-                    "left out",
-                    says,
-                    f"normal force of {contact.name}",
-                    "N",
-                    before,
-                    after,
-                    "let the pair touch",
-                    0,
-                    COVERS,
-                )
+                force = f"normal force of {contact.name}"
+                yield contact_cause("left out", says, force, "N", before, after, "let the pair touch")
 
 
 @hypothesis(
@@ -181,7 +176,7 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
         says, name = "convex cone: the sliding contact hops at u_n = μ|u_t|", "speed along the normal at the start"
         after = float(np.abs(began - rises[which]).max())
         remedy = "no step mends it: correct the normal rows (MuJoCo's preset tuned), or take Coulomb's own law"
-        yield Cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy, 0, COVERS)
+        yield contact_cause("convex cone", says, name, "m/s", float(rises[which].max()), after, remedy)
 
 
 @hypothesis("friction pyramid", "friction that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample")
@@ -199,13 +194,8 @@ def _of_a_square(
 ) -> Iterator[Cause]:
     """The cause that friction is bounded by a square.
 
-    Args:
-        n: normals, (samples, 3).
-        u: slips [m/s], (samples, 3).
-        T: friction [N], (samples, 3).
-        full: Coulomb's friction for these slips [N], (samples, 3).
-        bound: its size [N], (samples,).
-        least: natural force [N]; a small part of it is none.
+    Arrays over samples: normals, slips [m/s], friction T and Coulomb's friction ``full`` [N], (samples, 3); its size
+    [N], (samples,). A small part of ``least``, a natural force [N], counts as none.
     """
     if np.abs(n - n[0]).max() > _FORCE:
         return
@@ -220,7 +210,7 @@ def _of_a_square(
     sides = np.abs(np.einsum("aij,kj->aki", turned, T @ plane.T)).sum(axis=-1)
     after = float(np.abs(sides - bound).max(axis=1).min())
     says = "friction pyramid: friction is bounded by a square about two axes, not by a circle"
-    yield Cause("pyramid", says, "friction of what slides", "N", against, after, "choose the elliptic cone", 1, COVERS)
+    yield contact_cause("pyramid", says, "friction of what slides", "N", against, after, "choose the elliptic cone", 1)
 
 
 @hypothesis(
@@ -268,9 +258,8 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         speed = float(np.sum(slip * used) / np.sum(used * used))
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
         after = float(np.abs(slip - speed * used).max())
-        yield Cause(
-            "creep", says, "slip of what sticks", "m/s", float(slip.max()), after, "make that speed smaller", 1, COVERS
-        )
+        proof = "slip of what sticks", "m/s", float(slip.max()), after
+        yield contact_cause("creep", says, *proof, "make that speed smaller", 1)
 
 
 @hypothesis(
@@ -300,9 +289,8 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
 
     def cause(says: str, after: float, remedy: str, fitted: int = 0) -> Cause:
         name = "acceleration at time 0"
-        return Cause(
-            "contacts at time 0", says, name, "m/s^2", before, after, remedy, fitted, COVERS, explains=found.size
-        )
+        proof = name, "m/s^2", before, after
+        return contact_cause("contacts at time 0", says, *proof, remedy, fitted, explains=found.size)
 
     def scaled(factor: float) -> tuple[Any, ...]:
         return tuple(replace(pair, friction=factor * pair.friction) for pair in pairs)

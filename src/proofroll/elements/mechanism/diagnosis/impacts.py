@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import said_factor
-from proofroll.elements.mechanism.diagnosis.contacts import COVERS, SeenContact, touch_of
+from proofroll.elements.mechanism.diagnosis.contacts import SeenContact, contact_cause, touch_of
 
 _DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
 _REAL = 1e-9  # imaginary part of a real root [s]
@@ -35,19 +35,10 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             steps = np.round(2 * np.mean(delays) / evidence.step) / 2
             says = f"impacts come {said_delay(float(np.mean(delays)), evidence.step)}"
             after = float(np.max(np.abs(delays - steps * evidence.step) + delay_bars))
-            yield Cause(
-                "late impact",
-                says,
-                "time of impacts",
-                "s",
-                size,
-                after,
-                "let the impact act in the step in which the gap closes",
-                1,
-                COVERS,
-                closes=CLOSES * min(1.0, evidence.step / size),  # any delay is near some multiple of half a step
-                explains=len(met),
-            )
+            proof = "time of impacts", "s", size, after
+            remedy = "let the impact act in the step in which the gap closes"
+            closes = CLOSES * min(1.0, evidence.step / size)  # any delay is near some multiple of half a step
+            yield contact_cause("late impact", says, *proof, remedy, 1, closes=closes, explains=len(met))
         own = np.array([law[k] for k, _ in met])
         before = float(np.abs(seen - own).max())
         if before <= _RATIO:
@@ -57,32 +48,13 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
             moved = dict(zip(of_each, order, strict=True))
             after = float(np.max(np.abs(seen - [law[moved[k]] for k, _ in met]) + seen_bars))
             swaps = "; ".join(f"{names[a]} has that of {names[b]}" for a, b in moved.items() if a != b)
-            yield Cause(
-                "restitution",
-                f"restitution is of another pair: {swaps}",
-                "restitution",
-                "1",
-                before,
-                after,
-                "give each pair its own",
-                0,
-                COVERS,
-            )
+            says = f"restitution is of another pair: {swaps}"
+            yield contact_cause("restitution", says, "restitution", "1", before, after, "give each pair its own")
         factor = float(seen @ own / (own @ own)) if own.any() else np.nan
         says = f"restitution of all pairs is {said_factor(factor)}"
         after = float(np.max(np.abs(seen - factor * own) + seen_bars))
-        yield Cause(
-            "restitution",
-            says,
-            "restitution",
-            "1",
-            before,
-            after,
-            "look at what the engine makes of it",
-            1,
-            COVERS,
-            explains=len(met),
-        )
+        proof = "restitution", "1", before, after
+        yield contact_cause("restitution", says, *proof, "look at what the engine makes of it", 1, explains=len(met))
 
 
 def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, float]]:

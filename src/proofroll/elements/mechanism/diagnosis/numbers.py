@@ -49,6 +49,18 @@ def _masses(mechanism: Mechanism, x: float) -> Change:
     return Change(mechanism, mass=x * np.array([body.mass for body in mechanism.bodies]))
 
 
+def _of_joints(name: str, law: str, what: str, give: str) -> Hypothesis:
+    """Hypothesis: a law of all joints has one factor; only its armature, an inertia, cannot have the wrong sign."""
+    return factor_of_all(
+        name,
+        f"the {what} of the joints",
+        lambda m, x: Change(m, **{law: x}),  # type: ignore[arg-type]  # a factor by its name
+        lambda m: any(getattr(joint, law) for joint in m.joints),
+        f"give the joints {give}",
+        signed=law != "armature",
+    )
+
+
 FACTORS_OF_ALL: tuple[Any, ...] = (
     factor_of_all(
         "gravity",
@@ -61,42 +73,16 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
     factor_of_all(
         "inertia", "all inertias", _inertias, lambda m: bool(m.bodies), "give each body its inertia once", False
     ),
-    factor_of_all(
+    _of_joints(
         "joint damping",
-        "the damping of the joints",
-        lambda m, x: Change(m, damping=x),
-        lambda m: any(joint.damping for joint in m.joints),
-        "give the joints their damping, as a moment per rad/s or a force per m/s against the motion",
+        "damping",
+        "damping",
+        "their damping, as a moment per rad/s or a force per m/s against the motion",
     ),
-    factor_of_all(
-        "joint friction",
-        "the dry friction of the joints",
-        lambda m, x: Change(m, friction=x),
-        lambda m: any(joint.friction for joint in m.joints),
-        "give the joints their dry friction, against the motion",
-    ),
-    factor_of_all(
-        "joint stiffness",
-        "the stiffness of the joints",
-        lambda m, x: Change(m, stiffness=x),
-        lambda m: any(joint.stiffness for joint in m.joints),
-        "give the joints their stiffness, per rad or per m",
-    ),
-    factor_of_all(
-        "joint torque",
-        "the drives of the joints",
-        lambda m, x: Change(m, torque=x),
-        lambda m: any(joint.torque for joint in m.joints),
-        "give the joints their drive, on the child against the parent",
-    ),
-    factor_of_all(
-        "armature",
-        "the armature of the joints",
-        lambda m, x: Change(m, armature=x),
-        lambda m: any(joint.armature for joint in m.joints),
-        "give the joints their armature",
-        False,
-    ),
+    _of_joints("joint friction", "friction", "dry friction", "their dry friction, against the motion"),
+    _of_joints("joint stiffness", "stiffness", "stiffness", "their stiffness, per rad or per m"),
+    _of_joints("joint torque", "torque", "drives", "their drive, on the child against the parent"),
+    _of_joints("armature", "armature", "armature", "their armature"),
     factor_of_all(
         "springs",
         "the stiffness of the springs",
@@ -138,13 +124,12 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
         for i, body in enumerate(mechanism.bodies if len(mechanism.bodies) > 1 else ()):
             one = np.arange(len(mass)) == i
 
-            def heavier(x: float, one: Any = one) -> Change:
-                return Change(mechanism, mass=np.where(one, x, 1.0) * mass)
+            for what, own in (("mass", mass), ("inertia", inertia)):
 
-            def stiffer(x: float, one: Any = one) -> Change:
-                return Change(mechanism, inertia=np.where(one, x, 1.0)[:, None, None] * inertia)
+                def change(x: float, what: str = what, own: FloatArray = own, one: Any = one) -> Change:
+                    scaled = (np.where(one, x, 1.0) * own.T).T
+                    return Change(mechanism, **{what: scaled})  # type: ignore[arg-type]  # an array by its name
 
-            for what, change in (("mass", heavier), ("inertia", stiffer)):
                 factor, number = best(held, change)
                 if not possible(factor, False):
                     continue
