@@ -189,13 +189,14 @@ def scatter_of(precision: str, size: float, steps: float) -> float:
     return EPSILON[precision] * size * steps**0.5 if precision == "single" else 0.0
 
 
-def is_floor(best: float, finest: float, scale: float | None) -> bool:
-    """True if the least error of a refinement is a floor of single precision.
+def is_floor(errors: Sequence[float], scale: float | None) -> bool:
+    """True if the errors of ever shorter steps reach a floor of single precision.
 
-    It is small against the scale of the observable, should it have one, and the shortest step is clearly worse: before
-    the order of a scheme shows, errors may be as large as the motion and rise a little with shorter steps, too.
+    The least is small against the scale of the observable, should it have one, and some step is clearly worse than a
+    longer one: before the order of a scheme shows, errors may be as large as the motion and rise a little, too.
     """
-    return (not scale or best <= _LARGE * scale) and finest > _WORSE * best
+    rises = any(later > _WORSE * earlier for earlier, later in itertools.combinations(errors, 2))
+    return rises and (not scale or min(errors) <= _LARGE * scale)
 
 
 def floor_text(step: float, error: float, unit: str) -> str:
@@ -217,8 +218,9 @@ def floor_of(errors: Mapping[float, float], scale: float | None, unit: str) -> s
         scale: of the observable; None: it has none.
         unit: of the errors; 1: none.
     """
-    best, least = min(errors, key=lambda step: errors[step]), min(errors)
-    return floor_text(best, errors[best], unit) if is_floor(errors[best], errors[least], scale) else ""
+    best = min(errors, key=lambda step: errors[step])
+    falling = [errors[step] for step in sorted(errors, reverse=True)]
+    return floor_text(best, errors[best], unit) if is_floor(falling, scale) else ""
 
 
 def size(values: FloatArray) -> float:

@@ -153,8 +153,8 @@ def _remarks(runs: list[Run]) -> list[str]:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
         where = at_point(run.parameters)
         remarks += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
-    # beyond its tolerance the reason of the verdict has it
-    floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.error <= item.tolerance]
+    # of any other verdict the reason has it
+    floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.verdict is Verdict.AGREES]
     if floors:
         run, item = max(floors, key=lambda pair: pair[1].error / pair[1].tolerance)
         remarks.append(f"{item.observable}{at_point(run.parameters)}: {item.floor}")

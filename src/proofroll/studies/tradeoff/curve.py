@@ -178,7 +178,7 @@ class Curve:
         best = done.index(used[least + 1])
         while best and errors[best - 1] <= errors[best]:  # an error that cancels at one step alone is not reached
             best -= 1
-        if not is_floor(errors[best], errors[-1], done[best].scales.get(quantity)):
+        if not is_floor(errors[best:], done[best].scales.get(quantity)):
             return None
         return Floor(done[best], errors[best], changes[least + 1])
 
