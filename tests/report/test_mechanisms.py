@@ -125,6 +125,33 @@ def test_forces_of_contact_are_replayed_at_the_shapes() -> None:
     ]
 
 
+def test_bodies_of_vertices_are_replayed_as_rods_around_them() -> None:
+    """A block of two corners has rods from its centre of mass to both, and one between them."""
+    scene = load_scene("rocking_block")
+    case, _, _ = drawn(Replayed(scene, truth(scene, np.linspace(0.0, 0.02, 3)), "", [], "block", "as it is"))
+    left, right = [-0.1, 0.0, -0.25], [0.1, 0.0, -0.25]
+    rods = case["bodies"][0]["rods"]
+    assert [[0.0, 0.0, 0.0], left] in rods
+    assert [[0.0, 0.0, 0.0], right] in rods
+    assert [left, right] in rods
+
+
+def test_the_picture_holds_whole_shapes() -> None:
+    """Around what moves, the box that the camera shows reaches as far as the sphere, not as its centre of mass."""
+    scene = load_scene("eccentric_sphere")
+    true = truth(scene, np.linspace(0.0, 0.02, 3))
+    _, _, numbers = drawn(Replayed(scene, true, "", [], "sphere", "as it is"))
+    content, at = bytes(numbers.content), 0
+    for name, _, width, length, least in numbers.arrays:
+        if name == "extent":
+            shuffled = np.frombuffer(content[at : at + 4 * width * length], np.uint8).reshape(4, -1)
+            low, high = np.ascontiguousarray(shuffled.T).view("<i4").reshape(length, width).cumsum(axis=0) * least
+        at += 4 * width * length
+    assert low == pytest.approx([-0.1, -0.1, 0.0], abs=1e-3)
+    path = true["p_WB"].to_numpy()[-1, 0]
+    assert high == pytest.approx([0.1 + path[0], 0.1 + path[1], 0.2], abs=1e-3)
+
+
 def test_nothing_is_replayed_of_a_motion_that_is_not_unique() -> None:
     """Where laws alone are known of a scene, there is no true motion beside which runs could be drawn."""
     scene = load_scene("painleve_rod")

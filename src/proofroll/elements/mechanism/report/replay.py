@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from typing import Any
 
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
-from proofroll.elements.mechanism.checks import WORLD, Vector
+from proofroll.elements.mechanism.checks import WORLD, ZERO, Vector
 from proofroll.elements.mechanism.contacts.geometry import BodyContact, Geometry
 from proofroll.elements.mechanism.contacts.observables import SLIDES
 from proofroll.elements.mechanism.contacts.shapes import HalfSpace
@@ -54,7 +55,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     """
     element = the_mechanism(replayed.scene)
     mechanism, length = element.mechanism, element.length
-    bodies, skeleton = [*element.bodies, WORLD], mechanism.fastened
+    bodies, rods = [*element.bodies, WORLD], _rods(element)
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
     # Of contacts the force on the shape that is no plane, at its middle; what is not determinate is not drawn
     touching = [_touching(contact) for contact in mechanism.contacts]
@@ -78,9 +79,13 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     numbers = PackedNumbers()
     coms = {body.name: body.com for body in mechanism.bodies}
     com = np.stack([placed.point(*place) for place in coms.items()], axis=1)
-    ends = [placed.point(body, at) for body, places in skeleton.items() for at in places]
+    reached = np.concatenate(
+        [placed.point(body, at) for body, places in mechanism.fastened.items() for at in places]
+        + [_outline(contact, placed) for contact in mechanism.contacts]
+        + [com.reshape(-1, 3)]
+    )
     numbers.put("middle", -1, com.mean(axis=1), least)
-    numbers.put("extent", 0, np.concatenate([com, *(end[:, None] for end in ends)], axis=1).reshape(-1, 3), least)
+    numbers.put("extent", 0, np.stack([reached.min(axis=0), reached.max(axis=0)]), least)
     shown = _columns(true, [name for name, _ in readings], times)
     numbers.put("readings", 0, shown, 2.0**-20 * (float(np.abs(shown).max(initial=0.0)) or 1.0))
     force = _columns(true, names, times) * signs
@@ -105,8 +110,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
         "events": [],
         "readings": [{"symbol": symbol(name), "unit": unit(text), "size": float(np.abs(shown[:, column]).max())}
                      for column, (name, text) in enumerate(readings)],
-        "bodies": [{"com": coms.get(name), "rods": [[coms[name], at] for at in skeleton[name] if name in coms]}
-                   for name in bodies],
+        "bodies": [{"com": coms.get(name), "rods": rods.get(name, [])} for name in bodies],
         "joints": [{"body": index[body], "at": at} for _, body, at in joints],
         "contacts": len(touching),
         "slips": SLIDES * element.speed,
@@ -117,6 +121,28 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
         "falls": any(joint.kind == "free" for joint in mechanism.joints),
     }  # fmt: skip
     return dict(plain(case)), [motion.time.size for motion in ghosts], numbers
+
+
+def _rods(element: MechanismElement) -> dict[str, list[list[Vector]]]:
+    """Ends of the rods of each body [m]: from its centre of mass to what is fastened there, and around its vertices."""
+    mechanism = element.mechanism
+    rods = {body.name: [[body.com, at] for at in mechanism.fastened[body.name]] for body in mechanism.bodies}
+    for body in mechanism.bodies:
+        own = [item for item in mechanism.geometries if item.body == body.name and item.kind == "sphere"]
+        vertices = [item.position for item in own if item.position != body.com] if len(own) > 1 else []
+        rods[body.name] += [[body.com, at] for at in vertices]
+        rods[body.name] += [list(ends) for ends in itertools.combinations(vertices, 2)]
+    return rods
+
+
+def _outline(contact: BodyContact, placed: Placed) -> FloatArray:
+    """Outermost places of a contact's shape that is no plane, along the world's axes, at all frames, shape (n, 3)."""
+    body, _, sign = _touching(contact)
+    shape = contact.shape_a if sign > 0 else contact.shape_b
+    assert not isinstance(shape, HalfSpace)
+    origin, turned = placed.point(body, ZERO), placed.R_WB[:, placed.mechanism.body_index[body]]
+    ways = np.concatenate([np.eye(3), -np.eye(3)])
+    return np.array([p + R @ shape.support(way @ R)[0] for p, R in zip(origin, turned, strict=True) for way in ways])
 
 
 def _touching(contact: BodyContact) -> tuple[str, Vector, float]:

@@ -76,6 +76,11 @@ replayed.mechanism = (replay) => {
       mesh.quaternion.set(...turn);
       mesh.scale.set(...half.map((one) => one || 1));
       groups[body].add(mesh);
+      // A round shape shows by a line on it that it turns: a radius on a disc, two great circles on the others.
+      const round = (from, to) => Array.from({ length: 65 }, (_, k) => from.clone().multiplyScalar(Math.cos((Math.PI * k) / 32)).addScaledVector(to, Math.sin((Math.PI * k) / 32)));
+      const [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => new T.Vector3(...axis));
+      const lines = { circle: [[new T.Vector3(), x]], sphere: [round(x, z), round(y, z)], ellipsoid: [round(x, z), round(y, z)] }[kind] || [];
+      for (const line of lines) mesh.add(new T.Line(new T.BufferGeometry().setFromPoints(line), new T.LineBasicMaterial({ color: tone, transparent: true, opacity: ghost ? 0.4 : 0.8 })));
     }
     groups.forEach((group) => group.traverse((item) => { item.renderOrder = ghost ? 3 : 0; }));
     const springs = shown.springs.map(() => {
@@ -151,7 +156,10 @@ replayed.mechanism = (replay) => {
   ];
 
   // The camera follows where the mechanism would be lost in its way.
-  const reach = (size) => (size > (replay.shown.falls ? 40 : 75) * replay.shown.scale ? 30 * replay.shown.scale : size);
+  const reach = (size) => {
+    const { scale, shapes, falls } = replay.shown, widest = Math.max(0, ...shapes.filter(({ kind }) => kind !== "plane").flatMap(({ half }) => half));
+    return size > (falls ? 40 : 75) * scale ? Math.min(size, Math.max(30 * scale, 1.6 * widest)) : size;
+  };
 
   return { columns, rows, write, compare, build, draw, key, reach };
 };
