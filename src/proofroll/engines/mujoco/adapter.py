@@ -30,10 +30,9 @@ from proofroll.engines.mujoco.mechanism import MujocoMechanism
 from proofroll.engines.mujoco.mechanism_geoms import MujocoGeoms
 from proofroll.engines.mujoco.model import read_spec, write_physics
 from proofroll.engines.mujoco.running import SteppedModel, compiled, forget_callbacks, silent, written
-from proofroll.engines.mujoco.settings import PRESETS, ROLLS, MujocoSettings, check, check_restitution, lowered
+from proofroll.engines.mujoco.settings import PRESETS, ROLLS, TERMS, MujocoSettings, check, check_restitution, lowered
 from proofroll.engines.mujoco.softness import softness
 from proofroll.engines.mujoco.start import EVALUATIONS, accelerations, start
-from proofroll.engines.mujoco.terms import TERMS
 
 _FORMULATIONS: Mapping[str, type[Formulation]] = {"free": Free, "chart": Chart, "facets": Facets}
 _MECHANISMS: Mapping[str, type[MujocoMechanism]] = {"joints": MujocoMechanism, "geoms": MujocoGeoms}

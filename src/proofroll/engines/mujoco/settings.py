@@ -10,6 +10,7 @@ import mujoco
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BeforeValidator
 
+from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
 from proofroll.elements.ball_on_surface.model import BallCapability
@@ -320,3 +321,51 @@ PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
         "tuned": MujocoSettings("geoms", "tuned", integrator="Euler", cone_correction=True),
     },
 }
+
+
+TERMS = (
+    Term(
+        "friction against turning (condim 4)",
+        ("chart", "free"),
+        {"condim": TURNS},
+        {"condim": SLIDES},
+        "resists the spin about the normal, on which the ball's motion on a curved wall hangs",
+        rung=True,
+    ),
+    Term(
+        "friction against turning and rolling (condim 6)",
+        ("chart", "free"),
+        {"condim": ROLLS},
+        {"condim": SLIDES},
+        "looks like rolling resistance, but sliding, turning and rolling share one cone",
+        rung=True,
+    ),
+    Term(
+        "settled start",
+        ("chart", "free"),
+        {"start": "settled"},
+        {"start": "touching"},
+        "starts the soft contact at the depth at which it already bends the path as the wall does",
+    ),
+    Term(
+        "curvature (J̇v)",
+        ("free",),
+        {"curvature": True},
+        {"curvature": False},
+        "adds to the contact's rows the turning of the normal, which MuJoCo leaves out",
+    ),
+    Term(
+        "damping of the slip",
+        ("free",),
+        {"friction_damping": 1.9},
+        {"friction_damping": None},
+        "lets the creep of the step cancel that of the missing J̇v",
+    ),
+    Term(
+        "correction of the cone",
+        ("chart", "free"),
+        {"cone_correction": True},
+        {"cone_correction": False},
+        "takes away the lift that MuJoCo's convex cone gives a slipping ball",
+    ),
+)

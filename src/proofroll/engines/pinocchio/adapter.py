@@ -17,7 +17,7 @@ from proofroll.elements.ball_on_surface.model import ALL_OF_A_BALL, BallCapabili
 from proofroll.elements.mechanism.capabilities import MechanismCapability, require
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.pinocchio import constraint_dynamics, impulses, joint_tree
-from proofroll.engines.pinocchio.contact_run import ContactRun
+from proofroll.engines.pinocchio.contact import ContactRun
 from proofroll.engines.pinocchio.impulse_run import ImpulseRun
 from proofroll.engines.pinocchio.mechanism_run import MechanismRun
 from proofroll.engines.pinocchio.rows_run import RowsRun

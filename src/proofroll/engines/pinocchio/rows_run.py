@@ -15,8 +15,7 @@ from proofroll.engines.pinocchio.composite import Composite
 from proofroll.engines.pinocchio.free_flyer import FreeFlyer
 from proofroll.engines.pinocchio.integrators import Adaptive, SemiImplicitEuler, TangentIntegrator, TangentRungeKutta4
 from proofroll.engines.pinocchio.settings import PinocchioSettings
-from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip
-from proofroll.engines.pinocchio.stick_slip_steps import StickSlipEuler, StickSlipRungeKutta4
+from proofroll.engines.pinocchio.stick_slip import AdaptiveStickSlip, StickSlipEuler, StickSlipRungeKutta4
 
 # Of a ball that rolls, and of one that can slip.
 _INTEGRATORS = {

@@ -1,12 +1,31 @@
-"""Protocol of a contact mode: its own state y and equations, and the margins that end it."""
+"""Modes of contact: by static friction, rolling or at rest, and by kinetic friction, with two descriptions of one slip.
+
+A slip is described by its size ρ = |u| and its direction, which are states of their own, because the difference
+C v would lose the digits of a small slip; elimination then holds C v to them. There are two descriptions, since the
+direction is stiff where ρ is small. It obeys ρ φ̇ = -|b| sin(φ - ψ), with ψ the direction of the drive b: it relaxes
+within ρ/|b|. A slip that starts grazing (ρ ~ t²) starts with no slip and infinite stiffness.
+
+* :class:`SlavedSlip`, while ρ/|b| is below a small part ε of the time scale T of the motion: the direction follows
+  the drive. Its asymptotic value φ = ψ - ρ ψ̇ / (|b| + ρ̇) is exact to second order in ρ/|b|, and unlike an explicit
+  start with some tiny ρ it needs neither ρ > 0 nor small steps: the slip starts at ρ = 0, where the cone was left.
+* :class:`FreeSlip`: φ is integrated.
+
+The angle between both at the change is of the order ε² (T ψ̇)², some 1e-9 rad, and dies out within ρ/|b| of it. So ε
+is no parameter of the result but of the cost: the steps that an explicit method needs fall like 1/√ε.
+"""
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from enum import Enum, auto
-from typing import NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
+
+import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.engines.projection.friction import Friction, SlidingForces, along
+from proofroll.engines.projection.method import Kinematics, ProjectedBall
 
 # Slower than this part of the pace of the motion, a contact point or a centre stands still: 1e-14 s before it does.
 _STILL = 1e-13
@@ -68,29 +87,34 @@ class Pace(NamedTuple):
         return _SETTLED * self.speed
 
 
-class ContactMode(Protocol):
-    """One mode of contact."""
+class ContactMode(ABC):
+    """One mode of contact: its own state y and equations, and the margins that end it.
 
-    @property
-    def sticking(self) -> bool:
-        """True if the contact holds by static friction."""
+    Attributes:
+        sticking: whether the contact holds by static friction.
+        exits: that can end it, in the order of :attr:`Survey.margins`.
+    """
 
-    @property
-    def exits(self) -> tuple[Exit, ...]:
-        """Exits that can end it, in the order of :attr:`Survey.margins`."""
+    sticking: ClassVar[bool]
+    exits: tuple[Exit, ...]
 
+    @abstractmethod
     def rates(self, y: FloatArray) -> FloatArray:
         """ẏ."""
 
+    @abstractmethod
     def x(self, y: FloatArray) -> FloatArray:
         """Coordinates and velocities [q, s]."""
 
+    @abstractmethod
     def eliminated(self, y: FloatArray) -> FloatArray:
         """The state with C v brought to the slip that y says."""
 
+    @abstractmethod
     def survey(self, y: FloatArray) -> Survey:
         """Margins of the mode to its end."""
 
+    @abstractmethod
     def force(self, y: FloatArray) -> FloatArray:
         """Force of the wall on the ball along the local axes [N], shape (3,)."""
 
@@ -98,3 +122,233 @@ class ContactMode(Protocol):
 def time_left(size: float, growth: float) -> float:
     """Time until a size reaches zero at its present rate."""
     return size / -growth if growth < 0 else math.inf
+
+
+# While the cone leaves more than this part of itself, the needed friction cannot leave it and be back within one step:
+# a crest that high is many steps wide.
+_CLEAR = 0.25
+
+
+class _Held(ContactMode):
+    """Base of the modes with active rows."""
+
+    sticking = True
+
+    def __init__(self, ball: ProjectedBall, friction: Friction) -> None:
+        self._ball, self._friction = ball, friction
+
+    def rates(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return self._ball.rates(y)
+
+    def x(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return y
+
+    def eliminated(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return self._ball.eliminated(y)
+
+    def force(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return self._ball.contact_force(self._ball.response_at(y))
+
+
+class Stick(_Held):
+    """Rolling without slip: both rows active."""
+
+    def __init__(self, friction: Friction, pace: Pace) -> None:
+        super().__init__(friction.rolling, friction)
+        self._pace = pace
+        self.halts = friction.rolling.rolling_resistance > 0
+        # Where friction has no bound nobody looks for a slip.
+        self.exits = (*((Exit.CONE,) if friction.bounded else ()), *((Exit.HALT,) if self.halts else ()))
+
+    def survey(self, y: FloatArray) -> Survey:
+        """See :class:`ContactMode`. Rolling resistance shortens steps towards where the centre stands still."""
+        kin, trend = self._ball.kinematics(y), 0.0
+        response = self._ball.response(kin)
+        cone: tuple[float, ...] = ()
+        if self._friction.bounded:
+            reserve = self._friction.reserve(response)
+            cone = (reserve,)
+            if reserve <= _CLEAR * self._friction.mu_static * response.N:
+                span = DIFFERENCE * self._pace.time
+                ahead = self._ball.response_at(y + span * self._ball.derivative(kin, response))
+                trend = (self._friction.reserve(ahead) - reserve) / span
+        if not self.halts:
+            return Survey(cone, trend)
+        (v2, v3), along = kin.v[1:3], response.rate[1:3]
+        speed = math.hypot(v2, v3)
+        slowing = (v2 * along[0] + v3 * along[1]) / speed if speed else 0.0
+        longest = self._pace.reach * time_left(speed, slowing)
+        return Survey((*cone, speed - self._pace.still), trend, longest=longest)
+
+    def glance(self, y: FloatArray, before: Survey, elapsed: float) -> Survey:
+        """The survey of a ball that nothing but its own stop can end, from the one a step of ``elapsed`` [s] before.
+
+        How fast the centre slows down is read off that step, which spares an evaluation of the equations.
+        """
+        speed = self._ball.speed(y)
+        margin = speed - self._pace.still
+        growth = (margin - before.margins[0]) / elapsed
+        return Survey((margin,), longest=self._pace.reach * time_left(speed, growth))
+
+
+class Rest(_Held):
+    """The centre stands still, held by friction and rolling resistance; the ball may spin about the normal.
+
+    Two more rows, ω2 = 0 and ω3 = 0, whose multipliers are the moment of the resistance: a bound, as friction is.
+    """
+
+    exits = ()
+
+    def __init__(self, friction: Friction) -> None:
+        super().__init__(friction.rolling.under("centre"), friction)
+
+    def holds(self, x: FloatArray) -> bool:
+        """True if friction and resistance can both hold the ball at x."""
+        response = self._ball.response_at(x)
+        moment = self._ball.radius * math.hypot(response.F2, response.F3)  # that holds the ball against the friction
+        return self._friction.reserve(response) >= 0 and moment <= self._ball.rolling_resistance * response.N
+
+    def released(self, x: FloatArray, speed: float) -> FloatArray:
+        """The state x with a speed of the centre [m/s], too small to matter, in the direction in which it sets off.
+
+        It gives the resistance a direction, which it has not at rest.
+        """
+        ball = self._ball.under("contact")
+        ball.rolling_resistance = 0.0
+        response = ball.response_at(x)
+        pull = math.hypot(*response.rate[1:3])  # nothing drifts where the centre stands still
+        result = x.copy()
+        result[-5:-3] += speed / pull * np.array(response.acceleration[:2])
+        return ball.eliminated(result)
+
+    def survey(self, y: FloatArray) -> Survey:  # noqa: ARG002 -- nothing changes any more
+        """See :class:`ContactMode`."""
+        return Survey(())
+
+
+# ε: the start of a slip ends where its direction relaxes more slowly than this part of T.
+START = 1e-3
+# A slip that dies out this much faster than its direction relaxes (ρ̇ < -0.25 |b|) is not slaved: the asymptotic value
+# assumes that the relaxation wins, and fails altogether at -1.
+_DYING = 0.25
+
+
+class _Slip(ContactMode):
+    """Base of both descriptions of slip: ``size`` numbers of a slip behind x."""
+
+    sticking = False
+    size: ClassVar[int]
+
+    def __init__(self, friction: Friction, pace: Pace) -> None:
+        self._friction, self._ball, self._pace = friction, friction.sliding, pace
+
+    @abstractmethod
+    def look(self, y: FloatArray) -> SlidingForces:
+        """The slip at y."""
+
+    def x(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return y[: -self.size]
+
+    def force(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        return self._ball.contact_force(self.look(y).response)
+
+
+class SlavedSlip(_Slip):
+    """Slip whose direction follows the drive. y = [x, ρ]."""
+
+    exits = (Exit.STILL, Exit.LIFTOFF, Exit.CHANGE)
+    size = 1
+
+    def look(self, y: FloatArray) -> SlidingForces:
+        """The slip at y."""
+        x, rho = y[:-1], float(y[-1])
+        kin = self._ball.kinematics(x)
+        drive = self._friction.drive(kin)
+        psi = math.atan2(drive[1], drive[0])
+        sliding = self._friction.slide(kin, along(psi))
+        span = self._span(kin, sliding)
+        if rho == 0.0 or span == 0.0:
+            return sliding
+        ahead = self._friction.drive(self._ball.kinematics(x + span * self._ball.derivative(kin, sliding.response)))
+        turned = math.atan2(drive[0] * ahead[1] - drive[1] * ahead[0], drive[0] * ahead[0] + drive[1] * ahead[1])
+        lag = rho * turned / span / (sliding.strength + sliding.growth)
+        return self._friction.slide(kin, along(psi - lag))
+
+    def _span(self, kin: Kinematics, sliding: SlidingForces) -> float:
+        """Time [s] over which to difference the drive, in which the resistance jumps where the centre stands still."""
+        span = DIFFERENCE * self._pace.time
+        if not self._ball.rolling_resistance:
+            return span
+        return min(span, 0.1 * math.hypot(*kin.v[1:3]) / (math.hypot(*sliding.response.rate[1:3]) or 1.0))
+
+    def rates(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        sliding = self.look(y)
+        return np.append(self._ball.derivative(sliding.kin, sliding.response), sliding.growth)
+
+    def eliminated(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        (d2, d3), rho = self.look(y).direction, float(y[-1])
+        return np.append(self._friction.rolling.eliminated(y[:-1], (rho * d2, rho * d3)), rho)
+
+    def survey(self, y: FloatArray) -> Survey:
+        """See :class:`ContactMode`."""
+        sliding, rho = self.look(y), float(y[-1])
+        slow = START * self._pace.time * sliding.strength - rho
+        dying = sliding.growth + _DYING * sliding.strength
+        return Survey((rho, sliding.response.N, min(slow, dying)), longest=self._pace.time)
+
+    def freed(self, y: FloatArray) -> FloatArray:
+        """The same slip as a state of :class:`FreeSlip`."""
+        d = self.look(y).direction
+        return np.append(y, math.atan2(d[1], d[0]))
+
+
+class FreeSlip(_Slip):
+    """Slip in polar variables: y = [x, ρ, φ] with u = ρ (cos φ, sin φ)."""
+
+    exits = (Exit.STILL, Exit.LIFTOFF)
+    size = 2
+
+    def __init__(self, friction: Friction, pace: Pace) -> None:
+        super().__init__(friction, pace)
+        self._slaved = SlavedSlip(friction, pace)
+
+    def look(self, y: FloatArray) -> SlidingForces:
+        """The slip at y."""
+        return self._friction.slide(self._ball.kinematics(y[:-2]), along(float(y[-1])))
+
+    def rates(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        sliding = self.look(y)
+        rate = self._ball.derivative(sliding.kin, sliding.response)
+        return np.concatenate([rate, [sliding.growth, sliding.across / float(y[-2])]])
+
+    def eliminated(self, y: FloatArray) -> FloatArray:
+        """See :class:`ContactMode`."""
+        (d2, d3), rho = along(float(y[-1])), float(y[-2])
+        x = self._friction.rolling.eliminated(y[:-2], (rho * d2, rho * d3))
+        return np.concatenate([x, y[-2:]])
+
+    def survey(self, y: FloatArray) -> Survey:
+        """See :class:`ContactMode`. The stiff direction bounds a step before it would make the method unstable."""
+        sliding, rho = self.look(y), float(y[-2])
+        N, span = sliding.response.N, DIFFERENCE * self._pace.time
+        ahead = self._ball.kinematics(y[:-2] + span * self._ball.derivative(sliding.kin, sliding.response))
+        trend = (self._ball.normal_force(ahead) - N) / span
+        relaxation = rho / sliding.strength if sliding.strength else math.inf
+        # Not at the same bounds at which a slaved slip ends, so that the two do not alternate.
+        slaved = relaxation < 0.5 * START * self._pace.time and sliding.growth > -0.5 * _DYING * sliding.strength
+        if slaved:
+            d = self._slaved.look(y[:-1]).direction
+            slaved = abs(math.remainder(float(y[-1]) - math.atan2(d[1], d[0]), math.tau)) < START**2
+        change = math.hypot(sliding.growth, sliding.across)
+        doubling = rho / change if change else math.inf
+        longest = min(self._pace.reach * doubling, 0.8 * self._pace.stability * relaxation)
+        return Survey((rho - self._pace.still, N), trend, 1, longest, slaved)

@@ -17,9 +17,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.projection.alternating import WITHOUT_PROGRESS
 from proofroll.engines.projection.friction import Friction
 from proofroll.engines.projection.method import ProjectedBall
-from proofroll.engines.projection.modes import ContactMode, Exit, Pace, Survey
-from proofroll.engines.projection.slipping import FreeSlip, SlavedSlip
-from proofroll.engines.projection.sticking import Rest, Stick
+from proofroll.engines.projection.modes import ContactMode, Exit, FreeSlip, Pace, Rest, SlavedSlip, Stick, Survey
 
 # Times are located to this part of the time scale of the motion, or to round-off of the time itself.
 _LOCATED = 1e-12
