@@ -20,9 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from proofroll.ball_studies.report.kind import BallReport
-from proofroll.ball_studies.report.poses import AWAY, SLIPS, STICKS, poses
-from proofroll.ball_studies.report.replay import LENGTH
-from proofroll.ball_studies.report.wall import middle, wall
+from proofroll.ball_studies.report.replay import AWAY, LENGTH, SLIPS, STICKS, middle, poses, wall
 from proofroll.core.truth import truth
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain

@@ -19,7 +19,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.mechanism.sampling import mechanism_of
 from proofroll.engines.mujoco import Mujoco
-from proofroll.engines.mujoco.reproducer.mechanism_loop import stepped
+from proofroll.engines.mujoco.reproducer import stepped
 from proofroll_benchmarks.bare import Bare, in_vertical_cylinder, is_mechanism
 
 _ON_CONE = 1 - 1e-9

@@ -50,7 +50,7 @@ def versions(
     if robot is not None and scheduler is not None:
         raise InputError("--scheduler", scheduler, "a robot file is checked here; leave the option out")
     if robot is None:
-        from proofroll.studies.versions.subjects import comparisons_about
+        from proofroll.studies.versions.versions import comparisons_about
 
         comparisons = comparisons_about(subject, engine)  # before minutes are spent on environments
     options.require_pages()

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import itertools
+import multiprocessing
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -12,8 +16,12 @@ from typing import Any
 from unittest import SkipTest
 
 from proofroll.conformance import building, declarations, motion, response
-from proofroll.conformance.apart import run_apart
 from proofroll.conformance.subject import Subject, UnlikeSceneError, checked_on, explained, scenes, truth_scenes
+
+# What a check in a process of its own ends with, and those processes: one for each formulation and preset of an engine.
+_PASSED, _SKIPPED, _FAILED = "passed", "skipped", "failed"
+_processes: dict[str, ProcessPoolExecutor] = {}
+
 
 # One per engine.
 _OF_ENGINES: tuple[Callable[[Any], None], ...] = (
@@ -120,10 +128,7 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
     patterns = dict(known or {})
     all_runs = runs(engine)
     if apart:
-        all_runs = (
-            (name, partial(run_apart, _run, failure_text, engine, _of_one_process(engine, name), name))
-            for name, _ in all_runs
-        )
+        all_runs = ((name, partial(_run_apart, engine, name)) for name, _ in all_runs)
     selected = [
         Check(engine, name, next((why for pattern, why in patterns.items() if _fits(name, pattern)), ""), run)
         for name, run in all_runs
@@ -134,8 +139,37 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
     return selected
 
 
-def _run(engine: Any, name: str) -> None:
-    dict(runs(engine))[name]()
+def _run_apart(engine: Any, name: str) -> None:
+    """Runs the check of this name in the process of its formulation and preset, which stays for the next one.
+
+    Raises:
+        AssertionError: it failed there, or the process ended.
+        SkipTest: it has nothing to look at.
+    """
+    place = f"{engine.__module__}.{engine.__qualname__}: {_of_one_process(engine, name)}"
+    if place not in _processes:
+        _processes[place] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+        atexit.register(_processes[place].shutdown, wait=False, cancel_futures=True)
+    try:
+        how, text = _processes[place].submit(_outcome, engine, name).result()
+    except BrokenProcessPool:
+        del _processes[place]
+        raise AssertionError("its process ended without a word, as an engine's own crash ends it") from None
+    if how == _SKIPPED:
+        raise SkipTest(text)
+    if how == _FAILED:
+        raise AssertionError(text)
+
+
+def _outcome(engine: Any, name: str) -> tuple[str, str]:
+    """Outcome of a check with its text, in the process that runs it."""
+    try:
+        dict(runs(engine))[name]()
+    except SkipTest as why:
+        return _SKIPPED, str(why)
+    except Exception as error:
+        return _FAILED, failure_text(error)
+    return _PASSED, ""
 
 
 def _fits(name: str, pattern: str) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.events import Event
-from proofroll.core.failed_run import FailedRun
+from proofroll.core.program_text import FailedRun
 
 if TYPE_CHECKING:
     import xarray as xr

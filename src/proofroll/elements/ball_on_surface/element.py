@@ -16,9 +16,9 @@ from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
 from proofroll.core.errors import InputError, Refused
-from proofroll.core.failed_run import FailedRun
 from proofroll.core.gravity import Gravity
 from proofroll.core.observable import Observable
+from proofroll.core.program_text import FailedRun
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface import certificate, events, failure, natural, observables
 from proofroll.elements.ball_on_surface.dataset import from_samples

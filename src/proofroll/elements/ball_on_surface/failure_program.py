@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from proofroll.core import program_text
-from proofroll.core.failed_run import FailedRun
-from proofroll.core.program_text import asking, assigned
+from proofroll.core.program_text import FailedRun, asking, assigned
 from proofroll.elements.ball_on_surface.failure import (
     BACKWARDS,
     GAIN,

@@ -16,8 +16,8 @@ from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
 from proofroll.core.errors import NotUnique
 from proofroll.core.events import events_of
-from proofroll.core.failed_run import FailedRun
 from proofroll.core.observable import Observable, Role
+from proofroll.core.program_text import FailedRun
 from proofroll.core.time_grid import EVERY
 from proofroll.core.turns import PART
 from proofroll.elements.mechanism.analysis import Analysis, analysed

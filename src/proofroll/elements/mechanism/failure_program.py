@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core import program_text
-from proofroll.core.failed_run import FailedRun
-from proofroll.core.program_text import asking
+from proofroll.core.program_text import FailedRun, asking
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement

@@ -165,11 +165,11 @@ class Exudyn:
     @classmethod
     def reproducer(cls, scene: Scene, settings: ExudynSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.exudyn.reproducer import mechanism, source
+        from proofroll.engines.exudyn.reproducer import mechanism_source, source
 
         model = cls.build(scene, settings)
         if settings.formulation == "spheres":
             raise Refused("programs hold no contacts between bodies yet")
         if settings.formulation in OF_MECHANISMS:
-            return mechanism.source(model, mechanism_of(scene), settings)
+            return mechanism_source(model, mechanism_of(scene), settings)
         return source(model, rolling_ball(scene), settings)

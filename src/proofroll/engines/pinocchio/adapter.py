@@ -126,12 +126,12 @@ class Pinocchio:
     @classmethod
     def reproducer(cls, scene: Scene, settings: PinocchioSettings) -> str:
         """See :class:`proofroll.core.engine_abilities.Reproduces`."""
-        from proofroll.engines.pinocchio.reproducer import mechanism, source
+        from proofroll.engines.pinocchio.reproducer import mechanism_source, source
 
         if settings.formulation == "impulses":
             raise Refused("programs hold no contacts between bodies yet")
         if settings.formulation in OF_MECHANISMS:
-            return mechanism.source(_of_mechanism(scene, settings), settings)
+            return mechanism_source(_of_mechanism(scene, settings), settings)
         return source(rolling_ball(scene), _decided(scene, settings))
 
 

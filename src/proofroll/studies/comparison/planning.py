@@ -8,7 +8,9 @@ from itertools import product
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.comparison import Comparison, Edge, Row
+from proofroll.core.engine import whole_steps
 from proofroll.core.errors import InputError, ProofrollError, told_of
 from proofroll.core.multi_element import represents
 from proofroll.core.plugins import parse_engine, place_of, plain_name
@@ -21,10 +23,13 @@ from proofroll.running.case import Case, EngineFacts
 from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.cases import case_of
-from proofroll.studies.step_factors import USUAL, fitting, unfit
 
 # What is expected of a row whose formulation cannot represent the scene.
 _UNFIT = frozenset({"failed", "refused", "another-scene"})
+# Factors of a ladder of steps where a row says none.
+_USUAL = [4.0, 2.0, 1.0]
+# In this order: finer steps cost more.
+_LADDERS = (_USUAL, [2.0, 1.0, 0.5], [1.0, 0.5, 0.25])
 
 
 def point_name(parameters: Mapping[str, float | Edge]) -> str:
@@ -134,7 +139,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     comparison = settled(comparison)
     times = time_grid(comparison.until, comparison.every)
     steps = [facts.step if isinstance(facts, EngineFacts) else None for facts in resolved]
-    rows = [fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
+    rows = [_fitting(row, step, times) for row, step in zip(rows, steps, strict=True)]
     rungs = _rungs(rows, resolved, workers)
     scenes: dict[str, Scene] = {}
     truths: dict[str, Case] = {}
@@ -222,12 +227,12 @@ def require_fit(comparison: Comparison, facts: Sequence[EngineFacts | ProofrollE
                 raise InputError(place, row.engine, advice)
             if (step := item.step) is None:
                 continue
-            if error := unfit([1.0], step, times):
+            if error := _misfit([1.0], step, times):
                 raise error.within(place, row.engine)
-            ladder = fitting(row, step, times).ladder
-            if unfit(ladder, step, times):
+            ladder = _fitting(row, step, times).ladder
+            if _misfit(ladder, step, times):
                 advice = "a step of it does not divide the interval between samples (`every`); "
-                advice += f"{fitting(replace(row, ladder=USUAL), step, times).ladder} does"
+                advice += f"{_fitting(replace(row, ladder=_USUAL), step, times).ladder} does"
                 raise InputError(f"{place.removesuffix('engine')}ladder", ladder, advice)
 
 
@@ -294,3 +299,28 @@ def _edge_found(comparison: Comparison, point: dict[str, float | Edge], name: st
     if jump is None:
         raise InputError(where, list(edge.edge_between), f"nothing jumps between these values of {name}")
     return jump
+
+
+def _misfit(factors: Sequence[float], step: float, times: FloatArray) -> InputError | None:
+    """Error for a ladder that does not fit between the samples, or None; the last interval may be shorter."""
+    for factor in factors:
+        for start, end in (times[:2].tolist(), times[-2:].tolist()):
+            try:
+                whole_steps(start, end, factor * step)
+            except InputError as error:
+                return error
+    return None
+
+
+def _fitting(row: Row, step: float | None, times: FloatArray) -> Row:
+    """The row, with factors that fit where it has the usual ones and they do not.
+
+    Args:
+        row: of a comparison.
+        step: of its engine [s]; None: it has none, or an adaptive one.
+        times: of the samples [s].
+    """
+    if step is None or row.ladder != _USUAL:
+        return row
+    ladder = next((factors for factors in _LADDERS if _misfit(factors, step, times) is None), row.ladder)
+    return replace(row, ladder=list(ladder))

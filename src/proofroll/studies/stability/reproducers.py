@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from proofroll.core.element_abilities import WritesPrograms
-from proofroll.core.failed_run import FailedRun
-from proofroll.core.program_text import imported
+from proofroll.core.program_text import FailedRun, imported
 from proofroll.running.asking import programs
 from proofroll.running.case import Case
 from proofroll.running.store import write_text

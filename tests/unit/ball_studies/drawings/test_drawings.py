@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from proofroll.ball_studies.report.drawings import overview
-from proofroll.ball_studies.report.drawings.surfaces import overview as by_kind
+from proofroll.ball_studies.report.drawings import overview as by_kind
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.files.json_data import plain
 from proofroll.files.scene_file import load_scene

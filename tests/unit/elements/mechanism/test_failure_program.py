@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from proofroll.core.failed_run import FailedRun
 from proofroll.core.plugins import load_engine, resolve_settings
-from proofroll.core.program_text import imported
+from proofroll.core.program_text import FailedRun, imported
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
