@@ -30,14 +30,11 @@ def read_only(item: T) -> T:
     elif isinstance(item, (tuple, list)):
         inside = item
     elif dataclasses.is_dataclass(item) and not isinstance(item, type):
-        inside = vars(item).values() if hasattr(item, "__dict__") else _fields(item)
+        own = vars(item) if hasattr(item, "__dict__") else [field.name for field in dataclasses.fields(item)]
+        inside = [getattr(item, name) for name in own]
     for part in inside:
         read_only(part)
     return item
-
-
-def _fields(item: Any) -> list[Any]:
-    return [getattr(item, field.name) for field in dataclasses.fields(item)]
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

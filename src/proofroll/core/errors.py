@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
+_ENGINES = _PACKAGE / "engines"
 
 
 class ProofrollError(Exception):
@@ -103,16 +104,13 @@ def place(error: BaseException) -> str:
     It is the last line of the first package outside the harness: what that package calls knows no better.
     """
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "importlib" not in frame.filename]
-    outside = [frame for frame in frames if not Path(frame.filename).is_relative_to(_PACKAGE) or _of_engine(frame)]
+    places = [(frame, Path(frame.filename)) for frame in frames]
+    outside = [one for one, file in places if not file.is_relative_to(_PACKAGE) or file.is_relative_to(_ENGINES)]
     if not outside:
         return ""
     home = Path(outside[0].filename).parent
     last = [frame for frame in outside if Path(frame.filename).is_relative_to(home)][-1]
     return f"{'/'.join(Path(last.filename).parts[-2:])}:{last.lineno} in {last.name}"
-
-
-def _of_engine(frame: traceback.FrameSummary) -> bool:
-    return Path(frame.filename).is_relative_to(_PACKAGE / "engines")
 
 
 def lack_behind(error: BaseException) -> BaseException | None:

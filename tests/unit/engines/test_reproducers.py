@@ -210,7 +210,7 @@ def test_what_has_no_program(engine: str, options: dict[str, str], parameters: d
     [
         ("mujoco", {"formulation": "free", "preset": "tuned"}, "free:Free._add_curvature"),
         ("mujoco", {"formulation": "chart", "preset": "tuned"}, "chart:Chart._resister"),
-        ("mujoco", {"formulation": "joints", "preset": "tuned"}, "reproducer.mechanism_loop:stepped"),
+        ("mujoco", {"formulation": "joints", "preset": "tuned"}, "reproducer:stepped"),
         ("exudyn", {"formulation": "contact", "preset": "matched"}, "integration:Integration.advance"),
         ("pinocchio", {"formulation": "contact", "preset": "matched"}, "contact:ContactSteps.kick"),
         ("pinocchio", {"formulation": "composite", "preset": "default"}, "integrators:TangentRungeKutta4._step"),

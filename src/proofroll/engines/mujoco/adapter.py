@@ -145,7 +145,7 @@ class Mujoco(SteppedModel):
         bounded = math.isfinite(body.contact.mu_static)
         check(settings, bounded=bounded)
         if bounded:
-            check_coefficients(body.contact, settings)
+            check_coefficients((body.contact.mu_static, body.contact.mu_kinetic), settings, "the wall")
         if body.flies:
             check_restitution(settings)
         forget_callbacks()

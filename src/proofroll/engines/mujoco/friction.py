@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import mujoco
@@ -35,18 +35,18 @@ def corrects(contact: Contact, settings: MujocoSettings) -> bool:
     return settings.cone_correction and 0 < contact.mu_static < math.inf
 
 
-def check_coefficients(contact: Contact, settings: MujocoSettings) -> None:
-    """Rejects what MuJoCo would silently change or cannot hold.
+def check_coefficients(coefficients: Iterable[float], settings: MujocoSettings, softened: str) -> None:
+    """Rejects coefficients of friction that MuJoCo would silently change, or by which ``softened`` would be soft.
 
     Raises:
         Refused: the first such coefficient.
     """
-    for mu in (contact.mu_static, contact.mu_kinetic):
+    for mu in coefficients:
         if 0 < mu < SMALLEST_FRICTION:
             raise Refused(f"MuJoCo raises a coefficient of friction of {mu:g} to {SMALLEST_FRICTION:g}; 0 is exact")
-    if settings.cone == "pyramidal" and contact.mu_static > LARGEST_PYRAMIDAL_FRICTION:
-        limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
-        raise Refused(f"cone=pyramidal with friction above {limit} makes the wall soft; set cone=elliptic")
+        if settings.cone == "pyramidal" and mu > LARGEST_PYRAMIDAL_FRICTION:
+            limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
+            raise Refused(f"cone=pyramidal with friction above {limit} makes {softened} soft; set cone=elliptic")
 
 
 class BoundedFriction:

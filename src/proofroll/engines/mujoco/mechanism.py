@@ -167,7 +167,7 @@ class MujocoMechanism(SteppedModel):
         places = {int(model.joint(joint.name).id): k for k, joint in enumerate(mechanism.joints) if joint.nq == 1}
         dofs = {int(model.jnt_dofadr[own]): k for own, k in places.items()}
         friction[list(dofs.values())] = stop[list(dofs.values())] = 0.0
-        kinds = data.efc_type[: data.nefc].tolist()
+        kinds, rows = data.efc_type[: data.nefc].tolist(), self._rows(data, data.nefc)
         for row, (kind, own) in enumerate(zip(kinds, data.efc_id[: data.nefc].tolist(), strict=True)):
             force = float(data.efc_force[row])
             if kind == _ROW.mjCNSTR_EQUALITY and own in equalities:
@@ -175,12 +175,9 @@ class MujocoMechanism(SteppedModel):
             elif kind == _ROW.mjCNSTR_FRICTION_DOF and own in dofs:
                 friction[dofs[own]] = force
             elif kind == _ROW.mjCNSTR_LIMIT_JOINT and own in places:
-                stop[places[own]] += force * self._row_sign(data, row, int(model.jnt_dofadr[own]))
+                # a stop pushes up where the coordinate has a positive sign in its row
+                stop[places[own]] += force * float(np.sign(rows[row, int(model.jnt_dofadr[own])]))
         return {"effort": data.actuator_force * gears, "coupling": coupling, "friction": friction, "stop": stop}
-
-    def _row_sign(self, data: Any, row: int, dof: int) -> float:
-        """Sign of the coordinate in a row of a stop: 1 where its force pushes up."""
-        return float(np.sign(self._rows(data, data.nefc)[row, dof]))
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
         """Forces and moments of joints and loops on the child, about the joint, world axes.
@@ -216,7 +213,7 @@ class MujocoMechanism(SteppedModel):
         for flat, body in zip(axes, bodies, strict=True):
             mujoco.mju_quat2Mat(flat, model.body_iquat[body])
         R = axes.reshape(-1, 3, 3)
-        rows = self._equality_rows(data)
+        rows = self._rows(data, data.ne)
         rank = independent(rows)
         accelerations = self._accelerations(data)
         return MechanismBuilt(
@@ -240,10 +237,6 @@ class MujocoMechanism(SteppedModel):
             return np.full(3, np.nan)
         names = mechanism_model.part_names(joint)
         return np.array(data.xaxis[self._model.joint(names[0 if joint.kind == "universal" else -1]).id])
-
-    def _equality_rows(self, data: Any) -> Array:
-        """Rows of the equality constraints on MuJoCo's velocities, shape (rows, nv)."""
-        return self._rows(data, data.ne)
 
     def _rows(self, data: Any, count: int) -> Array:
         """The first rows of all constraints on MuJoCo's velocities, shape (count, nv)."""

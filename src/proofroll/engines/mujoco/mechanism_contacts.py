@@ -27,8 +27,8 @@ from proofroll.elements.mechanism.contacts.touching import Moving
 from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT
-from proofroll.engines.mujoco.friction import NEAR_CONE, SMALLEST_FRICTION
-from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, MujocoSettings
+from proofroll.engines.mujoco.friction import NEAR_CONE, check_coefficients
+from proofroll.engines.mujoco.settings import MujocoSettings
 
 # m; MuJoCo has no sphere of radius 0.
 _VERTEX = 1e-12
@@ -53,12 +53,7 @@ def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
     """
     moving = _moving(mechanism)
     for contact in mechanism.contacts:
-        mu = contact.friction
-        if 0 < mu < SMALLEST_FRICTION:
-            raise Refused(f"MuJoCo raises a coefficient of friction of {mu:g} to {SMALLEST_FRICTION:g}; 0 is exact")
-        if settings.cone == "pyramidal" and mu > LARGEST_PYRAMIDAL_FRICTION:
-            limit = f"{LARGEST_PYRAMIDAL_FRICTION:g}"
-            raise Refused(f"cone=pyramidal with friction above {limit} makes a contact soft; set cone=elliptic")
+        check_coefficients([contact.friction], settings, "a contact")
         sides = ((contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b))
         for (body, shape), (_, other) in (sides, sides[::-1]):
             if isinstance(shape, HalfSpace) and body in moving and not isinstance(other, SphereShape):

@@ -69,14 +69,10 @@ class silent:  # noqa: N801 -- used as a statement; a generator's context would 
 
     def __enter__(self) -> None:
         self._before = mujoco.get_mju_user_warning()
-        mujoco.set_mju_user_warning(_nothing)
+        mujoco.set_mju_user_warning(lambda _: None)
 
     def __exit__(self, *_: object) -> None:
         mujoco.set_mju_user_warning(self._before)
-
-
-def _nothing(_: str) -> None:
-    pass
 
 
 class SteppedModel:

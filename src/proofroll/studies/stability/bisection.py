@@ -5,26 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import Generic, Protocol, TypeVar
 
-
-class RungVerdict(Protocol):
-    """Verdict of a run on a rung."""
-
-    @property
-    def stable(self) -> bool:
-        """True if it held together."""
-
-    @property
-    def accurate(self) -> bool:
-        """True if it was right as well; never without being stable."""
-
-
-V = TypeVar("V", bound=RungVerdict)
+from proofroll.studies.failure import RunOutcome
 
 
 @dataclass
-class SearchResult(Generic[V]):
+class SearchResult:
     """Result of a search; rungs are numbered from the coarsest.
 
     Attributes:
@@ -32,10 +18,10 @@ class SearchResult(Generic[V]):
         limit: the first rung whose run is too long, or the number of rungs.
     """
 
-    seen: dict[int, V] = field(default_factory=dict)
+    seen: dict[int, RunOutcome] = field(default_factory=dict)
     limit: int = 0
 
-    def boundary(self, passes: Callable[[V], bool]) -> tuple[int | None, int | None]:
+    def boundary(self, passes: Callable[[RunOutcome], bool]) -> tuple[int | None, int | None]:
         """The coarsest rung from which on all that ran passed, and the failing rung next to it; None: no such rung.
 
         A rung that passes above one that fails does not count: a user who refines the step would get worse.
@@ -45,7 +31,7 @@ class SearchResult(Generic[V]):
         return min(holding, default=None), failing
 
 
-def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
+def search(size: int, stride: int) -> Generator[int, RunOutcome | None, SearchResult]:
     """Asks for rungs and is sent what a run on each gave; returns what it found.
 
     It goes down by ``stride`` until a run is accurate and one half a stride below it too: the finest run costs most.
@@ -53,7 +39,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
     boundary a pass may be luck. What is known is never asked again. A rung for which None is sent, and all finer ones,
     are left out as too long.
     """
-    result: SearchResult[V] = SearchResult(limit=size)
+    result: SearchResult = SearchResult(limit=size)
     seen = result.seen
     rung, in_a_row = 0, 0
     while rung < result.limit:
@@ -84,7 +70,7 @@ def search(size: int, stride: int) -> Generator[int, V | None, SearchResult[V]]:
     return result
 
 
-def _next(search: SearchResult[V], passes: Callable[[V], bool]) -> int | None:
+def _next(search: SearchResult, passes: Callable[[RunOutcome], bool]) -> int | None:
     """Next rung to run for a boundary; None: the boundary is found."""
     holding, failing = search.boundary(passes)
     if holding is None:

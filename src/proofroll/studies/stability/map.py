@@ -49,7 +49,7 @@ class MapPoint:
     curve: Curve
     place: Place
     ladder: list[float]
-    found: SearchResult[RunOutcome] = field(default_factory=SearchResult)
+    found: SearchResult = field(default_factory=SearchResult)
     cases: dict[int, Case] = field(default_factory=dict)
     results: dict[int, Result] = field(default_factory=dict)
 
@@ -99,7 +99,7 @@ class StabilityMap:
 
 
 Progress = Callable[[str, int], None]
-Searching = Generator[int, RunOutcome | None, SearchResult[RunOutcome]]
+Searching = Generator[int, RunOutcome | None, SearchResult]
 
 
 def stability(

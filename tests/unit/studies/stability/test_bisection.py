@@ -3,36 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import pytest
 
+from proofroll.studies.failure import RunOutcome
 from proofroll.studies.stability.bisection import SearchResult, search
-
-
-@dataclass(frozen=True)
-class Made:
-    """A verdict."""
-
-    stable: bool
-    accurate: bool
 
 
 def found(
     stable: Callable[[int], bool], accurate: Callable[[int], bool], size: int = 35, affordable: int = 35
-) -> SearchResult[Made]:
+) -> SearchResult:
     """What a search finds if rungs behave so."""
     searching = search(size, 4)
     rung = next(searching)
     while True:
-        verdict = Made(stable(rung), accurate(rung)) if rung < affordable else None
+        verdict = RunOutcome(stable(rung), accurate(rung), None, False, None, None, "") if rung < affordable else None
         try:
             rung = searching.send(verdict)
         except StopIteration as stop:
             return stop.value  # type: ignore[no-any-return]  # StopIteration has no type
 
 
-def boundaries(result: SearchResult[Made]) -> list[tuple[int | None, int | None]]:
+def boundaries(result: SearchResult) -> list[tuple[int | None, int | None]]:
     """Coarsest that holds and the failing one beside it, for stable and for accurate."""
     return [result.boundary(lambda v: v.stable), result.boundary(lambda v: v.accurate)]
 
