@@ -23,7 +23,7 @@ FIRST = 4
 FIRST_TOLERANCE = 10.0**-FIRST
 # All that a reader can ask for: forces, too, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
-NEEDS = ("motion", "motion and forces")
+NEEDS = ("motion to {0} of the path", "motion to {0} of the path and forces to {0} of the largest")
 UNIT = "in seconds of computing per second of motion"
 NOTHING = "nothing that was run and timed holds it for"
 UNJUDGED = "no scene that was run is judged by that"
@@ -153,7 +153,7 @@ class ChoiceMatrix:
             if not found and column.group in self.judged_groups[forces]
         ]
         nothing = f"{NOTHING} {', '.join(without)}" if without else ""
-        asked = f"{NEEDS[forces]} to {number(tolerance)}"
+        asked = NEEDS[forces].format(number(tolerance))
         if not held:
             return f"To hold {asked}: {nothing or (UNJUDGED if groups else 'nothing was run')}."
         return f"The cheapest to hold {asked}, {UNIT}: {', '.join(held)}{f'; {nothing}' if nothing else ''}."
@@ -240,8 +240,9 @@ def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
         size, item = min(told, key=lambda entry: entry[0])
         limit = item.limit(forces)
         state = Verdict.CONVERGES if limit == LimitResult.WITHIN else Verdict.DIFFERS
-        title, why = f"{item.name}: off by {error(size)}; {_WHY[limit]}", f"off by {error(size, 1)}, {_WHY[limit]}"
-        return ChoiceCell(state, error(size, 1), title, item.href, name=item.name, why=why)
+        off = _beyond(size, tolerance)
+        title, why = f"{item.name}: off by {_beyond(size, tolerance, 2)}; {_WHY[limit]}", f"off by {off}, {_WHY[limit]}"
+        return ChoiceCell(state, off, title, item.href, name=item.name, why=why)
     if whole:
         lacking = "no forces" if whole[0].motion is not None else "no motion"
         title = f"{whole[0].name}: reports {lacking}"
@@ -249,6 +250,16 @@ def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
     item = steps[0]
     state = item.blame or Verdict.FAILED
     return ChoiceCell(state, str(state), f"{item.name}: {item.message}".rstrip(": "), item.href, why=str(state))
+
+
+def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
+    """An error with as many digits as show that it is beyond the tolerance."""
+    text = error(size, digits)
+    return (
+        text
+        if digits > 4 or not math.isfinite(size) or float(text) > tolerance
+        else _beyond(size, tolerance, digits + 1)
+    )
 
 
 def _joined(cells: Sequence[tuple[str, ChoiceCell]]) -> ChoiceCell:

@@ -32,7 +32,7 @@
     const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
     const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
     const lacking = without.length ? `${nothing} ${without.join(", ")}` : "";
-    const asked = `${needs[+forces.checked]} to ${tolerances[Number(slider.value) - first]}`;
+    const asked = needs[+forces.checked].replaceAll("{0}", tolerances[Number(slider.value) - first]);
     const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.some(Boolean) ? unjudged : "nothing was run")}.`;
     return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
   }

@@ -109,6 +109,13 @@ def test_a_run_holds_only_at_all_places() -> None:
     assert at([LINE, FORCE, *FINER, heavy], 4).state != Verdict.AGREES, "the finer step was not run there"
 
 
+def test_an_error_that_is_too_large_looks_so() -> None:
+    """An error just beyond the tolerance has as many digits as tell it apart from that."""
+    cell = at([line(error=1.004e-4)], 4)
+    assert (cell.state, cell.text) == (Verdict.CONVERGES, "1.004e-4")
+    assert "off by 1.004e-4" in cell.title
+
+
 def test_a_group_holds_where_all_its_scenes_do() -> None:
     """All: the cost of the slowest scene; some: how many; a group of one scene has no column besides."""
     chain = [replace(item, study="chain", scene="chain", cost=0.5) for item in ARM]
@@ -128,11 +135,11 @@ def test_the_answer_names_the_cheapest_engine_of_each_group() -> None:
     ball = line(study="ball", group="ball rolling", error=0.1)
     found = choice_matrix([*ARM, beta, own, ball], STUDIES)
     assert found.answer(1e-3, False) == (
-        "The cheapest to hold motion to 1e-3, in seconds of computing per second of motion: "
+        "The cheapest to hold motion to 1e-3 of the path, in seconds of computing per second of motion: "
         "alpha joints for trees (0.01); nothing that was run and timed holds it for ball rolling."
     )
     assert "beta joints for trees (0.5)" in found.answer(1e-8, False)
-    assert "motion and forces" in found.answer(1e-3, True)
+    assert "motion to 1e-3 of the path and forces to 1e-3 of the largest" in found.answer(1e-3, True)
 
 
 def test_the_cheapest_of_each_column_is_framed() -> None:
