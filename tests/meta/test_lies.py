@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
@@ -28,6 +28,7 @@ from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, LimitResult, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Result, Status
 from proofroll.running.recording import record
 from proofroll.running.simulation import simulate
 from proofroll.running.time_case import clean_runs
@@ -35,6 +36,7 @@ from proofroll.studies.comparison.default_comparison import bounds
 from proofroll.studies.judging import held_against
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.tradeoff.curve import CurvePoint, measured
 
 # Each lie is told of one scene in every run of the tests, of all others in the drills.
 LIES = [
@@ -51,13 +53,20 @@ LIES = [
 _STATE = ("v_WB", "w_WB", "q_WB")
 
 
+_POINT = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]  # what it ran is a dataset here
+
+
 @dataclass(frozen=True)
 class Heard:
-    """What is said of a run: that it agrees in all, or what is wrong; and causes."""
+    """What is said of a run: that it agrees in all, or what is wrong; causes; and what a trade-off measures of it.
+
+    That is its error of each observable in parts of its size, infinite where it has none; empty: there is no point.
+    """
 
     agrees: bool
     words: str
     causes: tuple[str, ...] = ()
+    errors: dict[str, float] = field(default_factory=dict, compare=False)
 
 
 def hear(scene: Scene, kind: Any, band: dict[str, str], until: float, **settings: Any) -> Heard:
@@ -74,7 +83,15 @@ def hear(scene: Scene, kind: Any, band: dict[str, str], until: float, **settings
         not wrong,
         "\n".join(map(str, wrong)),
         _causes(scene, kind, run, [item.judgement for item in found.compared], settings),
+        _errors(scene, run, band),
     )
+
+
+def _errors(scene: Scene, run: Any, asked: Iterable[str]) -> dict[str, float]:
+    reference = Reference.of(scene, _true(scene, run))
+    errors = measured(_POINT, reference, run).errors
+    known = [name for name in asked if name in reference.curves]
+    return {name: errors.get(name, np.inf) / (reference.scale(name) or 1.0) for name in known}
 
 
 def _causes(
@@ -117,7 +134,9 @@ def test_a_lie(about: str, lie: Lie) -> None:
     if not lie.said:
         assert heard.agrees, heard
         assert not heard.causes
+        assert max(heard.errors.values()) < 1e-3
         return
+    assert not heard.errors or max(heard.errors.values()) > 1e-3, heard
     assert not heard.agrees
     assert any(word in heard.words for word in lie.said), heard
     assert not [cause for cause in heard.causes[:1] if cause.startswith("or, ")]  # than nothing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from numbers import Real
 
 import numpy as np
@@ -78,3 +79,8 @@ def off_grid(times: FloatArray, step: float | None) -> FloatArray:
         part = min(max(round((index + 1) * _GOLDEN % 1 * parts), 1), parts - 1)
         between.append(start + length * (part / parts))
     return np.asarray(between, dtype=np.float64)
+
+
+def off_grids(times: FloatArray, steps: Iterable[float | None]) -> tuple[float, ...]:
+    """Times [s] between those of the grid at which engines with these steps [s] are sampled (:func:`off_grid`)."""
+    return tuple(sorted({t for step in set(steps) for t in off_grid(times, step).tolist()}))

@@ -115,7 +115,7 @@ def ladder_content(study: Ladder) -> LadderContent:
         scale=truth.sizes.get(study.quantity),
         tolerance=study.tolerance,
         until=study.until,
-        truth=KnownTruth(truth.dataset.attrs.get("route"), study.true({})[1]),
+        truth=KnownTruth(truth.dataset.attrs.get("route"), study.bar({})),
         rungs=[_rung(study, rung) for rung in study.ladder],
         terms=[_term(study, switch) for switch in study.switches],
         absent={
@@ -179,7 +179,7 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
         change,
         cost,
         tolerance=study.tolerance,
-        bar=study.true(point)[1],
+        bar=study.bar(point),
         scale=study.truths[str({})].sizes.get(study.quantity, 1.0),
     )
     return TermFound(*said, verdict, reason, on, off, cost, change, error_change)

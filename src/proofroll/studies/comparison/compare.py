@@ -218,9 +218,7 @@ def _judgements(
         judgements.append(judgement)
         for factor, observed in curves.items():
             if name in observed:
-                between = held_against.between(reference, name, trajectories[factor])
-                off_grid = 0.0 if between is None else largest_difference(*between)
-                errors[factor][name] = max(largest_difference(observed[name], true), off_grid)
+                errors[factor][name] = held_against.error(reference, name, observed[name], trajectories[factor])
     return judgements, errors
 
 

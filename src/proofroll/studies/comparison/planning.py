@@ -15,7 +15,7 @@ from proofroll.core.errors import InputError, ProofrollError, told_of
 from proofroll.core.multi_element import represents
 from proofroll.core.plugins import parse_engine, place_of, plain_name
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import off_grid, time_grid
+from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.core.truth import edge_between
 from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.asking import described, resolve, resolve_with_truth
@@ -146,7 +146,7 @@ def plan(comparison: Comparison, engines: Iterable[str] = (), workers: Workers |
     runs: list[Planned] = []
     of_engines = {facts.step for facts in resolved if isinstance(facts, EngineFacts)}
     of_engines |= {rung.step for ladder in rungs for rung in ladder.values()}
-    between = tuple(sorted({t for step in of_engines for t in off_grid(times, step).tolist()}))
+    between = off_grids(times, of_engines)
     for row, facts, ladder_facts in zip(rows, resolved, rungs, strict=True):
         for point in comparison.variations(row):
             name = point_name(point)

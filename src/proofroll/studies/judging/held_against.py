@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.comparison import Tolerance
 from proofroll.core.dataset import BETWEEN, observe, part
 from proofroll.core.events import EVENT_ORDER, events_of
@@ -66,6 +66,13 @@ def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Float
     turned = on_turns_of(true, values, name, (dataset, reference.dataset))
     said = np.isfinite(true)
     return None if turned is None else (turned[said], true[said])
+
+
+def error(reference: Reference, name: str, values: FloatArray, dataset: xr.Dataset) -> float:
+    """Largest distance of an observable's ``values`` from the truth, and of those that its run has off the grid."""
+    off_grid = between(reference, name, dataset)
+    on_grid = largest_difference(values, reference.true(name, values)[0])
+    return on_grid if off_grid is None else max(on_grid, largest_difference(*off_grid))
 
 
 def turned_alike(values: FloatArray, true: FloatArray) -> FloatArray:

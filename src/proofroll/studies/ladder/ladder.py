@@ -7,16 +7,16 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.arrays import FloatArray
 from proofroll.core.dataset import observe
 from proofroll.core.errors import InputError, ProofrollError, Refused, require_known
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names
 from proofroll.core.scene import Scene
-from proofroll.core.time_grid import time_grid
+from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.asking import described, resolve, resolve_with_truth
@@ -26,8 +26,12 @@ from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.studies.cases import case_of
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, switches
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _EVERY = 0.02  # interval between samples [s], as in the comparison files
 
@@ -40,12 +44,14 @@ class ModelAnswer:
         case: what was run; None if its settings make no sense or its engine is missing.
         result: how that ended.
         values: of the quantity, None if there are none.
+        run: its trajectory, if it reached the end.
         timing: wall seconds per simulated second, None if it could not be timed.
     """
 
     case: Case | None
     result: Result
     values: FloatArray | None = None
+    run: xr.Dataset | None = None
     timing: Timing | None = None
 
 
@@ -128,7 +134,14 @@ class Ladder:
 
     def _run_truths(self, wanted: Sequence[dict[str, float]], progress: Callable[[str], None]) -> None:
         wanted = [point for point in wanted if str(point) not in self.truths]
-        cases = {str(point): self._case(self._truth_facts, LadderModel("truth", {}, point)) for point in wanted}
+        # Which steps the models take is not known yet: none, and round ones of few parts of an interval.
+        off_grid = off_grids(time_grid(self.until, _EVERY), [None, _EVERY / 2, _EVERY / 4, _EVERY / 5])
+        cases = {
+            str(point): dataclasses.replace(
+                self._case(self._truth_facts, LadderModel("truth", {}, point)), between=off_grid
+            )
+            for point in wanted
+        }
         results = self._runner.run(cases.values(), lambda *_: progress("truth"))
         for point in wanted:
             case = cases[str(point)]
@@ -146,18 +159,21 @@ class Ladder:
     def _answer(self, model: LadderModel, case: Case, result: Result) -> ModelAnswer:
         if result.status != Status.DONE:
             return ModelAnswer(case, result)
-        curves = observe(self._scene_at(model.parameters), read(self._runner.store.trajectory(case)))
-        return ModelAnswer(case, result, curves.get(self.quantity))
+        run = read(self._runner.store.trajectory(case))
+        curves = observe(self._scene_at(model.parameters), run)
+        return ModelAnswer(case, result, curves.get(self.quantity), run)
 
-    def true(self, point: dict[str, float]) -> tuple[FloatArray, float]:
-        """The true values of the quantity in the scene with these parameters, and their error bar."""
+    def bar(self, point: dict[str, float]) -> float:
+        """Error bar of the true quantity in the scene with these parameters."""
         reference = self.truths[str(point)]
-        return reference.true(self.quantity, reference.curves[self.quantity])
+        return reference.true(self.quantity, reference.curves[self.quantity])[1]
 
     def error(self, model: LadderModel, point: dict[str, float]) -> float | None:
         """Largest distance from the truth of the scene with these parameters; None: no answer."""
-        values = self.answers[key_of(model)].values
-        return None if values is None else largest_difference(values, self.true(point)[0])
+        answer = self.answers[key_of(model)]
+        if answer.values is None or answer.run is None:
+            return None
+        return held_against.error(self.truths[str(point)], self.quantity, answer.values, answer.run)
 
     def _time(self, progress: Callable[[str], None]) -> None:
         timed = {key: answer.case for key, answer in self.answers.items() if answer.values is not None}

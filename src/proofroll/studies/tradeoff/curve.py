@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import is_floor
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import Case, EngineFacts, Result, Status
@@ -24,6 +25,9 @@ from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.pareto import envelope
 from proofroll.studies.tradeoff.records import Corner
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # Samples per run. An oscillation of the founding scene's z has a dozen of them.
 SAMPLES = 40
@@ -77,6 +81,14 @@ class Question:
         """Cases of a point: its run, and with an adaptive step that over few samples."""
         adaptive = facts.resolution not in {None, "dt"}
         return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
+
+    def truths(self, scene: Scene, facts: EngineFacts, runs: Collection[Case]) -> dict[float, Case]:
+        """Cases of the truth by sampling interval, known wherever the runs are sampled."""
+        steps: dict[float, list[float | None]] = {self.every: []}
+        for run in runs:
+            steps.setdefault(run.every, []).append(run.engine.step)
+        off_grid = {every: off_grids(time_grid(self.until, every), those) for every, those in steps.items()}
+        return {every: replace(self.case(scene, facts, every), between=times) for every, times in off_grid.items()}
 
 
 @dataclass
@@ -199,7 +211,13 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
 
     ``points`` are the run, and the one over few samples if there is one; the truth is known by sampling interval.
     """
-    point, *others = (_measured(point, references[point.case.every], runner) for point in points)
+    done = (
+        measured(point, references[point.case.every], read(runner.store.trajectory(point.case)))
+        if point.result.status == Status.DONE
+        else point
+        for point in points
+    )
+    point, *others = done
     if not others:
         return point
     (sparse,) = others
@@ -212,14 +230,16 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
     return replace(point, errors=errors, dense=point.errors, sparse=sparse)
 
 
-def _measured(point: CurvePoint, reference: Reference, runner: Runner) -> CurvePoint:
-    if point.result.status != Status.DONE:
-        return point
-    curves = held_against.observed(reference, read(runner.store.trajectory(point.case)))
-    errors, bars = {}, {}
-    for name, curve in curves.items():
-        true, bar = reference.true(name, curve)
-        errors[name], bars[name] = largest_difference(curve, true), bar
+def measured(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
+    """The point with its observables and their errors; an event in a wide bracket is as wrong as that is half wide."""
+    curves = held_against.observed(reference, run)
     return replace(
-        point, curves=curves, errors=errors, bars=bars, scales={name: reference.scale(name) for name in curves}
+        point,
+        curves=curves,
+        errors={
+            name: max(held_against.error(reference, name, curve, run), reference.own_bar(name, run))
+            for name, curve in curves.items()
+        },
+        bars={name: reference.true(name, curve)[1] for name, curve in curves.items()},
+        scales={name: reference.scale(name) for name in curves},
     )

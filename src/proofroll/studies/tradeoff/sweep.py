@@ -195,9 +195,10 @@ def _run(
             )
         except ProofrollError as error:
             curve.dropped[value] = str(error)
-    intervals = {question.every, *(case.every for _, both in cases for case in both)} - references.keys()
-    truths = {every: question.case(scene, truth_facts, every) for every in intervals}
-    results = runner.run([*truths.values(), *(case for _, both in cases for case in both)], progress)
+    runs = [case for _, both in cases for case in both]
+    truths = question.truths(scene, truth_facts, runs)
+    truths = {every: case for every, case in truths.items() if every not in references}
+    results = runner.run([*truths.values(), *runs], progress)
     for every, case in truths.items():
         if results[case.key].status != Status.DONE:
             raise ProofrollError(f"there is no truth here: {results[case.key].message}")

@@ -165,8 +165,7 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: Callabl
         question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **place})
         scene = question.loaded
         runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
-        intervals = {case.every for both in runs.values() for case in both}
-        truths = {every: question.case(scene, truth, every) for every in intervals}
+        truths = question.truths(scene, truth, [case for both in runs.values() for case in both])
         asked.append((place, scene, truths, runs))
     cases = [case for _, _, truths, runs in asked for case in (*truths.values(), *itertools.chain(*runs.values()))]
     results = runner.run(cases, told)

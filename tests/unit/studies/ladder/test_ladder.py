@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hostile import ENTRY_POINTS
 
+from proofroll.core.dataset import BETWEEN, observe
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain
@@ -17,10 +18,12 @@ from proofroll.files.scene_file import load_scene
 from proofroll.report.ladder.ladder import LadderContent, ladder_content
 from proofroll.report.ladder.tables import rung_table, term_table
 from proofroll.report.terminal.tables import WIDTH, console
+from proofroll.running.case import Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
-from proofroll.studies.ladder.ladder import Ladder
+from proofroll.studies.ladder.ladder import Ladder, ModelAnswer, key_of
+from proofroll.studies.ladder.models import LadderModel
 
 UNTIL = 0.2
 
@@ -38,6 +41,22 @@ def climb(tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]) 
         return ladder_content(study)
 
     return run
+
+
+def test_a_model_that_is_right_on_the_grid_alone_is_wrong(
+    tmp_path: Path, install_engines: Callable[[Mapping[str, str]], None]
+) -> None:
+    """Its error is that of its samples between those every 0.02 s, where a model is right at these."""
+    install_engines(ENTRY_POINTS)
+    study = Ladder("sphere_in_cylinder", {}, Runner(Store(tmp_path), jobs=1), engines=("laddered",), until=UNTIL)
+    study._run_truths([{}], lambda _: None)
+    model, reference = LadderModel("laddered", {}), study.truths[str({})]
+    for wrong in (0.0, 0.25):
+        run = reference.dataset.copy(deep=True)
+        run[f"{BETWEEN}.z"] += wrong
+        values = observe(study.scene, run)["z"]
+        study.answers[key_of(model)] = ModelAnswer(None, Result(Status.DONE, ""), values, run)
+        assert study.error(model, {}) == pytest.approx(wrong, abs=1e-12)
 
 
 def error_of(f: float, options: str) -> float:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from proofroll.core.errors import InputError
+from proofroll.core.time_grid import off_grid, time_grid
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -124,6 +125,17 @@ def test_a_curve_ends_where_the_truth_or_round_off_shows_no_more(bar: float, err
         curve.points = [point(8 * QUESTION.every, 1.0), point(2e-4, 1600 * error), point(1e-4, last)]
         found.append(_further(QUESTION, curve, {QUESTION.every: reference}))  # type: ignore[dict-item]
     assert found == [[], [QUESTION.step(1 / 500)]]
+
+
+def test_the_truth_is_known_wherever_a_run_is_sampled(swept: tuple[dict[str, Curve], float]) -> None:
+    """Samples that engines have off the grid have their true values, at each sampling interval that there is."""
+    cases = [point.case for curve in swept[0].values() for point in curve.points]
+    truths = QUESTION.truths(QUESTION.loaded, cases[0].engine, cases)
+    assert truths.keys() == {case.every for case in cases}
+    for case in cases:
+        off = off_grid(time_grid(case.until, case.every), case.engine.step)
+        assert set(off) <= set(truths[case.every].between)
+    assert truths[QUESTION.every].between
 
 
 def test_a_curve_has_each_tolerance_once() -> None:
