@@ -83,7 +83,9 @@ class _TogetherWhatShares(LoadScopeScheduling):
         check = nodeid.rpartition("-")[2] if "moves_as_the_truth" in nodeid else nodeid
         # The comparison accuracy runs many cases of the paper's, which are stored by then.
         rows = nodeid.partition("-")[0].replace("[accuracy", "[paper")
-        return {"report": folder, "agreement": rows, "conformance": check}.get(folder, path)
+        # Drills of a unit share little beside what each of them takes; in one file they would keep one process busy.
+        unit = nodeid if self.config.option.markexpr == "drill" else path
+        return {"report": folder, "agreement": rows, "conformance": check, "unit": unit}.get(folder, path)
 
 
 @pytest.hookimpl(optionalhook=True)
