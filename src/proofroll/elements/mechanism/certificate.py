@@ -148,7 +148,7 @@ def _compare_response(
     except Refused:  # ours, of a joint with stops and dry friction, which an engine may have
         return
     state = dynamics.at(*mechanism.start())
-    shut = [k for k, _ in enumerate(mechanism.contacts) if state.touching[k].gap <= TOUCHING]
+    shut = [k for k, _ in enumerate(mechanism.contacts) if state.touching[k].gap <= TOUCHING * element.length]
     if not shut:
         return
     normals = [np.outer(state.touching[k].normal, state.touching[k].normal) for k in shut]

@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.analysis import Analysis, analysed
 from proofroll.elements.mechanism.capabilities import MechanismCapability, required
 from proofroll.elements.mechanism.certificate import CAPS, certify
 from proofroll.elements.mechanism.contacts.observables import LAWS, RESIDUALS, contact_observables
-from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.contacts.start import extent
 from proofroll.elements.mechanism.dataset import from_samples
 from proofroll.elements.mechanism.failure_program import program
 from proofroll.elements.mechanism.joint import TURNING
@@ -146,11 +146,7 @@ class MechanismElement:
     @cached_property
     def extent(self) -> float:
         """Largest distance between joints, centres of mass, tracked points and contacts at the start [m]."""
-        joints = [self.start.point(joint.child, joint.child_position) for joint in self.mechanism.joints]
-        masses = [self.start.point(body.name, body.com) for body in self.mechanism.bodies]
-        touching = [each.place[None] for each in touches(self.mechanism, self._solution.motion)]
-        places = np.concatenate([*joints, *masses, *self.start.points.swapaxes(0, 1), *touching])
-        return float(np.max(np.linalg.norm(places[:, None] - places[None], axis=-1)))
+        return extent(self.mechanism, self._solution.motion)
 
     @property
     def natural_time(self) -> float:

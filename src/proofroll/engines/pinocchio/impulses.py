@@ -16,7 +16,7 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.contacts.start import TOUCHING
+from proofroll.elements.mechanism.contacts.start import TOUCHING, scale_of
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.engines.pinocchio.joint_rows import JointRows
@@ -95,6 +95,7 @@ class ImpulseSteps:
         self.contacts = mechanism.contacts
         self.q, self.v, self.t = tree.q0, tree.v0, 0.0
         self._gravity = float(np.linalg.norm(mechanism.gravity))
+        self._touching = scale_of(mechanism).gap
         self._index = mechanism.body_index
         self.restitution = np.array([contact.restitution for contact in self.contacts])
         self.joints = JointRows(tree)
@@ -152,7 +153,7 @@ class ImpulseSteps:
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
         shifts = np.zeros((len(self._returned), 3))
         shifts[: len(found)] = (ahead - J) @ self.v
-        apart = [each.gap > TOUCHING for each in found] + [False] * len(self.joints.friction)
+        apart = [each.gap > self._touching for each in found] + [False] * len(self.joints.friction)
         shifts[apart + [item.gap(self.q) > TOUCHING for item in self.joints.stops], 2] = np.inf
         return self._solved(J, free, inverse, found, shifts, span, convex=convex)
 
@@ -255,7 +256,7 @@ class ImpulseSteps:
             hits = e and -e * approach > _SOFT * self._gravity * dt
             shifts[k, 2] = np.inf
             if self._midpoint:
-                if gap <= max(TOUCHING, self._gravity * dt**2):
+                if gap <= max(self._touching, self._gravity * dt**2):
                     shifts[k, 2] = e * approach if hits else _CLOSED * gap / dt
             else:
                 reached = gap + dt * (approach - dt * self._gravity) <= 0

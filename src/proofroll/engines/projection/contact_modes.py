@@ -21,7 +21,7 @@ from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
 from proofroll.elements.mechanism.contacts.family import Family
-from proofroll.elements.mechanism.contacts.start import STILL, TOUCHING
+from proofroll.elements.mechanism.contacts.start import closed_and_still, scale_of
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks
@@ -68,13 +68,14 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
-        self._faint = max(STILL, _REST * step * float(np.linalg.norm(mechanism.gravity)))
+        scale = scale_of(mechanism)
+        self._still = scale.speed
+        self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
         self._limit_efforts(start)
         now = self.at(start)
-        closed = [each.gap <= TOUCHING and float(each.normal @ each.slide) <= STILL for each in now.touching]
-        still = [bool(np.linalg.norm(each.slide) <= STILL) for each in now.touching]
+        closed, still = closed_and_still(now.touching, np.full(len(self.contacts), scale.length), scale.rate)
         self._enter(0.0, start, self._decided(now, closed, still))
 
     def _limit_efforts(self, y: Array) -> None:
@@ -249,7 +250,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             self._limit_efforts(x)  # what a servo wants jumps with the velocity
             happened = [("impact", self.contacts[k].name)]
             now = self.at(x)
-            still = [bool(np.linalg.norm(across(each)) <= STILL) for each in now.touching]
+            still = [bool(np.linalg.norm(across(each)) <= self._still) for each in now.touching]
         elif kind == "still":
             slips = [float(np.linalg.norm(across(each))) for each in now.touching]
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, Direction, across, acting
-from proofroll.elements.mechanism.contacts.start import STILL
+from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
 from proofroll.elements.mechanism.switches import SETTLED
@@ -29,20 +29,14 @@ Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 class ContactBodies(ContactStretches):
     """The stretches of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
-    def __init__(self, equations: ContactEquations, tolerance: float, size: float, touching: float) -> None:
-        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size, touching)
+    def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
+        super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
         self.equations = equations
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
         state = np.append(self.equations.equations.equations.start(), 0.0)
-        found = self.equations.at(state)
-        speed = STILL * max([1.0, *(float(np.linalg.norm(each.slide)) for each in found.touching)])
-        closed = [each.gap <= self._least_gap and float(each.normal @ each.slide) <= speed for each in found.touching]
-        still = [
-            shut and bool(np.linalg.norm(each.slide) <= speed)
-            for shut, each in zip(closed, found.touching, strict=True)
-        ]
+        closed, still = closed_and_still(self.equations.at(state).touching, np.ones(len(self.contacts)), 1.0)
         state = self.equations.eliminated(state, held(closed, still))
         mode, margin = self._decided(state, closed, still)
         return Transition(state, mode, (), margin)

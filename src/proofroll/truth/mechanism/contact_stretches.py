@@ -71,10 +71,10 @@ class ContactStretches(Stretches[ContactMode]):
     See :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
-    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float, touching: float) -> None:
-        """Takes the length of a state without time, the tolerance of each step, the mechanism's size, the least gap."""
+    def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
+        """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
         super().__init__(length + 1, tolerance)
-        self._given, self.contacts, self._size, self._least_gap = equations, equations.contacts, size, touching
+        self._given, self.contacts, self._size = equations, equations.contacts, size
         self._timed = any(map(varies, equations.mechanism.signals))
 
     @abstractmethod

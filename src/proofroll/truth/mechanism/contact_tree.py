@@ -10,6 +10,7 @@ from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
+from proofroll.elements.mechanism.contacts.start import Scale
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import SETTLED
@@ -21,13 +22,13 @@ from proofroll.truth.mechanism.contact_stretches import ContactStretches, Solved
 class ContactTree(ContactStretches):
     """The stretches of a mechanism in the coordinates of its tree. See :class:`proofroll.truth.hybrid.HybridRoute`."""
 
-    def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float, touching: float) -> None:
+    def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
         self.dynamics = dynamics
-        super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size, touching)
+        super().__init__(dynamics, dynamics.mechanism.nq + dynamics.mechanism.nv, tolerance, size)
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
-        mode, margin = self.dynamics.begin(self._least_gap)
+        mode, margin = self.dynamics.begin(Scale(1.0, 1.0))  # natural units
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 

@@ -6,7 +6,6 @@ import numpy as np
 
 from proofroll.elements.mechanism.contacts.acting import kinds
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.start import TOUCHING
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.rotations import Array
@@ -40,10 +39,10 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     own = units.mechanism(mechanism)
     dynamics, second = ContactDynamics(own), MaximalCoordinates(own)
     check_start(dynamics.equations, second, units.length)
-    size, touching = _size(dynamics), TOUCHING / units.length
-    tree = ContactTree(dynamics, TOLERANCE, size, touching)
+    size = _size(dynamics)
+    tree = ContactTree(dynamics, TOLERANCE, size)
     equations = ContactEquations(own, second.lean)
-    bodies = ContactBodies(equations, TOLERANCE, size, touching)
+    bodies = ContactBodies(equations, TOLERANCE, size)
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = paths[0].leg_at(times)

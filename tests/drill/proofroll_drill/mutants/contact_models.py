@@ -12,7 +12,7 @@ from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import Acting, heading_of
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
-from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
+from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
@@ -38,7 +38,7 @@ class ContactMutant(MechanismMutant):
         self.scenes, self.t = scene, 0.0
         self.mechanism = self.other(mechanism_of(scene))
         self.dynamics = self.law(self.mechanism)
-        self.tree = ContactTree(self.dynamics, _TOLERANCE, 1.0, TOUCHING)
+        self.tree = ContactTree(self.dynamics, _TOLERANCE, 1.0)
         self.path = follow(self.tree, self.until + 4 * STEP)
 
     def advance(self, t: float) -> None:

@@ -286,6 +286,17 @@ def test_a_foot_that_slides_rebounds_from_a_stop() -> None:
     assert np.isinf(found.horizon)
 
 
+@pytest.mark.parametrize(
+    ("laws", "kinds"), [({"sole": 0.0, "pull": 3.0}, ["impact"]), ({"restitution": 0.5}, ["impact", "turn"])]
+)
+def test_a_stop_that_is_approached_at_first_is_hit_at_once(laws: dict[str, float], kinds: list[str]) -> None:
+    """A joint that starts at its stop and moves into it has an impact at time 0, as it has without contacts."""
+    found = truth_of(dragged(limits=(-1.0, 0.0), **laws), np.array([0.0, 0.3]))
+    assert [kind for kind, _ in happened(found)] == kinds
+    times_of(found, *[0.0] * len(kinds))
+    assert np.isinf(found.horizon)
+
+
 def test_a_smooth_foot_is_pressed_against_a_stop() -> None:
     """A stop that returns nothing bears what pulls the foot on."""
     found = truth_of(dragged(limits=(-1.0, 0.1), sole=0.0, pull=3.0), np.array([0.0, 0.3]))

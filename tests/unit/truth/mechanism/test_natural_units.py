@@ -157,7 +157,7 @@ def test_an_effort_that_starts_at_its_limit_passes_it() -> None:
     flick = mechanism_of("flick")
     servo = replace(flick.actuators[0], kind="torque", target=Formula("0.5 + t^3"), kp=0.0, kd=0.0, limit=0.5)
     mechanism = replace(flick, actuators=(servo,))
-    tree = ContactTree(ContactDynamics(mechanism), 1e-14, 1.0, 1e-9)
+    tree = ContactTree(ContactDynamics(mechanism), 1e-14, 1.0)
     begun = tree.begin()
     law = tree._law(begun.state, begun.mode)
     assert law.guards(begun.state)[-1] <= 0.0

@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMo
 from proofroll.elements.mechanism.contacts.coulomb import sure
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
-from proofroll.elements.mechanism.contacts.start import TOUCHING, least_speed, touches
+from proofroll.elements.mechanism.contacts.start import Scale, closed_and_still, scale_of, touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion
@@ -204,14 +204,14 @@ class ContactDynamics:
         K = np.concatenate(rows)
         return _held(state.W, K, K @ v)
 
-    def begin(self, touching: float = TOUCHING) -> tuple[ContactMode, float]:
-        """Mode at the start, where a gap is closed up to ``touching``, and how far it is from another one, relative."""
+    def begin(self, scale: Scale | None = None) -> tuple[ContactMode, float]:
+        """Mode at the start, and how far it is from another one, relative; ``scale``: None: the mechanism's own."""
         q, v = self.mechanism.start()
-        state = self.at(q, v)
-        least = least_speed(state.solution.motion, state.touching)
-        closed = [each.gap <= touching and float(each.normal @ each.slide) <= least for each in state.touching]
-        still = [bool(np.linalg.norm(each.slide) <= least) for each in state.touching]
-        return self.decided(q, v, closed, still)
+        scale = scale or scale_of(self.mechanism)
+        turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != "prismatic"
+                 for c in self.contacts]  # fmt: skip
+        lengths = np.where(turns, 1.0, scale.length)
+        return self.decided(q, v, *closed_and_still(self.at(q, v).touching, lengths, scale.rate))
 
     def decided(
         self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool], time: float = 0.0

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
+from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 
-# m: digits of a file, by which shapes may be apart or overlap and still touch.
+# Part of a natural length, or rad: digits of a file, by which shapes may be apart or overlap and still touch.
 TOUCHING = 1e-9
-# m/s, and part of the fastest body's speed: digits of a file, by which what touches may part, approach or slide.
+# Part of a natural speed: digits of a file, by which what touches may part, approach or slide.
 STILL = 1e-9
 
 
@@ -28,9 +30,62 @@ def touches(mechanism: Mechanism, motion: BodyMotion) -> tuple[Touching, ...]:
     return tuple(touch(contact, moving(contact.body_a), moving(contact.body_b)) for contact in mechanism.contacts)
 
 
-def least_speed(motion: BodyMotion, found: Sequence[Touching]) -> float:
-    """Speed below which a contact does not move at the start [m/s]."""
-    return STILL * max([1.0, *(float(np.linalg.norm(each.slide)) for each in found), float(np.abs(motion.v_WB).max())])
+def extent(mechanism: Mechanism, motion: BodyMotion) -> float:
+    """Largest distance between joints, centres of mass, tracked points and contacts at one instant [m]."""
+    own = [(joint.child, joint.child_position) for joint in mechanism.joints]
+    own += [(body.name, body.com) for body in mechanism.bodies]
+    own += [(point.body, point.position) for point in mechanism.points]
+    index = mechanism.body_index
+    places = [motion.p_WB[index[body]] + motion.R_WB[index[body]] @ np.array(at) for body, at in own]
+    if not mechanism.points:
+        places += list(motion.p_WB[:-1])
+    places += [each.place for each in touches(mechanism, motion)]
+    return float(np.max(np.linalg.norm(np.array(places)[:, None] - np.array(places)[None], axis=-1)))
+
+
+class Scale(NamedTuple):
+    """Natural length [m] and rate [1/s] of a mechanism at its start."""
+
+    length: float
+    rate: float
+
+    @property
+    def gap(self) -> float:
+        """Largest gap of bodies that touch [m]."""
+        return TOUCHING * self.length
+
+    @property
+    def speed(self) -> float:
+        """Largest speed of what stands [m/s]."""
+        return STILL * self.length * self.rate
+
+
+def scale_of(mechanism: Mechanism, motion: BodyMotion | None = None) -> Scale:
+    """Scale of a mechanism, by its extent, its gravity and its first velocities."""
+    motion = motion or Tree(mechanism).at(*mechanism.start())
+    length = extent(mechanism, motion) or 1.0
+    speeds = float(np.abs(motion.v_WB).max()) / length, float(np.abs(motion.w_WB).max())
+    return Scale(length, max(float(np.sqrt(np.linalg.norm(mechanism.gravity) / length)), *speeds))
+
+
+def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float) -> tuple[list[bool], list[bool]]:
+    """True for each contact that is closed at the start and stays so for a moment, and for those of them that stand.
+
+    Args:
+        found: the contacts.
+        lengths: natural length along each, 1 of an angle.
+        rate: natural rate [1/s].
+    """
+    rate = max([rate, *(float(np.linalg.norm(each.slide)) / size for each, size in zip(found, lengths, strict=True))])
+    closed = [
+        each.gap <= TOUCHING * size and abs(float(each.normal @ each.slide)) <= STILL * size * rate
+        for each, size in zip(found, lengths, strict=True)
+    ]
+    still = [
+        shut and bool(np.linalg.norm(each.slide) <= STILL * size * rate)
+        for shut, each, size in zip(closed, found, lengths, strict=True)
+    ]
+    return closed, still
 
 
 def check_contacts(mechanism: Mechanism) -> None:
@@ -42,15 +97,14 @@ def check_contacts(mechanism: Mechanism) -> None:
     if not mechanism.contacts:
         return
     motion = Tree(mechanism).at(*mechanism.start())
-    found = touches(mechanism, motion)
-    still = least_speed(motion, found)
-    for contact, each in zip(mechanism.contacts, found, strict=True):
+    scale = scale_of(mechanism, motion)
+    for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
-        if each.gap < -TOUCHING:
+        if each.gap < -scale.gap:
             advice = f"they overlap by {-each.gap:.3g} m at the start; move one"
             raise InputError(f"pairs.{contact.name}", between, advice)
         closing = -float(each.normal @ each.slide)
-        if each.gap <= TOUCHING and closing > still:
+        if each.gap <= scale.gap and closing > scale.speed:
             advice = (
                 f"they touch and approach at {closing:.3g} m/s, an impact at time 0; correct v0 or start them apart"
             )

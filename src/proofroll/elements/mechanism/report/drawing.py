@@ -100,7 +100,7 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
             if path.round(3).tobytes() not in drawn_already:
                 picture.path(path, "hidden" if isinstance(shape, HalfSpace) else "thin")
                 drawn_already.add(path.round(3).tobytes())
-        if each.gap <= TOUCHING and len(touching) <= _MOST_NAMES:
+        if each.gap <= TOUCHING * element.length and len(touching) <= _MOST_NAMES:
             _name(picture, np.asarray(at(each.place)), contact.name, "letter", (0.0, 14.0))
 
 
