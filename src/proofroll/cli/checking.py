@@ -34,15 +34,12 @@ def check_text(name: str, as_json: bool, plot: Path | None = None) -> None:
     sound = checked(name)
     if plot is not None:
         _draw(sound, plot)
-    if as_json:
-        options.write_json(sound)
-        return
     counts = ", ".join(counted(count, what) for what, count in sound.counts.items())
     needs = f"; engines must provide: {', '.join(sound.requires)}" if sound.requires else ""
     about = f"{sound.scene}, " if sound.kind != "scene" and sound.scene else ""
     head = f"{sound.name} is sound: {sound.kind}, {about}{counts}{needs}"
     drawn = [] if plot is None else [f"The plot is in {plot}."]
-    options.show(sound, False, lambda: [head, *(f"  {line}" for line in sound.start), *drawn])
+    options.show(sound, as_json, lambda: [head, *(f"  {line}" for line in sound.start), *drawn])
 
 
 def _draw(file: SoundFile, plot: Path) -> None:

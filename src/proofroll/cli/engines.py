@@ -36,10 +36,8 @@ def listed(context: typer.Context, as_json: options.Json = False) -> None:
 
     from proofroll.report.terminal.tables import console
 
-    installed, provided = Table(box=None, pad_edge=False), Table(box=None, pad_edge=False)
-    for table, columns in ((installed, ("engine", "version", "formulations (presets)")), (provided, ("", "provides"))):
-        for column in columns:
-            table.add_column(column)
+    installed = Table("engine", "version", "formulations (presets)", box=None, pad_edge=False)
+    provided = Table("", "provides", box=None, pad_edge=False)
     for item in described:
         name = item["name"]
         if item["status"] != "installed":

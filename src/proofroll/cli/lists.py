@@ -46,9 +46,8 @@ def _tables(files: Mapping[str, SceneFile]) -> Iterator[Table | str]:
     from rich.table import Table
 
     for name, file in files.items():
-        table = Table(title=f"{name}: {file.title}", title_justify="left", box=None, pad_edge=False)
-        for column in ("parameter", "symbol", "default", "unit", "meaning"):
-            table.add_column(column)
+        columns = ("parameter", "symbol", "default", "unit", "meaning")
+        table = Table(*columns, title=f"{name}: {file.title}", title_justify="left", box=None, pad_edge=False)
         for key, item in file.parameters.items():
             value = item.value if isinstance(item.value, str) else f"{item.value:g}"
             table.add_row(key, item.symbol, value, item.unit, item.meaning)

@@ -115,17 +115,13 @@ class EarlierReport:
         try:
             said: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             table, made = said["table"], said["environment"]
-            lines = [TableLine(**_known(dict(zip(table["columns"], row, strict=True)))) for row in table["data"]]
+            rows = [zip(table["columns"], row, strict=True) for row in table["data"]]
+            lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
             return cls(path, said["date"], made["machine"], made["versions"], lines)
         except OSError as problem:
             raise InputError(option, path, f"cannot be read: {problem.strerror}") from None
         except (KeyError, TypeError, ValueError):
             raise InputError(option, path, "is no report.json with a long table; proofroll report writes one") from None
-
-
-def _known(values: dict[str, Any]) -> dict[str, Any]:
-    """The values of columns that this version has."""
-    return {name: value for name, value in values.items() if name in COLUMNS}
 
 
 def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versions: dict[str, str]) -> Against:

@@ -14,17 +14,23 @@ from proofroll.robots.protocol import Reading
 from proofroll.robots.states import RobotStates
 from proofroll.robots.two_formulations import Dynamics, Frames, passive, poses, world_jacobians
 
-LAYERS = {
-    "joints": "joints that are absent, added, or follow no other although the file says so",
-    "mass": "mass carried by all moving joints [relative]",
-    "kinematics": "position and rotation of each body [m, 1]",
-    "bodies": "mass, first moment and inertia of what each joint carries [relative, m]",
-    "mass matrix": "M [relative]",
-    "gravity": "torque of gravity [relative]",
-    "bias": "torque of gravity and velocities [relative]",
-    "inverse dynamics": "torque for given accelerations, without damping, friction and springs [relative]",
-    "forward dynamics": "what is left of the equation of motion, damping, friction and springs included [relative]",
+# Layer: its name in few characters, and what is compared.
+_LAYERS = {
+    "joints": ("joints", "joints that are absent, added, or follow no other although the file says so"),
+    "mass": ("mass", "mass carried by all moving joints [relative]"),
+    "kinematics": ("poses", "position and rotation of each body [m, 1]"),
+    "bodies": ("bodies", "mass, first moment and inertia of what each joint carries [relative, m]"),
+    "mass matrix": ("M", "M [relative]"),
+    "gravity": ("g", "torque of gravity [relative]"),
+    "bias": ("h", "torque of gravity and velocities [relative]"),
+    "inverse dynamics": ("inv", "torque for given accelerations, without damping, friction and springs [relative]"),
+    "forward dynamics": (
+        "fwd",
+        "what is left of the equation of motion, damping, friction and springs included [relative]",
+    ),
 }
+SHORT = {layer: short for layer, (short, _) in _LAYERS.items()}
+LAYERS = {layer: compared for layer, (_, compared) in _LAYERS.items()}
 # Round-off of two formulations is 1e-15 to 3e-14 on robots with up to 67 velocities; the smallest known defect of an
 # importer is 1e-7.
 TOLERANCE = 1e-10

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from proofroll.robots.model import Robot, RobotJoint
+from proofroll.robots.model import Robot
 from proofroll.robots.plausibility import implausible
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
@@ -48,12 +48,8 @@ def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
     for joint in robot.moving:
         if joint.kind == "free" or robot.groups[joint.name].mass:
             continue
-        if not any(other.parent == child for other in robot.moving for child in _carried(robot, joint)):
+        if not any(robot.welded[other.parent][0] == joint.name for other in robot.moving):
             yield "error", f"joint {joint.name}", "it moves no mass: the mass matrix is singular"
-
-
-def _carried(robot: Robot, joint: RobotJoint) -> list[str]:
-    return [name for name, (home, _, _) in robot.welded.items() if home == joint.name]
 
 
 def _joints(robot: Robot) -> Iterator[_Noticed]:

@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element
 
 from proofroll.robots.mjcf_classes import class_of, with_classes
 from proofroll.robots.model import Robot
+from proofroll.robots.robot_file import floats
 
 _PLAIN = {"motor", "position", "velocity", "general"}
 # Attributes that make something else of an actuator where they are not these values.
@@ -31,7 +32,7 @@ def motors(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]
         else:
             other.update(merged or {})
     for item, of_joint in with_classes(root, "joint"):
-        ends = _numbers(of_joint.get("actuatorfrcrange", ""))
+        ends = floats(of_joint.get("actuatorfrcrange", ""))
         for table in [table for table in actuators if ends and table["joint"] == item.get("name")]:
             table["limit"] = min(ends[1], table.get("limit", ends[1]))
             if ends[0] != -ends[1]:
@@ -60,7 +61,7 @@ def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
     if tag not in _PLAIN or any(given.get(key, plain) != plain for key, plain in _OTHER.items()):
         return None
     kp, kd = _gains(tag, given)
-    gear = (_numbers(given.get("gear", "")) or [1.0])[0]
+    gear = (floats(given.get("gear", "")) or [1.0])[0]
     low, high = _range(given, "ctrl") or (0.0, 0.0)
     force = _range(given, "force")
     if not gear or kp < 0 or kd < 0 or (force and force[0] != -force[1]) or (force and force[1] <= 0):
@@ -79,7 +80,7 @@ def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:
         return float(given.get("kp", 1.0)), float(given.get("kv", 0.0))
     if tag == "velocity":
         return 0.0, float(given.get("kv", 1.0))
-    bias = [*_numbers(given.get("biasprm", "")), 0.0, 0.0, 0.0]
+    bias = [*floats(given.get("biasprm", "")), 0.0, 0.0, 0.0]
     if tag == "motor" or given.get("biastype", "none") == "none":
         return 0.0, 0.0
     plain = given["biastype"] == "affine" and not bias[0]
@@ -99,11 +100,7 @@ def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | 
 
 def _range(given: Mapping[str, str], what: str) -> tuple[float, float] | None:
     """Range of a control or force where the file limits it; None: it does not."""
-    ends = _numbers(given.get(f"{what}range", ""))
+    ends = floats(given.get(f"{what}range", ""))
     if given.get(f"{what}limited") == "false" or len(ends) != 2:
         return None
     return ends[0], ends[1]
-
-
-def _numbers(text: str) -> list[float]:
-    return [float(number) for number in text.split()]

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.report.pages import environment, rendered
+from proofroll.robots.layers import SHORT
 from proofroll.robots.records import AgainstCheck, RobotCheck
-from proofroll.robots.terminal import SHORT, amount, sentences
+from proofroll.robots.terminal import amount, sentences
 
 if TYPE_CHECKING:
     import jinja2

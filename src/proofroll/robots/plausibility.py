@@ -9,7 +9,7 @@ import numpy as np
 
 from proofroll.robots.mjcf_classes import with_classes
 from proofroll.robots.model import Robot, RobotBody
-from proofroll.robots.robot_file import RobotFile
+from proofroll.robots.robot_file import RobotFile, floats
 
 # Machines larger than this are rarer than lengths in millimetres [m].
 _LARGE = 10.0
@@ -68,7 +68,7 @@ def _urdf_angles(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]
             yield "warning", f"joint {joint.name}", words
     for owner in (*file.root.findall("joint"), *file.root.findall("link")):
         for origin in owner.iter("origin"):
-            turns = [abs(turn) for turn in _numbers(origin.get("rpy", "0"))]
+            turns = [abs(turn) for turn in floats(origin.get("rpy", "0"))]
             if max(turns) > _TURNS[0]:
                 where = f"{owner.tag} {owner.get('name')}"
                 yield "warning", where, f"rpy {origin.get('rpy')}: angles are radians"
@@ -79,15 +79,11 @@ def _mjcf_joints(file: RobotFile) -> Iterator[tuple[str, str, str]]:
     for joint, given in with_classes(file.root, "joint"):
         where = f"joint {joint.get('name')}"
         if given.get("type") == "free":
-            laws = [name for name in _LAWS if name not in joint.attrib and any(_numbers(given.get(name, "0")))]
+            laws = [name for name in _LAWS if name not in joint.attrib and any(floats(given.get(name, "0")))]
             if laws:
                 words = f"it inherits {' and '.join(f'{law} {given[law]}' for law in laws)} from a default class"
                 yield "warning", where, f"{words}, which acts on the flight of the body; write <freejoint/>"
         elif given.get("type", "hinge") == "hinge" and degrees and "range" in given:
-            bounds = [abs(bound) for bound in _numbers(given["range"])]
+            bounds = [abs(bound) for bound in floats(given["range"])]
             if any(abs(bound - angle) < 0.005 for bound in bounds for angle in _IN_RADIANS):
                 yield "warning", where, f'range {given["range"]} is in degrees; radians need <compiler angle="radian"/>'
-
-
-def _numbers(text: str) -> list[float]:
-    return [float(part) for part in text.split()]

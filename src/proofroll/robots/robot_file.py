@@ -180,3 +180,8 @@ def numbers(element: Element, attribute: str, default: str | None, count: int) -
     if not all(map(math.isfinite, values)):
         raise InputError(field, text, "numbers must be finite")
     return values
+
+
+def floats(text: str) -> list[float]:
+    """The numbers in a text, however many."""
+    return [float(part) for part in text.split()]

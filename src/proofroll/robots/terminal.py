@@ -13,21 +13,11 @@ from proofroll.core.number_format import counted, error
 from proofroll.report.labels import SYMBOLS
 from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.report.terminal.tables import STYLES
+from proofroll.robots.layers import SHORT
 from proofroll.robots.records import AgainstCheck, GalleryContent, HeldLayer, ImporterRow, RobotCheck
 from proofroll.robots.robot_file import LintRemark
 
 WIDTH = 80
-SHORT = {
-    "joints": "joints",
-    "mass": "mass",
-    "kinematics": "poses",
-    "bodies": "bodies",
-    "mass matrix": "M",
-    "gravity": "g",
-    "bias": "h",
-    "inverse dynamics": "inv",
-    "forward dynamics": "fwd",
-}
 _MARKS = {"holds": "✓", "explained": "✗", "differs": "✗", "refused": SYMBOLS["refused"], "missing": " "}
 _COLOURS = {"holds": "green", "explained": "yellow", "differs": "red", "refused": STYLES["refused"]}
 

@@ -134,11 +134,6 @@ def left_at(dataset: xr.Dataset) -> float:
     return min((event.time for event in events_of(dataset) if event.kind == "lift_off"), default=math.inf)
 
 
-def _on_wall(dataset: xr.Dataset, start: str) -> list[str]:
-    """Variables with this prefix that exist on the wall only."""
-    return [start + name for name in _ON_WALL if start + name in dataset]
-
-
 def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
     """The truth and the runs up to the end of the shortest, and what is on the wall up to the first lift-off of any.
 
@@ -154,7 +149,8 @@ def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.D
 
     def cut(dataset: xr.Dataset) -> xr.Dataset:
         short = dataset.isel(time=slice(count))
-        there = [(name, at) for at, start in (("time", ""), ("between", "between.")) for name in _on_wall(short, start)]
+        prefixes = (("time", ""), ("between", "between."))
+        there = [(start + name, at) for at, start in prefixes for name in _ON_WALL if start + name in short]
         on_wall = {
             name: short[name].where(short[at] < until, 0.0).assign_attrs(short[name].attrs) for name, at in there
         }

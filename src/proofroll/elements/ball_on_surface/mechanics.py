@@ -145,12 +145,20 @@ def _way(body: RollingBall) -> FloatArray:
 
 
 def newton_euler(
-    body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArray
+    body: RollingBall,
+    p_WB: FloatArray,
+    v_WB: FloatArray,
+    w_WB: FloatArray,
+    *,
+    force: FloatArray | float = 0.0,
+    moment: FloatArray | float = 0.0,
+    resistance: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """p̈ [m/s²], ω̇ [rad/s²] and the wall's force on the ball [N] while rolling without slip, each shape (3,).
 
     Unreduced: six equations of motion and three acceleration constraints, in the world frame, with no
-    parametrisation of the surface.
+    parametrisation of the surface. A ``force`` [N] and a ``moment`` [N m] may act besides; a ``resistance`` is the
+    moment of another law of rolling resistance for N = 1 [m].
     """
     a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
     e1 = body.surface.normal(p_WB)
@@ -160,16 +168,18 @@ def newton_euler(
     # v + a ω × e1 = 0 holds along the tangents only by rolling, along e1 by the wall: both are one vector equation,
     # since (ω × e1) · e1 = 0. Its derivative is the last block.
     cross_e1 = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])  # [e1]× y = e1 × y
-    # -N = R · e1, and the resistance is linear in N: M = f (v/V) × (R·e1) e1.
-    resistance = np.outer(resistance_moment(f, -1.0, e1, v_WB), e1) if f else np.zeros((3, 3))
+    if resistance is None and f:
+        resistance = resistance_moment(f, 1.0, e1, v_WB)
     matrix = np.zeros((9, 9))
     matrix[:3, :3] = m * np.eye(3)
     matrix[:3, 6:] = -np.eye(3)
     matrix[3:6, 3:6] = J * np.eye(3)
-    matrix[3:6, 6:] = -a * cross_e1 - resistance
+    matrix[3:6, 6:] = -a * cross_e1
+    if resistance is not None:  # it is linear in N, and -N = R · e1: M = f (v/V) × (R·e1) e1
+        matrix[3:6, 6:] += np.outer(resistance, e1)
     matrix[6:, :3] = np.eye(3)
     matrix[6:, 3:6] = -a * cross_e1
-    right = np.concatenate([m * body.gravity, np.zeros(3), -a * cross(w_WB, e1_rate)])
+    right = np.concatenate([m * body.gravity + force, np.zeros(3) + moment, -a * cross(w_WB, e1_rate)])
     if body.wall_rate is not None:  # v + a ω × e1 is the wall's velocity W × (p + a e1), whose rate this is
         right[6:] += cross(body.wall_rate, v_WB + a * e1_rate)
     solution = np.linalg.solve(matrix, right)

@@ -48,6 +48,8 @@ _SHAPES = {
     "contact_response": ((-1, 3, -1, 3),),
     **dict.fromkeys(("rows", "rank", "mobility", "mass_matrix_error"), ((), (1,))),
 }
+# Quantity, unit, expected and given values, scale of their difference.
+_Compare = Callable[[str, str, Any, Any, float], None]
 
 
 def _require_readable(built: MechanismBuilt) -> None:
@@ -115,12 +117,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     return lines
 
 
-def _compare_contacts(
-    element: MechanismElement,
-    built: MechanismBuilt,
-    compare: Callable[[str, str, Any, Any, float], None],
-    lines: list[Line],
-) -> None:
+def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare: _Compare, lines: list[Line]) -> None:
     """Compares gaps, normals, places and coefficients of contacts, and names the law that the model has."""
     contacts = element.mechanism.contacts
     if not contacts:
@@ -138,9 +135,7 @@ def _compare_contacts(
     _compare_response(element, built, compare)
 
 
-def _compare_response(
-    element: MechanismElement, built: MechanismBuilt, compare: Callable[[str, str, Any, Any, float], None]
-) -> None:
+def _compare_response(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:
     """Compares the Delassus matrix of what touches, along the directions in which the pairs have forces."""
     mechanism = element.mechanism
     try:
@@ -161,10 +156,7 @@ def _compare_response(
 
 
 def _compare_press(
-    element: MechanismElement,
-    built: MechanismBuilt,
-    sample: MechanismSample,
-    compare: Callable[[str, str, Any, Any, float], None],
+    element: MechanismElement, built: MechanismBuilt, sample: MechanismSample, compare: _Compare
 ) -> None:
     """Compares the first forces of contacts, as far as they are determinate; a first step as soft as a hop has none."""
     if not element.mechanism.contacts:
@@ -178,10 +170,7 @@ def _compare_press(
 
 
 def _compare_reactions(
-    element: MechanismElement,
-    built: MechanismBuilt,
-    sample: MechanismSample,
-    compare: Callable[[str, str, Any, Any, float], None],
+    element: MechanismElement, built: MechanismBuilt, sample: MechanismSample, compare: _Compare
 ) -> None:
     """Named forces, and forces and moments as far as they are determinate; models without them are not asked."""
     _compare_press(element, built, sample, compare)
@@ -197,9 +186,7 @@ def _compare_reactions(
     compare("torques", "N m", wrench[:, 3:], reactions(element, sample, "joint_torque"), torque)
 
 
-def _compare_named(
-    element: MechanismElement, sample: MechanismSample, compare: Callable[[str, str, Any, Any, float], None]
-) -> None:
+def _compare_named(element: MechanismElement, sample: MechanismSample, compare: _Compare) -> None:
     """Efforts and forces of couplings."""
     names, natural = named_forces(element.mechanism), element.first_motion.scale * element.length
     natural *= sum(body.mass for body in element.mechanism.bodies)

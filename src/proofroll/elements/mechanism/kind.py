@@ -12,7 +12,7 @@ from proofroll.core.parameters import Parameters
 from proofroll.core.scene import Scene
 from proofroll.core.validation import all_units_of
 from proofroll.elements.mechanism.drives import Actuator, Coupling
-from proofroll.elements.mechanism.element import MechanismElement
+from proofroll.elements.mechanism.element import MechanismElement, the_mechanism
 from proofroll.elements.mechanism.reader import KINDS, made_mechanism
 from proofroll.elements.mechanism.signal import Formula
 
@@ -26,33 +26,28 @@ _LAWS: Mapping[str, float] = {"damping": 2.0, "torque": 3.0, "armature": 0.3, "f
 _SPEED = 1.0  # rad/s, at which a damper acts
 
 
+def _changed(scene: Scene, name: str, **parts: Any) -> Scene:
+    """The scene with other parts of its mechanism."""
+    element = the_mechanism(scene)
+    return replace(scene, name=name, elements=(replace(element, mechanism=replace(element.mechanism, **parts)),))
+
+
 def _with_law(scene: Scene, law: str, value: float) -> Scene:
     """A scene of hinges whose joints all move, with the law in each."""
-    (element,) = scene.elements
-    assert isinstance(element, MechanismElement)  # it is one of ours
-    mechanism = element.mechanism
     changes: dict[str, Any] = {law: value, "v0": (_SPEED,)}
-    joints = tuple(replace(joint, **changes) for joint in mechanism.joints)
-    changed = replace(element, mechanism=replace(mechanism, joints=joints))
-    return replace(scene, name=f"{scene.name}-{law}", elements=(changed,))
+    joints = tuple(replace(joint, **changes) for joint in the_mechanism(scene).mechanism.joints)
+    return _changed(scene, f"{scene.name}-{law}", joints=joints)
 
 
 def _falling(scene: Scene) -> Scene:
     """A scene of a free body, with gravity and a centre of mass outside the origin of its frame."""
-    (element,) = scene.elements
-    assert isinstance(element, MechanismElement)  # it is one of ours
-    (body,) = element.mechanism.bodies
-    body = replace(body, com=(0.1, -0.2, 0.3))
-    changed = replace(element, mechanism=replace(element.mechanism, bodies=(body,), gravity=(0.0, 0.0, -9.81)))
-    return replace(scene, name="falling_body", elements=(changed,))
+    (body,) = the_mechanism(scene).mechanism.bodies
+    return _changed(scene, "falling_body", bodies=(replace(body, com=(0.1, -0.2, 0.3)),), gravity=(0.0, 0.0, -9.81))
 
 
 def _with_drive(scene: Scene, drive: str) -> Scene:
     """A scene of two hinges that both move, with an actuator at the second or a coupling of the two."""
-    (element,) = scene.elements
-    assert isinstance(element, MechanismElement)  # it is one of ours
-    joints = tuple(replace(joint, v0=(_SPEED,)) for joint in element.mechanism.joints)
-    one, two = joints
+    joints = one, two = tuple(replace(joint, v0=(_SPEED,)) for joint in the_mechanism(scene).mechanism.joints)
     servo = Actuator("servo", two.name, "position", 1.0, kp=30.0, kd=2.0, gear=2.0)
     of_time = replace(servo, target=Formula("cos(5*t)"))
     drives: Mapping[str, Mapping[str, Any]] = {
@@ -61,8 +56,7 @@ def _with_drive(scene: Scene, drive: str) -> Scene:
         "target": {"actuators": (of_time,)},
         "coupling": {"couplings": (Coupling("gear", one.name, two.name, 1.0, two.q0[0] - one.q0[0]),)},
     }
-    changed = replace(element, mechanism=replace(element.mechanism, joints=joints, **drives[drive]))
-    return replace(scene, name=f"{scene.name}-{drive}", elements=(changed,))
+    return _changed(scene, f"{scene.name}-{drive}", joints=joints, **drives[drive])
 
 
 # s: the spheres then stick as they hit at 0.03822 s, which half a step sees sooner than a step of 2e-3 s or less.
@@ -72,26 +66,18 @@ _DRIVES = ("servo", "limit", "target", "coupling")
 
 def _sooner(scene: Scene, time: float) -> Scene:
     """A scene of spheres that fly freely, with what happens so much sooner [s]."""
-    (element,) = scene.elements
-    assert isinstance(element, MechanismElement)  # it is one of ours
     joints = tuple(
         replace(joint, q0=(*(x + time * v for x, v in zip(joint.q0[:3], joint.v0[:3], strict=True)), *joint.q0[3:]))
-        for joint in element.mechanism.joints
+        for joint in the_mechanism(scene).mechanism.joints
     )
-    changed = replace(element, mechanism=replace(element.mechanism, joints=joints))
-    return replace(scene, elements=(changed,))
+    return _changed(scene, scene.name, joints=joints)
 
 
 class MechanismKind:
     """See :class:`proofroll.core.element.ElementKind`."""
 
     name: ClassVar[str] = "mechanism"
-    tables: ClassVar[tuple[str, ...]] = (
-        *KINDS,
-        "repeat",
-        "published",
-        "unmodelled",
-    )
+    tables: ClassVar[tuple[str, ...]] = (*KINDS, "repeat", "published", "unmodelled")
     units: ClassVar[Mapping[str, str]] = all_units_of(*KINDS.values())
 
     @staticmethod

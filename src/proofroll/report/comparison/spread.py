@@ -73,10 +73,11 @@ def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], r
     assert point.reference is not None  # else no law was judged
     truth, lines = point.reference.dataset, list[SpreadLine]()
     end = float(truth["time"].to_numpy()[-1])
+    whole = {row: run for row, run in runs.items() if run["time"].to_numpy()[-1] == end}
     for key, item in point.scene.observables.items():
         if item.role is not Role.MOTION or not (item.headline or item.watched) or key not in truth:
             continue
-        last = {row: np.ravel(run[key].to_numpy()[-1]) for row, run in runs.items() if key in run and _ends(run, end)}
+        last = {row: np.ravel(run[key].to_numpy()[-1]) for row, run in whole.items() if key in run}
         finite = {row: values for row, values in last.items() if np.all(np.isfinite(values))}
         size = max((float(np.max(np.abs(values))) for values in finite.values()), default=0.0)
         for place, column in enumerate(column_names(truth[key]) if size else ()):
@@ -86,7 +87,3 @@ def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], r
                 shown = [values.get(row) for row in range(rows)]
                 lines.append(SpreadLine(column, item.unit, shown, low, high, (high - low) / size))
     return Spread(name, str(truth.attrs["ill_posed"]), end, lines)
-
-
-def _ends(run: xr.Dataset, end: float) -> bool:
-    return bool(run["time"].to_numpy()[-1] == end)

@@ -61,10 +61,11 @@ def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> 
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
     limits = _limit(lines, "motion"), _limit(lines, "reaction")
+    anchors = {"": href} | {place: f"{href}-r{lines[0].row}-p{number}" for number, place in enumerate(places)}
     steps = []
     for value in dict.fromkeys(line.step for line in lines):
         at = {place: [line for line in lines if line.step == value and line.place == place] for place in needed}
-        steps.append(_candidate(lines[0], value, at, limits=limits, anchors=_anchors(href, lines[0].row, places)))
+        steps.append(_candidate(lines[0], value, at, limits=limits, anchors=anchors))
     return sorted(steps, key=lambda item: item.name != _name(lines[0], own))
 
 
@@ -76,6 +77,7 @@ def _candidate(
     limits: tuple[LimitResult, LimitResult],
     anchors: dict[str, str],
 ) -> Candidate:
+    """One step of a row; ``anchors`` are ids of the evidence by place, under the empty name that of the study."""
     name, href = _name(first, value), anchors.get("", "")
     judged = {
         place: [line for line in lines if line.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}]
@@ -133,8 +135,3 @@ def _name(line: TableLine, value: float | None) -> str:
     words = " ".join(filter(None, (line.engine, line.formulation, line.setting)))
     size = step(line.resolution or None, value)
     return f"{words} at {size}" if size else words
-
-
-def _anchors(href: str, row: int, places: Sequence[str]) -> dict[str, str]:
-    """Id of the evidence by place; under the empty name that of the study."""
-    return {"": href} | {place: f"{href}-r{row}-p{number}" for number, place in enumerate(places)}

@@ -92,7 +92,8 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     turned = {key: item for key, item in columns.variables.items() if case.asks and item.dims == ("time", "wxyz")}
     for key, item in turned.items():
         curves |= {f"{key}.{part}": item._replace(values=item.values[:, i]) for i, part in enumerate("wxyz")}
-    smallest = {name: float(value) for key, value in columns.attrs.items() if (name := _after(SMALLEST, key))}
+    least = {key: value for key, value in columns.attrs.items() if key.startswith(SMALLEST)}
+    smallest = {key.removeprefix(SMALLEST): float(value) for key, value in least.items()}
     return replace(
         content,
         final={"time": float(columns["time"].values[-1])} | {name: float(c.values[-1]) for name, c in curves.items()},
@@ -105,10 +106,6 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
     )
 
 
-def _after(head: str, key: str) -> str:
-    return key.removeprefix(head) if key.startswith(head) else ""
-
-
 def _told(event: Event) -> str:
     """One event with its bracket, and what it happens to where it has a name."""
     bar = number(0.5 * (event.time_high - event.time_low), 1)
@@ -118,7 +115,7 @@ def _told(event: Event) -> str:
 
 def run_lines(content: RunContent) -> list[Any]:
     """Lines and tables about a run for the terminal, printed by rich."""
-    from rich.table import Table
+    from rich.table import Column, Table
     from rich.text import Text
 
     settings = ", ".join(filter(None, (settings_text(content.settings), *precision_words(content.precision))))
@@ -128,12 +125,8 @@ def run_lines(content: RunContent) -> list[Any]:
     if not content.final:
         return lines
     bars = content.error_bars or {}
-    table = Table(box=None, pad_edge=False)
-    table.add_column("at the end")
-    table.add_column("value", justify="right")
-    table.add_column("unit")
-    if bars:
-        table.add_column("error bar", justify="right")
+    of_bars = [Column("error bar", justify="right")] if bars else []
+    table = Table("at the end", Column("value", justify="right"), "unit", *of_bars, box=None, pad_edge=False)
     shown = {name: value for name, value in content.final.items() if name not in content.absent}
     for name, value in shown.items():
         bar = [f"{bars[name]:.1e}" if name in bars else ""] if bars else []

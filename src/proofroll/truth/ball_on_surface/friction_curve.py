@@ -16,9 +16,7 @@ from numpy.polynomial import chebyshev
 from proofroll.core.arrays import FloatArray
 from proofroll.core.crossing import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
-from proofroll.truth.ball_on_surface import taylor
-from proofroll.truth.ball_on_surface.polar import Polar
-from proofroll.truth.ball_on_surface.route import Route
+from proofroll.truth.ball_on_surface.stick_slip import first_route
 
 _UNREACHABLE = 1e6  # a static friction that stands for rolling without slip, and still can be squared
 _POINTS = 12
@@ -82,8 +80,7 @@ class FrictionCurve:
 def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
     """The curve of needed friction from time 0 to ``until`` [s], whatever μ the scene has."""
     endless = body.with_contact(mu_static=_UNREACHABLE, mu_kinetic=_UNREACHABLE)
-    fast = taylor.supports(endless)
-    route: Route = taylor.SlidingTaylor(endless) if fast else Polar(endless)
+    route = first_route(endless)
     leg = route.stick(0.0, route.start(), until)
     # One sample per turn of the ball by about a radian: crests come at the pace of the path, many turns apart.
     pace = body.ball.radius / (np.linalg.norm(body.v0) + np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))

@@ -38,11 +38,8 @@ def supports(body: RollingBall) -> bool:
         return body.contact.rolling_resistance == 0
     if not isinstance(surface, Cylinder):
         return False
-    return body.contact.rolling_resistance == 0 or _vertical(body, surface)
-
-
-def _vertical(body: RollingBall, surface: Cylinder) -> bool:
-    return not np.any(np.cross(body.gravity, surface.generators[1].axis))
+    vertical = not np.any(np.cross(body.gravity, surface.generators[1].axis))
+    return body.contact.rolling_resistance == 0 or vertical
 
 
 class SlidingTaylor(Sliding):

@@ -19,7 +19,12 @@ from proofroll.core.diagnosis import CLOSES, CLOSES_EXACTLY, Evidence
 from proofroll.core.diagnosis.fitting import ABOVE, Residuals, once
 from proofroll.core.diagnosis.lines import differing, left
 from proofroll.core.first_steps import OF_FIRST_STEPS
-from proofroll.elements.ball_on_surface.mechanics import natural_acceleration, resistance_moment, slip_velocity
+from proofroll.elements.ball_on_surface.mechanics import (
+    natural_acceleration,
+    newton_euler,
+    resistance_moment,
+    slip_velocity,
+)
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerations, stretches
 
@@ -65,7 +70,6 @@ class Law:
         moment: applied besides [N m], of e1, the velocity and the angular velocity.
         resisting: moment of the rolling resistance [N m] for N and the angular velocity; None: that of the scene.
         slipping: friction [N] for N and the centre's velocity; None: Coulomb's.
-        lever: distance of the friction from the centre [m]; None: the radius.
     """
 
     body: RollingBall
@@ -73,7 +77,6 @@ class Law:
     moment: Callable[[FloatArray, FloatArray, FloatArray], FloatArray] | None = None
     resisting: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
     slipping: Callable[[RollingBall, float, FloatArray], FloatArray] | None = None
-    lever: float | None = None
 
 
 def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
@@ -118,37 +121,25 @@ def response(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Accelerations and the wall's force at a state: Newton-Euler as in the mechanics, with the law's loads."""
     body = law.body
-    m, J, f = body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
-    a = body.ball.radius if law.lever is None else law.lever
+    a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
     e1 = body.surface.normal(p)
-    bend = body.surface.normal_gradient(p) @ v
-    applied = m * body.gravity + (law.force(v) if law.force else 0.0)
+    loads = law.force(v) if law.force else np.zeros(3)
     turning = law.moment(e1, v, w) if law.moment else np.zeros(3)
-
-    def resisting(N: float) -> FloatArray:
-        if law.resisting is not None:
-            return law.resisting(body, N, w)
-        return resistance_moment(f, N, e1, v)
-
-    if not sticks:
-        N = float(m * bend @ v + applied @ e1)
-        slip = slip_velocity(body.ball.radius, e1, v, w)
-        slip = slip - (slip @ e1) * e1
-        size = float(np.linalg.norm(slip))
-        if law.slipping is not None:
-            friction = law.slipping(body, N, v)
-        else:
-            friction = -body.contact.mu_kinetic * N * slip / size if size else np.zeros(3)
-        force = friction - N * e1
-        return (force + applied) / m, (a * cross(e1, force) + resisting(N) + turning) / J, force
-    cross_e1 = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])
-    matrix, right = np.zeros((9, 9)), np.zeros(9)
-    matrix[:3, :3], matrix[:3, 6:] = m * np.eye(3), -np.eye(3)
-    matrix[3:6, 3:6], matrix[3:6, 6:] = J * np.eye(3), -a * cross_e1 + np.outer(resisting(1.0), e1)
-    matrix[6:, :3], matrix[6:, 3:6] = np.eye(3), -a * cross_e1
-    right[:3], right[3:6], right[6:] = applied, turning, -a * cross(w, bend)
-    solution = np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
-    return solution[:3], solution[3:6], solution[6:]
+    if sticks:
+        held = law.resisting(body, 1.0, w) if law.resisting else None
+        return newton_euler(body, p, v, w, force=loads, moment=turning, resistance=held)
+    applied = m * body.gravity + loads
+    N = float(m * (body.surface.normal_gradient(p) @ v) @ v + applied @ e1)
+    slip = slip_velocity(a, e1, v, w)
+    slip = slip - (slip @ e1) * e1
+    size = float(np.linalg.norm(slip))
+    if law.slipping is not None:
+        friction = law.slipping(body, N, v)
+    else:
+        friction = -body.contact.mu_kinetic * N * slip / size if size else np.zeros(3)
+    force, f = friction - N * e1, body.contact.rolling_resistance
+    resisting = law.resisting(body, N, w) if law.resisting else resistance_moment(f, N, e1, v)
+    return (force + applied) / m, (a * cross(e1, force) + resisting + turning) / J, force
 
 
 @once

@@ -16,12 +16,8 @@ from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resi
 from proofroll.elements.ball_on_surface.model import RollingBall
 
 
-def _contact(body: RollingBall, **changes: float) -> RollingBall:
-    return dataclasses.replace(body, contact=dataclasses.replace(body.contact, **changes))  # type: ignore[arg-type]  # numbers by name
-
-
 def _ball(body: RollingBall, **changes: float) -> RollingBall:
-    return dataclasses.replace(body, ball=dataclasses.replace(body.ball, **changes))  # type: ignore[arg-type]  # likewise
+    return dataclasses.replace(body, ball=dataclasses.replace(body.ball, **changes))  # type: ignore[arg-type]  # numbers by name
 
 
 def _resisting(body: RollingBall, f: float) -> RollingBall:
@@ -32,7 +28,8 @@ def _resisting(body: RollingBall, f: float) -> RollingBall:
 
 
 def _friction(body: RollingBall, mu: float) -> RollingBall:
-    return _contact(body, mu_kinetic=mu, mu_static=max(mu, body.contact.mu_static))
+    contact = dataclasses.replace(body.contact, mu_kinetic=mu, mu_static=max(mu, body.contact.mu_static))
+    return dataclasses.replace(body, contact=contact)
 
 
 def number(

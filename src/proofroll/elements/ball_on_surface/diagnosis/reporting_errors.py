@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -192,11 +192,6 @@ def force_at_start(evidence: Evidence) -> Iterator[Cause]:
     yield from told.causes(evidence.step)
 
 
-def _axes_at_start(element: Any) -> Mapping[str, FloatArray]:
-    body = element.rolling
-    return {SURFACE: body.surface.frame(body.u0)[None]}
-
-
 def _attitudes(evidence: Evidence) -> FloatArray:
     assert evidence.truth is not None
     turned = attitudes(evidence.truth["time"].to_numpy(), evidence.truth["w_WB"].to_numpy())
@@ -210,7 +205,10 @@ REPORTING_ERRORS: tuple[Any, ...] = (
     reported_force,
     at_the_contact,
     stale_normal,
-    at_start(_axes_at_start, frozenset({"slip", "N", "F2", "F3"})),
+    at_start(
+        lambda element: {SURFACE: element.rolling.surface.frame(element.rolling.u0)[None]},
+        frozenset({"slip", "N", "F2", "F3"}),
+    ),
     force_at_start,
     single_precision_run,
     reported_quaternions(_attitudes),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,14 +37,6 @@ def _state(element: Any, data: xr.Dataset) -> FloatArray:
     length, T = element.length, element.natural_time
     parts = [data["p_WB"], data["v_WB"] * T, data["w_WB"] * (length * T), data["q_WB"] * length]
     return np.concatenate(parts, axis=-1)
-
-
-def _frames(evidence: Evidence) -> dict[str, FloatArray]:
-    return {BODY: placed_of(evidence.element.mechanism, evidence.truth).R_WB[:, :-1]}
-
-
-def _axes_at_start(element: Any) -> Mapping[str, FloatArray]:
-    return {BODY: element.start.R_WB[0, :-1]}
 
 
 def _of_centres(told: Reported, evidence: Evidence) -> Iterator[Cause]:
@@ -99,8 +91,14 @@ def _attitudes(evidence: Evidence) -> FloatArray:
 CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque", "motion"))
 REPORTING_ERRORS: tuple[Any, ...] = (
     CLOCK,
-    reported_vectors(_UNITS, _frames, CLOCK, _size, _of_centres),
-    at_start(_axes_at_start, frozenset()),
+    reported_vectors(
+        _UNITS,
+        lambda evidence: {BODY: placed_of(evidence.element.mechanism, evidence.truth).R_WB[:, :-1]},
+        CLOCK,
+        _size,
+        _of_centres,
+    ),
+    at_start(lambda element: {BODY: element.start.R_WB[0, :-1]}, frozenset()),
     centres_at_start,
     reported_quaternions(_attitudes),
     single_precision_run,
