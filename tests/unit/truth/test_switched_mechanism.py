@@ -1,5 +1,7 @@
 """Truths of mechanisms whose joints have dry friction or stops, against closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -87,6 +89,17 @@ def test_which_rebound_is_the_last_hangs_on_no_digit(restitution: float, impacts
     )
     assert np.isinf(found.horizon)
     assert [event.kind for event in found.events] == ["impact"] * impacts + ["settle"]
+
+
+@pytest.mark.parametrize(("height", "restitution"), [(0.0, 1.0), (1e-9, 0.5)])
+def test_what_lies_on_a_stop_or_nearly_so_comes_to_rest(height: float, restitution: float) -> None:
+    """Rebounds that are round-off do not go on for ever, and nothing is dropped on the stop that it lies on."""
+    stop = load_scene("stop", restitution=restitution).elements[0].mechanism  # type: ignore[attr-defined]
+    joint = replace(stop.joints[0], q0=(height,))
+    found = truth_of(replace(stop, joints=(joint,)), np.array([0.0, 0.01]))
+    assert found.record.q[-1, 0] == 0.0
+    ends = [event.time for event in found.events if event.kind == "settle"]
+    assert ends == [pytest.approx(3 * np.sqrt(2 * height / 9.81), rel=1e-12)] * bool(height)
 
 
 def test_friction_that_holds_does_not_creep() -> None:

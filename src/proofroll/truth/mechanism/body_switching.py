@@ -11,7 +11,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, SwitchedJoint
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
@@ -59,12 +59,11 @@ class SwitchedBodies(JointStretches):
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, _: float) -> tuple[Array, Mode, float, float]:
         last, joint, delay = state, self.joints[which], 0.0
         speed = abs(float(self._along(last)[1][which]))
-        fastest = self._fastest.setdefault(which, speed)
         state, margin = self._struck(last, leg.mode, which, joint.restitution)
-        if joint.restitution and speed < SETTLED * fastest:
+        if self._settles(which, speed, joint.restitution):
             free = self.equations.switched(state[:-1], self.switched(leg.mode))
             pull = abs(float(self._accelerations(free, state)[which]))
-            delay = 2 * speed * joint.restitution / (pull * (1 - joint.restitution))
+            delay = self._bouncing(speed * joint.restitution, pull, joint.restitution)
             state, margin = self._struck(last, leg.mode, which, 0.0)
         rates = self._along(state)[1]
         still = [

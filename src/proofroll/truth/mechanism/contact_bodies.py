@@ -12,7 +12,6 @@ from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMo
 from proofroll.elements.mechanism.contacts.start import closed_and_still
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis
-from proofroll.elements.mechanism.switches import SETTLED
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.body_switching import SLACK
 from proofroll.truth.mechanism.contact_equations import BodiesSolution, BodiesState, ContactEquations
@@ -55,17 +54,16 @@ class ContactBodies(ContactStretches):
         state, law = leg.last, self.contacts[hit].restitution
         found = self.equations.at(state)
         speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
-        fastest = self._fastest.setdefault(hit, speed)
         hits = striking(leg.mode, found.touching, hit, leg.end)
         rubs = self.equations.bounds > 0  # dry friction of joints is no impulse
         closed = [(own.kind != "open" or k in hits) and not rubs[k] for k, own in enumerate(leg.mode)]
         laws = [self.contacts[k].restitution if k in hits else 0.0 for k in range(len(closed))]
         delay = 0.0
         after, solution, margin = self._struck(state, found, closed, laws)
-        if law and speed < SETTLED * fastest:
+        if self._settles(hit, speed, law):
             free = self.equations.at(after)
             pull = -float(free.touching[hit].normal @ self.equations.accelerated(free, leg.mode).slide[hit])
-            delay = 2 * speed * law / (pull * (1 - law))
+            delay = self._bouncing(speed * law, pull, law)
             after, solution, margin = self._struck(state, found, closed, [0.0] * len(closed))
         stays = []
         for k, (shut, each) in enumerate(zip(closed, found.touching, strict=True)):

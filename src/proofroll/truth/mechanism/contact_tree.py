@@ -13,7 +13,6 @@ from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, Cont
 from proofroll.elements.mechanism.contacts.start import Scale
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import SETTLED
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.contact_guards import STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts
@@ -52,14 +51,13 @@ class ContactTree(ContactStretches):
         # dry friction of joints is no impulse
         closed = [k for k, own in enumerate(leg.mode) if (own.kind != "open" or k in hits) and not contacts[k].bound]
         speed = -float(found[hit].normal @ found[hit].slide)
-        fastest = self._fastest.setdefault(hit, speed)
         law = np.array([contacts[k].restitution if k in hits else 0.0 for k in closed])
         after, impulse, margin = dynamics.struck(q, v, closed, law)
         delay = 0.0
-        if contacts[hit].restitution and speed < SETTLED * fastest:
+        if self._settles(hit, speed, contacts[hit].restitution):
             free = dynamics.solve(q, after, leg.mode, time)
             pull = -float(found[hit].normal @ free.slide_rate[hit])
-            delay = 2 * speed * contacts[hit].restitution / (pull * (1 - contacts[hit].restitution))
+            delay = self._bouncing(speed * contacts[hit].restitution, pull, contacts[hit].restitution)
             after, impulse, margin = dynamics.struck(q, v, closed, np.zeros(len(closed)))
         state = np.concatenate([q, after, [time]])
         stays = [bool(contact.bound) for contact in contacts]

@@ -7,7 +7,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, held_by
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_by
 from proofroll.truth.hybrid import Stretch, Transition
 from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of
 from proofroll.truth.mechanism.stretches import StretchLaw
@@ -56,13 +56,12 @@ class SwitchedTree(JointStretches):
                 q[other.coordinate] = other.low if own == "low" else other.high
         q[joint.coordinate] = stop
         speed = abs(float(v[joint.velocity]))
-        fastest = self._fastest.setdefault(which, speed)
         v[:], margin = self.equations.struck(q, v, which)
         delay, rebound = 0.0, abs(float(v[joint.velocity]))
-        if joint.restitution and speed < SETTLED * fastest:
+        if self._settles(which, speed, joint.restitution):
             pull = abs(float(self.equations.solve(q, v, leg.mode, time=leg.end).acceleration[joint.velocity]))
             v[joint.velocity] = 0.0
-            delay = 2 * rebound / (pull * (1 - joint.restitution))
+            delay = self._bouncing(rebound, pull, joint.restitution)
         decided, after = self.equations.decided(q, v, leg.end)
         return state, decided, min(margin, after), delay
 

@@ -9,8 +9,10 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import SETTLED
 from proofroll.truth.hybrid import Stretch, walked
 
 ModeT = TypeVar("ModeT")
@@ -44,6 +46,25 @@ class Stretches(ABC, Generic[ModeT]):
     @abstractmethod
     def _law(self, state: Array, mode: ModeT) -> StretchLaw:
         """Equations of a stretch that begins at a state."""
+
+    def _settles(self, which: int, speed: float, restitution: float) -> bool:
+        """True if of the rebounds after an impact only the time is summed.
+
+        Speeds are in natural units: the first, too, may come from a fall that is hardly more than round-off.
+        """
+        fastest = self._fastest.setdefault(which, max(speed, 1.0))
+        return 0.0 < restitution < 1.0 and speed < SETTLED * fastest
+
+    @staticmethod
+    def _bouncing(rebound: float, pull: float, restitution: float) -> float:
+        """Time until the rebounds after one of this speed are over.
+
+        Raises:
+            Refused: nothing pulls them back.
+        """
+        if not pull > 0:
+            raise Refused("a rebound is slower than routes follow, and nothing pulls it back")
+        return 2 * rebound / (pull * (1 - restitution))
 
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
         """See the protocol."""

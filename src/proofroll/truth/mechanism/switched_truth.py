@@ -48,9 +48,12 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     units = natural_units(mechanism)
     own = units.mechanism(mechanism)
     if not kinks and not any(joint.friction for joint in equations.switched):
+        scout = SwitchedTree(JointCoordinates(_wider(own)), _SCOUT)
+        begun = scout.begin()
+        assert begun.mode is not None  # every start has one
         with units.said_in_seconds():
-            look = follow(SwitchedTree(JointCoordinates(_wider(own)), _SCOUT), float(times[-1]) / units.time)
-        if not look.happenings and not any(own in {"least", "greatest"} for own in look.legs[0].mode):
+            look = scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time)
+        if look.guard is None and not any(own in {"least", "greatest"} for own in look.mode):
             return find_truth(_unlimited(mechanism), times)  # no stop is passed, no limit reached
     refuse_uncovered(mechanism)
     with units.said_in_seconds():
