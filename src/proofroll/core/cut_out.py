@@ -127,8 +127,8 @@ class CutOut:
         self._kept[place] = node
         names, attributes = _asked(node, self._drops(node))
         self.attributes |= attributes
-        found = [self._take((module, one)) for one in names if one != name]
-        self._needs[place] = [one for one in found if one is not None]
+        needs = [self._take((module, one)) for one in names if one != name]
+        self._needs[place] = [one for one in needs if one is not None]
         return place
 
     def _drops(self, node: ast.stmt) -> list[ast.stmt]:
@@ -176,7 +176,7 @@ class CutOut:
 
 def _docstrings(node: ast.stmt, gone: set[int]) -> dict[tuple[int, int], str]:
     """First and last line of each docstring of a definition -> its first line; empty where that leads elsewhere."""
-    found = {}
+    first_lines = {}
     for part in ast.walk(node):
         words = ast.get_docstring(part) if isinstance(part, (_Function, ast.ClassDef)) else None
         if not words or (own := part.body[0]).lineno in gone:  # type: ignore[attr-defined]  # it has a docstring
@@ -184,8 +184,8 @@ def _docstrings(node: ast.stmt, gone: set[int]) -> dict[tuple[int, int], str]:
         text = words.partition("\n")[0]
         elsewhere = ":`" in text or _OURS in text
         text = f'"""{text}"""' if not elsewhere else "..." if len(part.body) == 1 else ""  # type: ignore[attr-defined]
-        found[own.lineno, own.end_lineno] = text and " " * own.col_offset + text
-    return found
+        first_lines[own.lineno, own.end_lineno] = text and " " * own.col_offset + text
+    return first_lines
 
 
 @functools.cache

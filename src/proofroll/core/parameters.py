@@ -64,7 +64,7 @@ class Parameters:
             return self.values[content[1:]]
         if content.startswith("="):
             return evaluated(where, content[1:], self.quantities, own)
-        return _NUMBERED.sub(lambda found: f"{evaluated(where, found[1], self.quantities):g}", content)
+        return _NUMBERED.sub(lambda index: f"{evaluated(where, index[1], self.quantities):g}", content)
 
     def beside(self, name: str, value: float) -> Parameters:
         """Numbers extended by one plain number of this name."""

@@ -61,13 +61,13 @@ def validated(kind: type[_T], content: Mapping[str, Any], where: str, **own: obj
     return content_of_kind
 
 
-def _turned(content: Any, found: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
+def _turned(content: Any, read: Any, place: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], bool]]:
     """Every true and false that was taken for a number, with its place."""
-    if isinstance(content, bool) and not isinstance(found, bool):
+    if isinstance(content, bool) and not isinstance(read, bool):
         yield place, content
     parts = content if isinstance(content, Mapping) else dict(enumerate(content if isinstance(content, list) else ()))
     for name, item in parts.items():
-        inside = found[name] if isinstance(found, (Mapping, list, tuple)) else getattr(found, str(name), item)
+        inside = read[name] if isinstance(read, (Mapping, list, tuple)) else getattr(read, str(name), item)
         yield from _turned(item, inside, (*place, str(name)))
 
 

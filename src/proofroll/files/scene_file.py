@@ -192,8 +192,8 @@ def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: s
         InputError: the table is no list of rows, or a row says no name that one of these kinds alone has.
     """
     shared = {name for name in tables if sum(name in own for own in known) > 1}
-    found = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]
-    named = [{str(row["name"]) for rows in own.values() for row in _rows(rows) if "name" in row} for own in found]
+    own_tables = [{name: tables[name] for name in own if name in tables and name not in shared} for own in known]
+    named = [{str(row["name"]) for rows in own.values() for row in _rows(rows) if "name" in row} for own in own_tables]
     for table in shared:
         if not isinstance(tables[table], list) or len(_rows(tables[table])) < len(tables[table]):
             raise InputError(f"{where}: {table}", tables[table], f"write each row as a table [[{table}]]")
@@ -205,8 +205,8 @@ def _of_each(known: Sequence[Sequence[str]], tables: Mapping[str, Any], where: s
             if len(homes) != 1:
                 advice = "several kinds of elements have such rows; name a thing of one of them, which another has not"
                 raise InputError(f"{where}: {table}.{index}", row, advice)
-            found[homes[0]].setdefault(table, []).append(row)
-    return found
+            own_tables[homes[0]].setdefault(table, []).append(row)
+    return own_tables
 
 
 def _rows(table: Any) -> list[Mapping[str, Any]]:

@@ -158,12 +158,12 @@ def once(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence
     """The same, found only once for each evidence: nearly every hypothesis asks for it."""
 
     @wraps(residuals)
-    def found(evidence: Evidence) -> Sequence[FactT]:
+    def remembered(evidence: Evidence) -> Sequence[FactT]:
         if residuals not in evidence.found:
             evidence.found[residuals] = tuple(residuals(evidence))
         return evidence.found[residuals]
 
-    return found
+    return remembered
 
 
 def any_gravity(

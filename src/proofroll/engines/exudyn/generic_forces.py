@@ -81,8 +81,8 @@ def _written_out(
     for row, i, j, factor in terms:
         sums[row].append(f"{factor!r} * rates[{i}] * rates[{j}]")
     text = "lambda rates, weight: [" + ", ".join(" + ".join(each) for each in sums) + "]"
-    found: Callable[[list[float], list[float] | None], list[float]] = eval(text)
-    return found
+    sums_of: Callable[[list[float], list[float] | None], list[float]] = eval(text)
+    return sums_of
 
 
 def weight_turns(body: RollingBall, local: LocalGeometry) -> bool:

@@ -143,15 +143,15 @@ class JointLaws:
 
     def named(self, pushes: list[tuple[JointLaw, float]]) -> dict[str, Array]:
         """Named forces of a sample."""
-        found = {name: np.full(count, np.nan) for name, count in lengths(self._mechanism).items()}
+        forces = {name: np.full(count, np.nan) for name, count in lengths(self._mechanism).items()}
         for law, push in pushes:
             if law.field == "joint":
                 joint = self._mechanism.joints[law.number]
                 parts = on_joint(bool(joint.limits), joint.friction, push)
-                found["friction"][law.number], found["stop"][law.number] = parts
+                forces["friction"][law.number], forces["stop"][law.number] = parts
             elif law.field:
-                found[law.field][law.place] = push
-        return found if pushes else {}
+                forces[law.field][law.place] = push
+        return forces if pushes else {}
 
 
 def _drive(joint: Joint) -> Callable[[float, float, float], float]:

@@ -182,12 +182,12 @@ def _turns(mechanism: Mechanism) -> dict[str, Array]:
     Where a joint has a law along its coordinate, they are those of the world at q = 0: the coordinate that Exudyn
     measures is the angle between the axes of two bodies.
     """
-    found = {WORLD: np.eye(3)} | {body.name: np.eye(3) for body in mechanism.bodies}
+    turns = {WORLD: np.eye(3)} | {body.name: np.eye(3) for body in mechanism.bodies}
     laws = any(joint.friction or joint.limits or joint.armature or varies(joint.torque) for joint in mechanism.joints)
     if laws or mechanism.actuators or mechanism.couplings:
         for joint in mechanism.joints:  # parents first
-            found[joint.child] = found[joint.parent] @ joint.parent_frame @ joint.child_frame.T
-    return found
+            turns[joint.child] = turns[joint.parent] @ joint.parent_frame @ joint.child_frame.T
+    return turns
 
 
 def _matrix(six: Any) -> Array:

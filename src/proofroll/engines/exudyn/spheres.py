@@ -146,12 +146,12 @@ class Spheres(Redundant):
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        found = super().built()
+        model = super().built()
         if not self._contacts:
-            return found
+            return model
         gaps, normals, places = zip(*(self._lying(made) for made in self._contacts), strict=True)
-        found = replace(
-            found,
+        model = replace(
+            model,
             contact_gap=np.array(gaps),
             contact_normal=np.array(normals),
             contact_place=np.array(places),
@@ -162,8 +162,8 @@ class Spheres(Redundant):
         larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by as much as it is pressed in")
         if self._builds_up:  # then the first accelerations tell nothing of what holds
             larger = Regularised(self._softness, "friction of what does not slip yet builds up with the creep")
-            found = replace(found, acceleration=None, angular_acceleration=None)
-        return replace(found, regularised=dict.fromkeys(("acceleration", "angular_acceleration"), larger))
+            model = replace(model, acceleration=None, angular_acceleration=None)
+        return replace(model, regularised=dict.fromkeys(("acceleration", "angular_acceleration"), larger))
 
     def _lying(self, made: _Made) -> tuple[float, Array, Array]:
         """Gap [m], normal from b to a and place [m] of a contact, from what Exudyn holds of it."""

@@ -168,8 +168,8 @@ class KinematicTree(ExudynModel):
         solver.ComputeMassMatrix(self.system, 1.0)
         solver.ComputeODE2RHS(self.system)
         kept = state.GetODE2Coordinates_tt()
-        found = np.linalg.solve(solver.GetSystemMassMatrix(), solver.GetSystemResidual())
-        state.SetODE2Coordinates_tt(found, exu.ConfigurationType.Current)
+        rates = np.linalg.solve(solver.GetSystemMassMatrix(), solver.GetSystemResidual())
+        state.SetODE2Coordinates_tt(rates, exu.ConfigurationType.Current)
         accelerations = self._read(self._sensors["Acceleration"]), self._read(self._sensors["AngularAcceleration"])
         state.SetODE2Coordinates_tt(kept, exu.ConfigurationType.Current)
         return accelerations

@@ -181,12 +181,12 @@ class Contacts:
         """Adds J̇v, which MuJoCo leaves out of the rows of contacts, to the reference accelerations at the start."""
         mechanism = self._mechanism
         motion = Tree(mechanism).at(*mechanism.start())
-        found, rate = touches(mechanism, motion), np.zeros((3, self._model.nv))
+        touching, rate = touches(mechanism, motion), np.zeros((3, self._model.nv))
         for index in range(data.ncon):
             contact = data.contact[index]
             row = int(contact.efc_address)
             number, sign = self._of_geom[int(contact.geom[1])]
-            own, each = mechanism.contacts[number], found[number]
+            own, each = mechanism.contacts[number], touching[number]
             missing = np.zeros(3)
             for body, side in ((own.body_a, 1.0), (own.body_b, -1.0)):
                 k = mechanism.body_index[body]

@@ -89,28 +89,28 @@ class MujocoGeoms(MujocoMechanism):
 
     def sample(self) -> MechanismSample:
         """See :class:`proofroll.core.engine.Engine`."""
-        found = super().sample()
-        return replace(found, contact_force=self._contacts.forces(self._scratch))
+        sample = super().sample()
+        return replace(sample, contact_force=self._contacts.forces(self._scratch))
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        found = super().built()
+        plain = super().built()
         read = self._contacts.read(self._evaluated(), self._rows)
         told = {f"contact_{name}": value for name, value in read._asdict().items()}
         told["contact_family"] = family(self._settings)[_CAPABILITY.CONTACT]
         if not self._evaluated().ncon:
-            return replace(found, **told)
-        softened, unsaid = dict(found.regularised), dict[str, None]()
+            return replace(plain, **told)
+        softened, unsaid = dict(plain.regularised), dict[str, None]()
         hard = self._hard(self._evaluated())
         load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
         for name, wanted in hard.items():
             size = float(np.abs(wanted).max()) or np.finfo(float).tiny
             rest = load / float(np.abs(hard["acceleration"]).max() or np.finfo(float).tiny)
-            difference = float(np.abs(wanted - getattr(found, name)).max()) / size
+            difference = float(np.abs(wanted - getattr(plain, name)).max()) / size
             softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
             if softened[name].tolerance > CAPS["acceleration"].tolerance:
                 unsaid[name] = None  # the first step of a hop tells nothing of the model
-        return replace(found, **told, **unsaid, regularised=softened)
+        return replace(plain, **told, **unsaid, regularised=softened)
 
     def _hard(self, data: Any) -> dict[str, Array]:
         """Accelerations by MuJoCo's own terms with the hardest contacts, with J̇v and without the cone's lift."""

@@ -65,11 +65,11 @@ class ImpulseRun(MechanismRun):
     def _evaluated(self) -> tuple[Any, Array, Array, Array, Any, Array]:
         """Data of the present state, q, v, and accelerations and forces of the step that begins."""
         q, v, (acceleration, pressing, _) = self.steps.q, self.steps.v, self._kick()
-        found = self.steps.terms(q, v, self._dt)[-1]
+        touching = self.steps.terms(q, v, self._dt)[-1]
         self.tree.now = self.steps.t
         data = self._placed(acceleration)
         forces = self.tree.pulls(data)
-        for contact, each, force in zip(self.steps.contacts, found, pressing, strict=True):
+        for contact, each, force in zip(self.steps.contacts, touching, pressing, strict=True):
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 if body != WORLD:
                     frame = self.tree.body[self._mechanism.body_index[body]]
@@ -91,19 +91,19 @@ class ImpulseRun(MechanismRun):
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
-        found, span = super().built(), _PART * self._dt
+        plain, span = super().built(), _PART * self._dt
         hard, twice = (self._accelerations(self._beginning(length), length) for length in (span, 2 * span))
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
         softened, unsaid = dict[str, Regularised](), dict[str, None]()
         for name, value in hard.items():
             size = float(np.abs(value).max()) or 1.0  # nothing moves otherwise than freely
-            others = twice[name], step[name], getattr(found, name)
+            others = twice[name], step[name], getattr(plain, name)
             unsure = float(self._settings.solver_tolerance or 0.0) / span / size
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
             softened[name] = Regularised(_MARGIN * (unsure + apart), _PARTS if self._settings.convex else _FOUND)
             if softened[name].tolerance > CAPS["acceleration"].tolerance:
                 unsaid[name] = None  # the first step of a hop tells nothing of the model
-        return replace(found, **unsaid, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
+        return replace(plain, **unsaid, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _beginning(self, span: float) -> Impulses:
         return self.steps.beginning(span, convex=False)
@@ -111,11 +111,11 @@ class ImpulseRun(MechanismRun):
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:
         """Accelerations of all bodies in the time of a kick [s]."""
         data = self._placed((kick.v - self.steps.v) / span)
-        found = [
+        accelerations = [
             pin.getFrameClassicalAcceleration(self._model, data, frame, pin.LOCAL_WORLD_ALIGNED)
             for frame in self.tree.body
         ]
         return {
-            "acceleration": np.array([each.linear for each in found]),
-            "angular_acceleration": np.array([each.angular for each in found]),
+            "acceleration": np.array([each.linear for each in accelerations]),
+            "angular_acceleration": np.array([each.angular for each in accelerations]),
         }

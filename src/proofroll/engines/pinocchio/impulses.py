@@ -140,34 +140,34 @@ class ImpulseSteps:
         """Impulses of the step from a state; changes nothing but scratch data."""
         if self._midpoint:
             q = pin.integrate(self._model, q, 0.5 * self._dt * v)
-        J, free, inverse, found = self.terms(q, v, self._dt)
-        shifts = self._shifts(J, q, v, found)
-        return self._solved(J, free, inverse, found, shifts, self._dt, convex=self._settings.convex)
+        J, free, inverse, touching = self.terms(q, v, self._dt)
+        shifts = self._shifts(J, q, v, touching)
+        return self._solved(J, free, inverse, touching, shifts, self._dt, convex=self._settings.convex)
 
     def beginning(self, span: float, *, convex: bool) -> Impulses:
         """Impulses of a short time from the present on, with the turning of the contacts (J̇v), which steps find later.
 
         What is apart stays apart.
         """
-        J, free, inverse, found = self.terms(self.q, self.v, span)
+        J, free, inverse, touching = self.terms(self.q, self.v, span)
         ahead = self.terms(pin.integrate(self._model, self.q, span * self.v), self.v, span)[0]
         shifts = np.zeros((len(self._returned), 3))
-        shifts[: len(found)] = (ahead - J) @ self.v
-        apart = [each.gap > self._touching for each in found] + [False] * len(self.joints.friction)
+        shifts[: len(touching)] = (ahead - J) @ self.v
+        apart = [each.gap > self._touching for each in touching] + [False] * len(self.joints.friction)
         shifts[apart + [item.gap(self.q) > TOUCHING for item in self.joints.stops], 2] = np.inf
-        return self._solved(J, free, inverse, found, shifts, span, convex=convex)
+        return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:
         """Normals, places and friction of the contacts' points as Pinocchio holds them; gaps of shapes at its poses."""
-        J, _, inverse, found = self.terms(self.q, self.v, self._dt)
-        world = np.array([frame_of_axis(each.normal) for each in found]) @ J
+        J, _, inverse, touching = self.terms(self.q, self.v, self._dt)
+        world = np.array([frame_of_axis(each.normal) for each in touching]) @ J
         solver, data = self._solver(tuple(range(len(self.contacts)))), self._data
-        normal, place = np.zeros((2, len(found), 3))
+        normal, place = np.zeros((2, len(touching), 3))
         for k, point in enumerate(solver.points):
             normal[k] = (data.oMi[point.joint1_id] * point.joint1_placement).rotation[:, 2]
             place[k] = (data.oMi[point.joint2_id] * point.joint2_placement).translation
         return {
-            "contact_gap": np.array([each.gap for each in found]),
+            "contact_gap": np.array([each.gap for each in touching]),
             "contact_normal": normal,
             "contact_place": place,
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
@@ -187,7 +187,7 @@ class ImpulseSteps:
         pulls = tree.pulls(data) if tree.springs else None
         tree.now = self.t + 0.5 * span * self._midpoint
         tau = tree.drives(q, v)
-        found = [
+        touching = [
             touch(contact, self._moving(contact.body_a), self._moving(contact.body_b)) for contact in self.contacts
         ]
         rate = pin.aba(model, data, q, v, tau, pulls) if pulls else pin.aba(model, data, q, v, tau)
@@ -195,11 +195,11 @@ class ImpulseSteps:
         inverse = np.triu(pin.computeMinverse(model, data, q))
         inverse = inverse + np.triu(inverse, 1).T
         pin.computeJointJacobians(model, data, q)
-        J = np.zeros((len(found), 3, model.nv))
-        all_of = self._solver(tuple(range(len(found))))
-        for k, each in enumerate(found):
+        J = np.zeros((len(touching), 3, model.nv))
+        all_of = self._solver(tuple(range(len(touching))))
+        for k, each in enumerate(touching):
             J[k] = self._posed(all_of, k, each)
-        return J, free, inverse, found
+        return J, free, inverse, touching
 
     def _moving(self, body: str) -> Moving:
         k, data = self._index[body], self._data
@@ -209,10 +209,10 @@ class ImpulseSteps:
         velocity, pose = self._tree.velocity(data, frame), data.oMf[frame]
         return Moving(pose.translation.copy(), pose.rotation.copy(), velocity.linear, velocity.angular)
 
-    def _posed(self, solver: _Solver, own: int, found: Touching) -> Array:
+    def _posed(self, solver: _Solver, own: int, there: Touching) -> Array:
         """Poses the ``own``-th point of a solver; its rows, shape (3, nv)."""
         point, data = solver.points[own], self._data
-        place = pin.SE3(frame_of_axis(found.normal), found.place)
+        place = pin.SE3(frame_of_axis(there.normal), there.place)
         point.joint1_placement = data.oMi[point.joint1_id].actInv(place)
         point.joint2_placement = data.oMi[point.joint2_id].actInv(place)
         point.calc(self._model, data, solver.point_datas[own])
@@ -244,11 +244,11 @@ class ImpulseSteps:
         k = self._index[body]
         return 0 if k < 0 else int(self._model.frames[self._tree.body[k]].parentJoint)
 
-    def _shifts(self, J: Array, q: Array, v: Array, found: Sequence[Touching]) -> Array:
+    def _shifts(self, J: Array, q: Array, v: Array, touching: Sequence[Touching]) -> Array:
         """Terms added to slides and speeds of gaps [m/s], shape (contacts + rows of joints, 3); inf: cannot close."""
-        first, dt = len(found) + len(self.joints.friction), self._dt
+        first, dt = len(touching) + len(self.joints.friction), self._dt
         shifts = np.zeros((len(self._returned), 3))
-        gaps = [(k, each.gap, float(J[k, 2] @ v)) for k, each in enumerate(found)]
+        gaps = [(k, each.gap, float(J[k, 2] @ v)) for k, each in enumerate(touching)]
         speeds = self.joints.J[len(self.joints.friction) :] @ v
         gaps += [(k, item.gap(q), float(speeds[k - first])) for k, item in enumerate(self.joints.stops, first)]
         for k, gap, approach in gaps:
@@ -268,14 +268,14 @@ class ImpulseSteps:
         J: Array,
         free: Array,
         inverse: Array,
-        found: Sequence[Touching],
+        touching: Sequence[Touching],
         shifts: Array,
         span: float,
         *,
         convex: bool,
     ) -> Impulses:
         """Impulses of friction, of those contacts and stops that would close, and of those that they close in turn."""
-        count, v = len(found), free
+        count, v = len(touching), free
         blocks = [*J, *self.joints.J[:, None]]
         of_blocks = [*shifts[:count], *shifts[count:, 2:]]
         rubs = count + len(self.joints.friction)
@@ -290,7 +290,7 @@ class ImpulseSteps:
             solver = self._solver(which)
             for own, k in enumerate(which):
                 if k < count:
-                    self._posed(solver, own, found[k])
+                    self._posed(solver, own, touching[k])
                 elif k < rubs:
                     solver.points[own].setTimeStep(span)  # bounds are forces, and without it of a step of 1 s
                     solver.points[own].calc(self._model, self._data, solver.point_datas[own])
@@ -320,6 +320,6 @@ class ImpulseSteps:
             impulse[:], along[:] = 0.0, 0.0
             for end, k in zip(ends, which, strict=True):
                 if k < count:
-                    impulse[k] = frame_of_axis(found[k].normal) @ got[end - 3 : end]
+                    impulse[k] = frame_of_axis(touching[k].normal) @ got[end - 3 : end]
                 else:
                     along[k - count] = got[end - 1]

@@ -75,7 +75,7 @@ class JointRows:
 
         A stop whose gap is open has none: what it does in a step that closes the gap is an impulse.
         """
-        found = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
+        along = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
         closed = {item.joint.number for item in self.stops if item.gap(q) <= AT_STOP}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
@@ -83,5 +83,5 @@ class JointRows:
                 total[item.joint.number] += item.sign * float(size)
         for joint in self.switched:
             on = on_joint(joint.number in closed, joint.friction, total[joint.number])
-            found["friction"][joint.number], found["stop"][joint.number] = on
-        return found
+            along["friction"][joint.number], along["stop"][joint.number] = on
+        return along

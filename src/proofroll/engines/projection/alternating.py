@@ -45,14 +45,14 @@ def ends_of_efforts(
     motors: Iterable[Actuator], modes: Sequence[str], wanted: Sequence[float], first: int
 ) -> list[Excess]:
     """Excess of the modes of efforts with a limit over their ends; these are numbered from ``first`` on."""
-    found = list[Excess]()
+    ends = list[Excess]()
     for k, (motor, mode, effort) in enumerate(zip(motors, modes, wanted, strict=True), first):
         over, under = effort - motor.bound, -motor.bound - effort
         if mode == "linear":
-            found += [Excess(k, "least", under, True), Excess(k, "greatest", over, True)]
+            ends += [Excess(k, "least", under, True), Excess(k, "greatest", over, True)]
         else:
-            found.append(Excess(k, "linear", -over if mode == "greatest" else -under, True))
-    return found
+            ends.append(Excess(k, "linear", -over if mode == "greatest" else -under, True))
+    return ends
 
 
 class AlternatingMotion(ABC, Generic[ModeT]):

@@ -141,8 +141,8 @@ class ProjectedConnections:
 
 def turned(R: Array, a: Array) -> Array:
     """Each vector by its own matrix."""
-    found: Array = np.matmul(R, a[:, :, None])[:, :, 0]
-    return found
+    turned: Array = np.matmul(R, a[:, :, None])[:, :, 0]
+    return turned
 
 
 class Constraints:
@@ -192,6 +192,6 @@ class Constraints:
 
 def _frames(axes: list[Array], places: list[Vector], com: Array) -> Array:
     """Poses of ends in the axes of their bodies, from the centres of mass."""
-    found = np.zeros((len(axes), 4, 4))
-    found[:, :3, :3], found[:, :3, 3], found[:, 3, 3] = np.array(axes), np.array(places) - com, 1.0
-    return found
+    frames = np.zeros((len(axes), 4, 4))
+    frames[:, :3, :3], frames[:, :3, 3], frames[:, 3, 3] = np.array(axes), np.array(places) - com, 1.0
+    return frames

@@ -96,13 +96,13 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         touching = tuple(touch(each, moving[each.body_a], moving[each.body_b]) for each in self.contacts)
         S, origin = spaces[0].S.reshape(-1, 4, 4), free.bodies.origin
         J, rate = np.zeros((len(touching), 3, len(S))), np.zeros((len(touching), 3))
-        for k, (contact, found) in enumerate(zip(self.contacts, touching, strict=True)):
-            along = S[:, :3, :3] @ (found.place - origin) + S[:, :3, 3]
+        for k, (contact, there) in enumerate(zip(self.contacts, touching, strict=True)):
+            along = S[:, :3, :3] @ (there.place - origin) + S[:, :3, 3]
             for body, sign in ((contact.body_a, 1.0), (contact.body_b, -1.0)):
                 i = self._index[body]
                 if i >= 0:
                     J[k] += sign * (equations.tree.moves[i][:, None] * along).T
-                    rate[k] += sign * self._material(x, free, i, moving[body], found)
+                    rate[k] += sign * self._material(x, free, i, moving[body], there)
         flat = J.reshape(-1, J.shape[2]).T
         return ContactsThere(touching, J, divided(spaces[0].H, flat).reshape(-1, *J.shape[:2]), rate)
 
@@ -111,19 +111,19 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         equations = self._equations
         r, _, v, _ = equations.parts(x)
         bodies = equations.bodies(x)
-        found = {"world": Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))}
+        moving = {"world": Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))}
         for name, i in self._index.items():
             if i >= 0:
                 R, w = bodies.rotation[i], bodies.spin[i]
                 arm = R @ equations.com[i]
-                found[name] = Moving(r[i] - arm, R, v[i] - cross(w, arm), w)
-        return found
+                moving[name] = Moving(r[i] - arm, R, v[i] - cross(w, arm), w)
+        return moving
 
-    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, found: Touching) -> Array:
+    def _material(self, x: Array, free: SolvedState, i: int, body: Moving, there: Touching) -> Array:
         """Rate of the velocity of a body's material at the place of contact, which moves over it."""
-        arm = found.place - self._equations.parts(x)[0][i]
+        arm = there.place - self._equations.parts(x)[0][i]
         turning = cross(body.R @ free.angular[i], arm) + cross(body.w, cross(body.w, arm))
-        return np.asarray(free.linear[i] + turning + cross(body.w, found.place_rate - body.velocity(found.place)))
+        return np.asarray(free.linear[i] + turning + cross(body.w, there.place_rate - body.velocity(there.place)))
 
     def forces(self, now: ContactsThere, mode: ContactMode) -> Array:
         """Forces on body a of each contact in a mode [N], (contacts, 3).
@@ -167,9 +167,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         """The state with a change of the velocities ν."""
         return np.append(self._equations.pushed(y[:-1], change), y[-1])
 
-    def _heading(self, k: int, found: Touching) -> Array:
+    def _heading(self, k: int, there: Touching) -> Array:
         """Direction of a slip; beyond its end within a step it goes on as before it."""
-        slip, toward = across(found), self._toward[k]
+        slip, toward = across(there), self._toward[k]
         speed = float(np.linalg.norm(slip))
         if speed <= np.finfo(float).tiny:
             return toward
@@ -184,11 +184,11 @@ class ContactMotion(AlternatingMotion[ContactMode]):
     def read(self) -> dict[str, Any]:
         """Geometry and laws of the contacts now, for :class:`proofroll.elements.mechanism.sampling.MechanismBuilt`."""
         now = self.at(self._stepper.x)
-        found = now.touching
+        touching = now.touching
         return {
-            "contact_gap": np.array([each.gap for each in found]),
-            "contact_normal": np.array([each.normal for each in found]),
-            "contact_place": np.array([each.place for each in found]),
+            "contact_gap": np.array([each.gap for each in touching]),
+            "contact_normal": np.array([each.normal for each in touching]),
+            "contact_place": np.array([each.place for each in touching]),
             "contact_friction": self.friction.copy(),
             "contact_restitution": np.array([contact.restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nlj->kilj", now.J, now.response),
@@ -215,16 +215,16 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
     def _excess(self, x: Array) -> list[Excess]:
         now = self.at(x)
-        force, found = self.forces(now, self.mode), list[Excess]()
+        force, ends = self.forces(now, self.mode), list[Excess]()
         held: ContactMode = ()
         for k, (own, each) in enumerate(zip(self.mode, now.touching, strict=True)):
             if own.kind == "open":
-                found.append(Excess(k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
+                ends.append(Excess(k, "impact", -each.gap, float(each.normal @ each.slide) < 0))
                 continue
             N = float(each.normal @ force[k])
-            found.append(Excess(k, "lift_off", -N, True))
+            ends.append(Excess(k, "lift_off", -N, True))
             if own.kind == "slip" and self.friction[k]:
-                found.append(Excess(k, "still", -float(across(each) @ self._toward[k]), True))
+                ends.append(Excess(k, "still", -float(across(each) @ self._toward[k]), True))
             elif own.kind == "stick":
                 beyond = float(np.linalg.norm(force[k] - N * each.normal)) - self.friction[k] * N
                 if beyond > 0 and sum(one.kind == "stick" for one in self.mode) > 1:
@@ -233,9 +233,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
                         now, [one.kind != "open" for one in self.mode], [one.kind == "stick" for one in self.mode]
                     )
                     beyond = -beyond if held[k].kind == "stick" else beyond
-                found.append(Excess(k, "slip", beyond, True))
+                ends.append(Excess(k, "slip", beyond, True))
         modes, wanted = list(self._equations.applied.modes.values()), self._equations.wanted(self._at(x))
-        return found + ends_of_efforts(self._motors.values(), modes, wanted, len(self.mode))
+        return ends + ends_of_efforts(self._motors.values(), modes, wanted, len(self.mode))
 
     def _next(self, x: Array, k: int, kind: str) -> tuple[Array, ContactMode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
@@ -305,10 +305,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         frames, J, response = self._framed(now, which)
         c, sliding = np.zeros(3 * len(which)), list[Array | None]()
         for place, (frame, k) in enumerate(zip(frames, which, strict=True)):
-            found = now.touching[k]
+            there = now.touching[k]
             c[3 * place : 3 * place + 3] = frame.T @ now.rate[k]
-            c[3 * place] += found.normal_rate @ found.slide
-            slip = frame[:, 1:].T @ found.slide
+            c[3 * place] += there.normal_rate @ there.slide
+            slip = frame[:, 1:].T @ there.slide
             sliding.append(None if still[k] else slip / np.linalg.norm(slip))
         G = J @ response
         force, done = self._law(G, c, which, sliding)
@@ -320,10 +320,10 @@ class ContactMotion(AlternatingMotion[ContactMode]):
 
 def _rows(now: ContactsThere, mode: ContactMode) -> list[tuple[int, Array]]:
     """Directions along which closed contacts hold, each with its contact: the normal of a slip, all of a stick."""
-    found: list[tuple[int, Array]] = []
+    directions: list[tuple[int, Array]] = []
     for k, (own, each) in enumerate(zip(mode, now.touching, strict=True)):
         if own.kind == "slip":
-            found.append((k, each.normal))
+            directions.append((k, each.normal))
         elif own.kind == "stick":
-            found += [(k, direction) for direction in np.eye(3)]
-    return found
+            directions += [(k, direction) for direction in np.eye(3)]
+    return directions

@@ -166,8 +166,8 @@ class DependentCoordinates:
             drift = self._loop_rows.bending(ends, rows)
             drift -= (rows.form * still[joints:][self._loop_rows.owner]).sum(1)
             closing = partial(self._closed, rows, self._with_zeros(-drift, held), held)
-        found, velocities, multipliers = self.tree.motions(bodies, relative, loads, closing)
-        rates = inverse @ found[..., :-1, :, :] @ pose
+        motions, velocities, multipliers = self.tree.motions(bodies, relative, loads, closing)
+        rates = inverse @ motions[..., :-1, :, :] @ pose
         linear = (pose @ (rates + bent))[..., :3, 3] + self.gravity
         angular = 0.5 * rates[..., :3, :3].reshape(*rates.shape[:-2], 9) @ SKEW.T
         return SolvedState(bodies, linear, angular, rates + bent, velocities, multipliers)
@@ -197,8 +197,8 @@ class DependentCoordinates:
     def responses(self, x: Array, drives: Array, at: Sequence[int]) -> tuple[Array, Array]:
         """ν̇ at a state, (nv,), and what unit forces along some of the velocities add, (nv, forces)."""
         units = np.vstack([np.zeros(self.nv), np.eye(self.nv)[list(at)]])
-        found = self.solve(x, drives + units).rates
-        return found[0], (found[1:] - found[0]).T
+        accelerations = self.solve(x, drives + units).rates
+        return accelerations[0], (accelerations[1:] - accelerations[0]).T
 
     def pushed(self, x: Array, change: Array) -> Array:
         """The state after a change of the velocities ν, (nv,)."""
@@ -221,14 +221,16 @@ class DependentCoordinates:
     def _apart(self, bodies: Bodies) -> Array:
         """Violations of couplings in coordinates and in velocities, (2, couplings)."""
         at = self.applied.watched(self.connections.ends(bodies, slice(0, self._joints)))
-        found = [np.subtract(at[b], ratio * np.array(at[a])) - (offset, 0.0) for a, b, ratio, offset in self._couplings]
-        return np.transpose(found)
+        violations = [
+            np.subtract(at[b], ratio * np.array(at[a])) - (offset, 0.0) for a, b, ratio, offset in self._couplings
+        ]
+        return np.transpose(violations)
 
     def rates(self, x: Array, drives: Array | float = 0.0, held: Sequence[int] = ()) -> Array:
         """ẋ; for the arguments see :meth:`solve`."""
         _, q, v, w = self.parts(x)
-        found = self.solve(x, drives, held=held)
-        return _joined(v, quaternion_rates(q, w), found.linear, found.angular)
+        solved = self.solve(x, drives, held=held)
+        return _joined(v, quaternion_rates(q, w), solved.linear, solved.angular)
 
     def eliminated(self, x: Array, held: Sequence[int] = ()) -> Array:
         """The state with its violations taken away within the constrained subspace; quaternions of unit length.
@@ -291,12 +293,12 @@ class DependentCoordinates:
         """Rows of all connections and couplings on the velocities of the bodies, (rows, 6 bodies)."""
         ends, every = self.connections.ends(bodies), self.connections.constraints()
         rows, on_bodies = every.at(ends), partial(self.connections.on_bodies, bodies, ends)
-        found = [on_bodies(every.owner, rows.force, rows.torque)]
+        blocks = [on_bodies(every.owner, rows.force, rows.torque)]
         for a, b, ratio, _ in self._couplings:
             push, turn = self.applied.along([a, b], ends)
             of_a, of_b = on_bodies(np.array([a, b]), push, turn)
-            found.append((of_b - ratio * of_a)[None])
-        return np.concatenate(found)
+            blocks.append((of_b - ratio * of_a)[None])
+        return np.concatenate(blocks)
 
     def accept(self, x: Array) -> None:
         """Tells the forces that the motion goes on from a state."""
@@ -351,8 +353,8 @@ _RATE = _rate(np.repeat(np.eye(4), 3, axis=0), np.tile(np.eye(3), (4, 1)))
 
 def rotations(q: Array) -> Array:
     """Rotation matrices of quaternions (w, x, y, z) of any length but zero, (bodies, 3, 3)."""
-    found = (q[:, :, None] * q[:, None, :]).reshape(-1, 16) @ _ROTATION
-    return np.asarray((found[:, :9] / found[:, 9:]).reshape(-1, 3, 3))
+    squared = (q[:, :, None] * q[:, None, :]).reshape(-1, 16) @ _ROTATION
+    return np.asarray((squared[:, :9] / squared[:, 9:]).reshape(-1, 3, 3))
 
 
 def quaternion_rates(q: Array, w: Array) -> Array:

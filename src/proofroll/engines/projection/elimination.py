@@ -219,7 +219,7 @@ def solved(H: Array, push: Array) -> Array:
     """
     from scipy.linalg.lapack import dposv  # here: whoever runs a ball need not wait for it
 
-    _, found, failed = dposv(H, push)
+    _, velocities, failed = dposv(H, push)
     if failed:
         raise np.linalg.LinAlgError("the mass matrix is not positive definite")
-    return np.asarray(found)
+    return np.asarray(velocities)

@@ -59,12 +59,12 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def along_joints(self, count: int) -> dict[str, Array]:
         """Forces of dry friction and of stops along the coordinates of all joints."""
         forces = self._holding(self.solve())
-        found = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
+        along = {"friction": np.full(count, np.nan), "stop": np.full(count, np.nan)}
         for k, joint in enumerate(self._joints):
             own = self.mode[k]
             on = on_joint(own in STOPPED, joint.friction, forces.get(k, joint.push(own)))
-            found["friction"][joint.number], found["stop"][joint.number] = on
-        return found
+            along["friction"][joint.number], along["stop"][joint.number] = on
+        return along
 
     def _holding(self, solved: SolvedState) -> dict[int, float]:
         """Forces that hold joints, by their numbers among the switched ones."""
@@ -89,9 +89,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
     def _joint_state(self, y: Array) -> tuple[Array, Array]:
         """Coordinates and velocities of the switched joints, where held exactly."""
         q, v = np.zeros((2, len(self._joints)))
-        found = self._equations.watched(self._at(y))
+        watched = self._equations.watched(self._at(y))
         for k, joint in enumerate(self._joints):
-            place, rate = found[joint.number]
+            place, rate = watched[joint.number]
             q[k] = {"low": joint.low, "high": joint.high}.get(self.mode[k], place)
             v[k] = 0.0 if self.mode[k] in HOLDING else rate
         return q, v
@@ -151,18 +151,18 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         """
         q, v = self._joint_state(y)
         forces = self._holding(self.solve(y)) if self._held else {}
-        found = list[Excess]()
+        ends = list[Excess]()
         for k, joint in enumerate(self._joints):
             own, place, rate = self.mode[k], float(q[k]), float(v[k])
             if k in forces:
                 low, high = joint.bounds(own)
-                found += [Excess(k, "up", low - forces[k], True), Excess(k, "down", forces[k] - high, True)]
+                ends += [Excess(k, "up", low - forces[k], True), Excess(k, "down", forces[k] - high, True)]
                 continue
             if own != "free":
-                found.append(Excess(k, "still", -rate if own == "forward" else rate, True))
-            found += [Excess(k, "low", joint.low - place, rate < 0), Excess(k, "high", place - joint.high, rate > 0)]
+                ends.append(Excess(k, "still", -rate if own == "forward" else rate, True))
+            ends += [Excess(k, "low", joint.low - place, rate < 0), Excess(k, "high", place - joint.high, rate > 0)]
         count, wanted = len(self._joints), self._equations.wanted(self._at(y))
-        return found + ends_of_efforts(self._motors.values(), self.mode[count:], wanted, count)
+        return ends + ends_of_efforts(self._motors.values(), self.mode[count:], wanted, count)
 
     def _next(self, y: Array, k: int, kind: str) -> tuple[Array, Mode, list[tuple[str, str]]]:
         was, happened = self.mode, list[tuple[str, str]]()
@@ -211,5 +211,5 @@ def _bounded(free: Array, G: Array, low: Array, high: Array) -> tuple[Array, NDA
     if sizes[0] <= _DEPENDENT * sizes[-1]:
         raise Refused("several joints hold one degree of freedom: their forces are not determinate")
     L = np.linalg.cholesky(G)
-    found = lsq_linear(L.T, -np.linalg.solve(L, free), (low, high), method="bvls", tol=np.finfo(float).tiny)
-    return np.asarray(found.x), np.asarray(found.active_mask)
+    least = lsq_linear(L.T, -np.linalg.solve(L, free), (low, high), method="bvls", tol=np.finfo(float).tiny)
+    return np.asarray(least.x), np.asarray(least.active_mask)

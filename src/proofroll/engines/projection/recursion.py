@@ -58,16 +58,16 @@ class Recursion(Elimination):
             if parent != self._world:
                 inertia[parent] = inertia[parent] + solid
                 pushes[..., parent, :] += push
-        found = np.zeros((*relative.shape[:-2], self._world + 1, 6), dtype=S.dtype)
+        twists = np.zeros((*relative.shape[:-2], self._world + 1, 6), dtype=S.dtype)
         velocities = np.zeros((*relative.shape[:-2], len(S)), dtype=S.dtype)
         for number, (body, parent) in enumerate(zip(self._child, self._parent, strict=True)):
-            motion = found[..., parent, :]
+            motion = twists[..., parent, :]
             for k in self._velocities[number]:
                 part, rate = parts[k]
                 velocities[..., k] = rate - motion @ part
                 motion = motion + np.multiply.outer(velocities[..., k], S[k])
-            found[..., body, :] = motion + steps[..., number, :]
-        return _four(found), velocities, np.zeros(0)
+            twists[..., body, :] = motion + steps[..., number, :]
+        return _four(twists), velocities, np.zeros(0)
 
 
 def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[Array], Array]]:
@@ -94,8 +94,10 @@ def compiled(mechanism: Mechanism) -> tuple[Callable[[Array], Array], Callable[[
     in_parts = len(mechanism.bodies) > _WHOLE
 
     def of(formulas: Any) -> Callable[[Array], Array]:
-        found = [item if isinstance(item, heyoka.expression) else heyoka.expression(float(item)) for item in formulas]
-        function: Callable[[Array], Array] = heyoka.cfunc(found, numbers, compact_mode=in_parts)
+        expressions = [
+            item if isinstance(item, heyoka.expression) else heyoka.expression(float(item)) for item in formulas
+        ]
+        function: Callable[[Array], Array] = heyoka.cfunc(expressions, numbers, compact_mode=in_parts)
         return function
 
     return of(equations.rates(x)), of(equations.eliminated(x))
@@ -108,10 +110,10 @@ def _six(twists: Array) -> Array:
 
 
 def _four(twists: Array) -> Array:
-    found = np.zeros((*twists.shape[:-1], 4, 4), dtype=twists.dtype)
-    found[..., :3, :3] = (twists[..., :3] @ SKEW).reshape(*twists.shape[:-1], 3, 3)
-    found[..., :3, 3] = twists[..., 3:]
-    return found
+    matrices = np.zeros((*twists.shape[:-1], 4, 4), dtype=twists.dtype)
+    matrices[..., :3, :3] = (twists[..., :3] @ SKEW).reshape(*twists.shape[:-1], 3, 3)
+    matrices[..., :3, 3] = twists[..., 3:]
+    return matrices
 
 
 def _moments(forces: Array) -> Array:
@@ -122,9 +124,9 @@ def _moments(forces: Array) -> Array:
 
 def _spatial(inertia: Array) -> Array:
     """Inertia matrix of six rows from Σ of four."""
-    found = np.zeros((6, 6), dtype=inertia.dtype)
-    found[:3, :3] = np.eye(3) * np.trace(inertia[:3, :3]) - inertia[:3, :3]
-    found[:3, 3:] = (inertia[:3, 3] @ SKEW).reshape(3, 3)
-    found[3:, :3] = found[:3, 3:].T
-    found[3:, 3:] = np.eye(3) * inertia[3, 3]
-    return found
+    matrix = np.zeros((6, 6), dtype=inertia.dtype)
+    matrix[:3, :3] = np.eye(3) * np.trace(inertia[:3, :3]) - inertia[:3, :3]
+    matrix[:3, 3:] = (inertia[:3, 3] @ SKEW).reshape(3, 3)
+    matrix[3:, :3] = matrix[:3, 3:].T
+    matrix[3:, 3:] = np.eye(3) * inertia[3, 3]
+    return matrix

@@ -140,19 +140,19 @@ class Switching:
         """The first exit within the last step and the times [s] between which it lies."""
         from scipy.optimize import brentq
 
-        found = [
+        ends = [
             (*self._crossing(index, self.stepper.t), exit_)
             for index, exit_ in enumerate(self.mode.exits)
             if survey.margins[index] < 0
         ]
-        if not found and self._survey.trend < 0 < survey.trend and self._may_dip(survey):
+        if not ends and self._survey.trend < 0 < survey.trend and self._may_dip(survey):
             now, before = self.stepper.t, self.stepper.t_before
             lowest = float(brentq(lambda t: self._at(t).trend, before, now, xtol=self._resolution(now)))
             if self._at(lowest).margins[survey.dips] < 0:
-                found = [(*self._crossing(survey.dips, lowest), self.mode.exits[survey.dips])]
-        if not found:
+                ends = [(*self._crossing(survey.dips, lowest), self.mode.exits[survey.dips])]
+        if not ends:
             return None
-        low, high, exit_ = min(found, key=lambda one: one[1])
+        low, high, exit_ = min(ends, key=lambda one: one[1])
         return exit_, low, high
 
     def _may_dip(self, survey: Survey) -> bool:

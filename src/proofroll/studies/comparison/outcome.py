@@ -146,14 +146,14 @@ class Outcome:
         """Points without a unique truth at which residuals alone are judged: runs are held to laws of mechanics."""
         from proofroll.studies.comparison.planning import point_name
 
-        found = []
+        names = []
         for name, point in self.points.items():
             runs = [run for run in self.runs if point_name(run.parameters) == name]
             judged = {item.observable for run in runs for item in run.judgements}
             roles = {point.scene.observables[key].role for key in judged}
             if roles == {Role.RESIDUAL} and point.reference is not None and point.reference.ill_posed:
-                found.append(name)
-        return found
+                names.append(name)
+        return names
 
     @property
     def lost(self) -> list[Run]:
