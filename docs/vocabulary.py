@@ -23,7 +23,6 @@ from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
 from proofroll.studies.stability import claims as stability_claims
 from proofroll.studies.tradeoff import claims
-from proofroll.studies.tradeoff import cost_claims as claimed
 
 ROOT = Path(__file__).resolve().parents[1]
 FILE = ROOT / "docs" / "vocabulary.md"
@@ -68,9 +67,9 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
     ),
     'A trade-off: `study = "tradeoff"`': (
         Table("", claims.TradeoffClaims, (*_OF_FILE, "over", "parameters", "cheapest", "holds", "converges")),
-        Table("[[cheapest]]", claimed.Cheapest),
-        Table("[[holds]]", claimed.Holds),
-        Table("[[converges]]", claimed.Converges),
+        Table("[[cheapest]]", claims.Cheapest),
+        Table("[[holds]]", claims.Holds),
+        Table("[[converges]]", claims.Converges),
     ),
     'A stability map: `study = "stability"`': (
         Table("", stability_claims.StabilityFile, (*_OF_FILE, "axes", "claims")),

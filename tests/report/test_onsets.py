@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from folded import whole
 
-from proofroll.ball_studies.report.onset_tables import bracket, clock, conditioning, slip_table
-from proofroll.ball_studies.report.onsets import CURVE, mark
+from proofroll.ball_studies.report.onsets import CURVE, bracket, clock, conditioning, mark, slip_table
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
 from proofroll.core.events import Event, events_of, with_events
 from proofroll.core.truth import truth

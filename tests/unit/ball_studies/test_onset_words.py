@@ -13,8 +13,7 @@ from rich.console import Console
 
 from proofroll.ball_studies.commands import _onset_table
 from proofroll.ball_studies.onset import EngineOnset, OnsetStudy, onset_study, summary
-from proofroll.ball_studies.report.onset_tables import conditioning
-from proofroll.ball_studies.report.onsets import TrueSlips
+from proofroll.ball_studies.report.onsets import TrueSlips, conditioning
 from proofroll.core.errors import InputError
 from proofroll.core.events import Event
 from proofroll.running.case import Status

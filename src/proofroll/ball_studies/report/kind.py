@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from proofroll.ball_studies.report import onset_tables, onsets
+from proofroll.ball_studies.report import onsets
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import BallOnSurface, rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability
@@ -20,7 +20,7 @@ class BallReport(ReportKind):
     """See :class:`proofroll.report.kinds.ReportKind`."""
 
     template: ClassVar[str] = "slips.html"
-    names: ClassVar[Mapping[str, Any]] = {"onsets": onset_tables}
+    names: ClassVar[Mapping[str, Any]] = {"onsets": onsets}
     replay_script: ClassVar[str] = "replay_ball.js"
     caption: ClassVar[str] = (
         "First the whole, to scale; then the ball enlarged, with its local frame at the contact: e₁ into the wall, e₂ "

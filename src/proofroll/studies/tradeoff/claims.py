@@ -1,24 +1,162 @@
-"""Reads the comparison files that claim something of a trade-off: ``study = "tradeoff"``."""
+"""Comparison files that claim something of a trade-off, ``study = "tradeoff"``, and the judgement of their claims.
+
+Steps and orders are judged exactly, cost by ratios. A claim that the measured costs do not decide is neither held nor
+contradicted: the speed of a machine, or its other work, must not contradict one.
+"""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from proofroll.core.bounds import bounded
 from proofroll.core.comparison import Tolerance
+from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError, told_of
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_content, study_files
+from proofroll.running.timing import FACTOR, Timing, named, ratio
 from proofroll.studies.claim_judgement import ClaimJudgement
-from proofroll.studies.tradeoff.cost_claims import Cheapest, Converges, Holds
 from proofroll.studies.tradeoff.curve import Question
+from proofroll.studies.tradeoff.recommend import fits, holding
+from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
+from proofroll.studies.tradeoff.requirements import Requirements
 
-if TYPE_CHECKING:
-    from proofroll.studies.tradeoff.records import TradeoffStudy
+
+@dataclass(frozen=True)
+class Holds:
+    """Claim on the coarsest step that holds a tolerance with margin at the scene's own parameters; nothing is timed.
+
+    Attributes:
+        engine: whose curves, ``name[key=value,…]``.
+        tolerance: of the quantity.
+        step: the coarsest of the sweep that holds it [s], or the loosest tolerance.
+        because: why.
+    """
+
+    engine: str
+    tolerance: Tolerance
+    step: float
+    because: str
+
+    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
+        """Judgement of the claim; exact in a brief study, too."""
+        said = f"{self.engine} holds {_to(quantity, self.tolerance)} up to a step of {self.step:g}"
+        if unknown := _unknown(study, [self.engine]):
+            return ClaimJudgement(said, self.because, None, unknown)
+        held = holding(study, Requirements(quantity, self.tolerance, engines=(self.engine,)), here=True)
+        steps = [point.step for point in held if point.step is not None]
+        if not steps:
+            return ClaimJudgement(said, self.because, False, "no step of the sweep does")
+        shown = f"the coarsest that does is {max(steps):g}"
+        return ClaimJudgement(said, self.because, math.isclose(max(steps), self.step), shown)
+
+
+@dataclass(frozen=True)
+class Converges:
+    """Claim: the order of convergence; no clock.
+
+    Attributes:
+        engine: whose curves, ``name[key=value,…]``.
+        order: lowest and highest.
+        because: why.
+    """
+
+    engine: str
+    order: tuple[float, float]
+    because: str
+
+    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
+        """Judgement of the claim; exact in a brief study, too."""
+        lowest, highest = self.order
+        said = f"{self.engine} converges in {quantity} with order {lowest:g} to {highest:g}"
+        if unknown := _unknown(study, [self.engine]):
+            return ClaimJudgement(said, self.because, None, unknown)
+        curves = {point.curve for point in study.points if fits(point, self.engine)}
+        budgets = [b for b in study.budgets if b.curve in curves and b.quantity == quantity]
+        orders = [(b.order_low or b.order, b.order_high or b.order) for b in budgets if b.order]
+        if not orders:
+            return ClaimJudgement(said, self.because, False, "no order shows")
+        shown = "what shows is " + ", ".join(f"{low:.3g} to {high:.3g}" for low, high in orders)
+        holds = all(low <= highest and high >= lowest for low, high in orders)
+        return ClaimJudgement(said, self.because, holds, shown)
+
+
+@dataclass(frozen=True)
+class Cheapest:
+    """Claim: the cheapest engine at a tolerance.
+
+    Attributes:
+        tolerance: of the quantity.
+        engine: any of these, ``name[key=value,…]``.
+        because: why it is.
+        levels: among which rungs of the ladder; all engines proper if empty.
+    """
+
+    tolerance: Tolerance
+    engine: list[str]
+    because: str
+    levels: list[Level] = field(default_factory=list)
+
+    def judged(self, study: TradeoffStudy, quantity: str) -> ClaimJudgement:
+        """Judges by the ratio of its cost to that of the cheapest other that holds the tolerance.
+
+        It holds where the whole interval of the ratio is at most 1, and is contradicted where all of it exceeds
+        :data:`proofroll.running.timing.FACTOR`, which no brief study can show; where no step of the engine holds the
+        tolerance it is contradicted without a clock.
+        """
+        among = f" among {', '.join(self.levels)}" if self.levels else ""
+        said = f"the cheapest that holds {_to(quantity, self.tolerance)}{among} is {' or '.join(self.engine)}"
+        return ClaimJudgement(
+            said, self.because, *self._found(study, Requirements(quantity, self.tolerance, levels=tuple(self.levels)))
+        )
+
+    def _found(self, study: TradeoffStudy, required: Requirements) -> tuple[bool | None, str]:
+        if unknown := _unknown(study, self.engine):
+            return None, unknown
+        held = holding(study, required)
+        mine = [point for point in held if any(fits(point, text) for text in self.engine)]
+        others = [point for point in held if point not in mine]
+        if not mine:
+            return False, "no step of it holds that"
+        if not others:
+            return True, "nothing else holds that"
+        best, rival = mine[0], others[0]
+        if not best.rounds or len(best.rounds) != len(rival.rounds):
+            return None, f"{_name(best)} and {_name(rival)} were not timed in the same rounds"
+        cost = ratio(Timing(tuple(best.rounds)), Timing(tuple(rival.rounds)))
+        said = (
+            f"{_name(best)} takes {cost.value:.3g} times as long as {_name(rival)} "
+            f"({cost.low:.3g} to {cost.high:.3g}, {named(cost.confidence)})"
+        )
+        if cost.high <= 1:
+            return True, said
+        contradicted = cost.low > FACTOR and cost.known and not study.brief
+        return (False if contradicted else None), said
+
+
+def _to(quantity: str, tolerance: Tolerance) -> str:
+    return f"{quantity} to {tolerance.value:g} {tolerance.unit}"
+
+
+def _name(point: MeasuredPoint) -> str:
+    step = "" if point.step is None else f" at {point.step:g}"
+    return f"{point.engine} {point.settings.get('formulation', '')}{step}"
+
+
+def _unknown(study: TradeoffStudy, engines: Sequence[str]) -> str:
+    """Reason that the study knows nothing of some engines; empty if it does."""
+    about = [point for point in study.points if any(fits(point, text) for text in engines)]
+    if not about:
+        return "it was not measured"
+    late = next((point for point in about if point.status == "timeout"), None)
+    return f"a run of it met the limit of time: {late.message}" if late else ""
+
 
 STUDY = "tradeoff"
 
