@@ -140,12 +140,7 @@ def checks(engine: Any, known: Mapping[str, str] | None = None, *, apart: bool =
 
 
 def _run_apart(engine: Any, name: str) -> None:
-    """Runs the check of this name in the process of its formulation and preset, which stays for the next one.
-
-    Raises:
-        AssertionError: it failed there, or the process ended.
-        SkipTest: it has nothing to look at.
-    """
+    """Runs the check of this name in the process of its formulation and preset, which stays for the next one."""
     place = f"{engine.__module__}.{engine.__qualname__}: {_of_one_process(engine, name)}"
     if place not in _processes:
         _processes[place] = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))

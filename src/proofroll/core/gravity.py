@@ -24,11 +24,7 @@ class Gravity:
     direction: tuple[float, float, float] = field(default=(0.0, 0.0, -1.0), metadata={"unit": "1"})
 
     def __post_init__(self) -> None:
-        """Refuses what is no gravity.
-
-        Raises:
-            OutOfBounds: a negative magnitude, or a direction without length.
-        """
+        """Refuses a negative magnitude, and a direction without length."""
         bounded("magnitude", self.magnitude, at_least=0)
         for value in self.direction:
             bounded("direction", value)

@@ -36,11 +36,7 @@ def run(case: dict[str, Any], out: str) -> dict[str, Any]:
 
 
 def _require_untouched(engine: str) -> None:
-    """Checks that the engine replaced no code that judges it; otherwise the process ends before the next row.
-
-    Raises:
-        ProofrollError: the engine has put something else in its place.
-    """
+    """Raises ProofrollError if the engine replaced code that judges it; the process then ends before the next row."""
     from proofroll.running.loading import load
 
     if engine != "truth" and (name := changed(load(engine))):

@@ -118,11 +118,7 @@ class Carrier(ExudynModel):
 
 
 def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, list[int]]:
-    """Axes of one joint, as columns, and which of its three translations and three rotations are locked.
-
-    Raises:
-        Refused: the generators' axes are neither parallel nor orthogonal, or both are rotations.
-    """
+    """Axes of one joint, as columns, and which translations and rotations are locked; refuses what one joint cannot."""
     if all(generator.kind == "rotation" for generator in generators):
         raise Refused("one joint cannot guide the carrier about two axes")
     first, second = (np.asarray(generator.axis) for generator in generators)

@@ -196,11 +196,7 @@ def _matrix(six: Any) -> Array:
 
 
 def _check(mechanism: Mechanism) -> None:
-    """Checks limits that no capability covers.
-
-    Raises:
-        Refused: a body without mass, or a spring in a universal joint.
-    """
+    """Refuses bodies without mass and springs of universal joints, which no capability covers."""
     for body in mechanism.bodies:
         if not body.mass:
             raise Refused(f"{body.name} has no mass; in redundant coordinates each body needs one")

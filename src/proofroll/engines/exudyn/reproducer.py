@@ -122,11 +122,7 @@ def mechanism_source(model: Any, mechanism: Mechanism, settings: ExudynSettings)
 
 
 def _essential(item: dict[str, Any]) -> dict[str, Any]:
-    """Item of Exudyn without drawing, name and entries listed twice.
-
-    Raises:
-        Refused: it has a function, as the effort of an actuator is.
-    """
+    """Item of Exudyn without drawing, name and entries listed twice; refuses one with a function."""
     if any(isinstance(value, dict) and "function" in value for value in item.values()):
         raise Refused("efforts that change in time or have a limit are functions, which programs do not hold yet")
     twice = {"jointHTs", "referenceHT", "referenceRotation"} | ({"localPosition"} if "localHT" in item else set())

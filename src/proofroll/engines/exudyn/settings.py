@@ -58,11 +58,7 @@ class ExudynSettings:
         return EXPLICIT.get(self.integrator, 2)
 
     def __post_init__(self) -> None:
-        """Accepts only settings that have an effect, and all that the formulation needs.
-
-        Raises:
-            InputError: otherwise.
-        """
+        """Accepts only settings that have an effect, and all that the formulation needs."""
         if (self.integrator in EXPLICIT) != (self.formulation == "tree"):
             advice = f"tree has {' and '.join(EXPLICIT)}, the others have implicit integrators"
             raise InputError("exudyn: integrator", self.integrator, advice)

@@ -183,11 +183,7 @@ class Spheres(Redundant):
 
 
 def _check(contact: BodyContact) -> None:
-    """Rejects shapes that Exudyn's contacts do not have.
-
-    Raises:
-        Refused: one of the shapes is no sphere and no plane, or has no radius.
-    """
+    """Refuses shapes that Exudyn's contacts do not have."""
     for shape in (contact.shape_a, contact.shape_b):
         if isinstance(shape, SphereShape) and not shape.radius:
             raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")

@@ -81,11 +81,7 @@ def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
 
 
 def _written(body: RollingBall, name: str, formulation: str) -> str:
-    """The model as MJCF.
-
-    Raises:
-        Refused: the formulation needs what only an author's file can say, or motions that the surface does not have.
-    """
+    """The model as MJCF; refuses what only a file of an author can say, and motions that the surface does not have."""
     known = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
     if formulation == "free":
         return _FREE.format(**known)

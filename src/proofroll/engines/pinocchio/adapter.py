@@ -142,11 +142,7 @@ def _of_mechanism(scene: Scene, settings: PinocchioSettings) -> MechanismRun:
 
 
 def _decided(scene: Scene, settings: PinocchioSettings) -> PinocchioSettings:
-    """The settings with the orientation as the scene asks for it, where they leave that open.
-
-    Raises:
-        Refused: the scene asks for the orientation, and the settings leave it out.
-    """
+    """The settings with the orientation as the scene asks for it; refused where they leave it out."""
     if settings.formulation == "contact":
         return settings
     asked = BallCapability.ORIENTATION in scene.requires

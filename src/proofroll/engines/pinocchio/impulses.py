@@ -110,11 +110,7 @@ class ImpulseSteps:
             raise Refused(str(error)) from None
 
     def _check(self, k: int, G: Array) -> None:
-        """Rejects a contact for which PGS returns wrong impulses, by what impulses do to its slide, shape (3, 3).
-
-        Raises:
-            Diverged: its responses along the surface differ too much.
-        """
+        """Ends where PGS returns wrong impulses for a contact, by what impulses do to its slide, shape (3, 3)."""
         one, two = float(G[0, 0]), float(G[1, 1])
         if self._settings.solver == "pgs" and self.contacts[k].friction and max(one, two) > _UNEQUAL * min(one, two):
             raise Diverged(

@@ -225,11 +225,7 @@ class Adaptive(TangentIntegrator):
         self.q, self.v = q.copy(), v.copy()
 
     def _make_step(self, solver: Any, end: float, most: float = math.inf) -> None:
-        """One step, at most to the time ``end`` [s] and of the length ``most`` [s].
-
-        Raises:
-            Diverged: none is small enough, or too many in a row are too short.
-        """
+        """One step, to ``end`` [s] at most and no longer than ``most`` [s]; ends the run if steps become too short."""
         controlled_step(solver, self._accepted, end, most)
         longest = SHORT * self._turning_time
         is_short = solver.step_size < longest

@@ -75,11 +75,7 @@ class PinocchioSettings:
         return () if self.formulation == "impulses" else ("convex",)
 
     def __post_init__(self) -> None:
-        """Refuses what the formulation or the integrator does not have, and what would change nothing.
-
-        Raises:
-            InputError: a setting does not go with another.
-        """
+        """Refuses what the formulation or the integrator does not have, and what would change nothing."""
         refuse_first("pinocchio", self, self._rules())
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:

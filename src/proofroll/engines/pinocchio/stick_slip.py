@@ -211,11 +211,7 @@ class AdaptiveStickSlip(Adaptive):
         return None
 
     def _leave(self, solver: Any, stop: Rise | None) -> None:
-        """Says that the ball leaves the wall where N falls through zero, unless the mode ends before that.
-
-        Raises:
-            Diverged: the ball leaves the wall.
-        """
+        """Ends the run where N falls through zero and the ball leaves the wall, unless the mode ends before that."""
         lift = located(solver, lambda y: np.array([-self._monitor(y)[2]]))
         time, width = lift[:2] if lift else (float(solver.t), float(solver.step_size))
         if stop is None or time <= stop[0]:
@@ -306,11 +302,7 @@ class FixedStickSlip(FixedStep):
         return self._mechanism.slide(self._data, self.q, self.v, np.zeros(3))
 
     def _must_press(self, time: float, normal_force: float) -> None:
-        """Remembers N [N]; ends the run if it is gone.
-
-        Raises:
-            Diverged: the ball leaves the wall.
-        """
+        """Remembers N [N]; ends the run if it is gone."""
         before, self._normal_force = self._normal_force, normal_force
         if normal_force >= -self._mechanism.faint:
             return

@@ -199,11 +199,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
 def _bounded(free: Array, G: Array, low: Array, high: Array) -> tuple[Array, NDArray[np.int_]]:
     """Forces f between bounds that leave the least of ½ f·G f + free·f: free + G f is zero but where f is at a bound.
 
-    Returns:
-        The forces; of each -1, 0, 1: at its lower bound, between, at its upper one.
-
-    Raises:
-        Refused: G is singular, so that the forces are not determinate.
+    With them of each -1, 0, 1: at its lower bound, between, at its upper one. A singular G is refused.
     """
     from scipy.optimize import lsq_linear
 

@@ -313,13 +313,7 @@ def _misfit(factors: Sequence[float], step: float, times: FloatArray) -> InputEr
 
 
 def _fitting(row: Row, step: float | None, times: FloatArray) -> Row:
-    """The row, with factors that fit where it has the usual ones and they do not.
-
-    Args:
-        row: of a comparison.
-        step: of its engine [s]; None: it has none, or an adaptive one.
-        times: of the samples [s].
-    """
+    """The row, with factors that fit where it has the usual ones and they do not; without a fixed step, itself."""
     if step is None or row.ladder != _USUAL:
         return row
     ladder = next((factors for factors in _LADDERS if _misfit(factors, step, times) is None), row.ladder)

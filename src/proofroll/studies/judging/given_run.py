@@ -134,11 +134,7 @@ def _whole(run: xr.Dataset, scene: Scene) -> bool:
 
 
 def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
-    """Every place, velocity and orientation that is given is finite, and every quaternion of unit length.
-
-    Raises:
-        InputError: one is not; with the time of the first.
-    """
+    """Raises InputError unless places, velocities and orientations are finite, and quaternions of unit length."""
     for element in scene.elements:
         for own in element.sample_type.widths:
             name = scene.label(element, own)
