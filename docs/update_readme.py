@@ -22,7 +22,7 @@ from proofroll.ball_studies.regimes import load_regimes, regime_maps
 from proofroll.ball_studies.report.regime_map import draw as draw_regimes
 from proofroll.files.comparison_file import load_comparison
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.page.growing import write_report
+from proofroll.report.page.growing import begun
 from proofroll.report.tradeoff.work_precision import svg
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store, write_text
@@ -103,7 +103,7 @@ def verdicts(runner: Runner, folder: Path) -> dict[str, str]:
     """Tables of the founding comparison; its picture and that of its report."""
     outcome = compare(load_comparison("paper"), runner)
     draw(outcome, ROOT / "docs" / "picture.svg")
-    write_report([outcome], folder, "proofroll report paper")
+    begun([outcome], "proofroll report paper").write(folder)
     screenshot(folder / "report.html", ROOT / "docs" / "report.png")
     content = outcome_content(outcome)
     return {"verdicts": verdict_table(content), "caveats": caveat_list(content), "remarks": remark_list(content)}

@@ -28,7 +28,7 @@ from proofroll.core.verdict import Verdict, judge_curve
 from proofroll.files.scene_file import load_scene, read_scene_file
 from proofroll.files.trajectory_file import write
 from proofroll.report.comparison.plots import PointCurves
-from proofroll.report.page.growing import begun, write_report
+from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, report_content
 from proofroll.report.replay.records import Replay
@@ -129,7 +129,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store]:
 def written(made: tuple[Outcome, Store], tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
     """What stands in report.json, and the folder of a written report."""
     out = tmp_path_factory.mktemp("out")
-    write_report([made[0]], out, "proofroll report invented")
+    begun([made[0]], "proofroll report invented").write(out)
     return json.loads((out / "report.json").read_text(encoding="utf-8")), out
 
 

@@ -18,7 +18,7 @@ from proofroll.core.number_format import number
 from proofroll.files.json_data import plain
 from proofroll.report.comparison.plots import EngineCurve, point_curves
 from proofroll.report.labels import symbol
-from proofroll.report.page.growing import write_report
+from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page
 from proofroll.report.page.records import report_content
 from proofroll.report.pages import packed
@@ -125,7 +125,9 @@ def test_numbers_that_are_not_finite_do_not_break_the_page(made: tuple[Outcome, 
     first = outcome.runs[0]
     lost = [dataclasses.replace(judgement, error=math.inf, order=math.nan) for judgement in first.judgements]
     runs = [dataclasses.replace(first, judgements=lost), *outcome.runs[1:]]
-    content = write_report([dataclasses.replace(outcome, runs=runs)], tmp_path, COMMAND)
+    report = begun([dataclasses.replace(outcome, runs=runs)], COMMAND)
+    report.write(tmp_path)
+    content = report.content
     assert plain(content)["comparisons"][0]["runs"][0]["judgements"][0]["error"] is None
     assert (
         "∞" in whole((tmp_path / "report.html").read_text(encoding="utf-8")).rpartition('<script type="text/plain"')[0]
@@ -206,7 +208,7 @@ def test_where_runs_were_made_is_told(made: tuple[Outcome, Store], html: str, tm
         if run.row.engine == "beta"
     ]
     runs = [run for run in outcome.runs if run.row.engine != "beta"] + away
-    write_report([dataclasses.replace(outcome, runs=runs)], tmp_path, COMMAND)
+    begun([dataclasses.replace(outcome, runs=runs)], COMMAND).write(tmp_path)
     shown = whole((tmp_path / "report.html").read_text(encoding="utf-8"))
     line = "Made on machines of a cluster: 2 on node&lt;7&gt;. No speed is measured there."
     assert f"<dt>Elsewhere</dt><dd>An invented comparison: {line}</dd>" in shown
@@ -219,7 +221,9 @@ def test_a_comparison_of_which_nothing_is_left_is_still_a_report(made: tuple[Out
     """Every engine missing: the page says so, and what cannot be said."""
     outcome, _ = made
     lost = [run for run in outcome.runs if run.row.engine == "gamma"]
-    content = write_report([dataclasses.replace(outcome, runs=lost)], tmp_path, COMMAND)
+    report = begun([dataclasses.replace(outcome, runs=lost)], COMMAND)
+    report.write(tmp_path)
+    content = report.content
     assert content.comparisons[0].evidence
     found = content.comparisons[0].evidence.findings
     assert found.answer.startswith("Of 1 engine setting, 1 gives no result at some points")

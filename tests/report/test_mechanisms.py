@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.report.replay import _turned, drawn
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import load_scene
 from proofroll.report.comparison.plots import point_curves
-from proofroll.report.page.growing import write_report
+from proofroll.report.page.growing import begun
 from proofroll.report.replay.records import Replayed
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -42,7 +42,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Store, 
 def report(compared: tuple[Outcome, Store, Path]) -> Path:
     """The folder of its report."""
     outcome, _, folder = compared
-    write_report([outcome], folder, "proofroll report slider_crank")
+    begun([outcome], "proofroll report slider_crank").write(folder)
     return folder
 
 

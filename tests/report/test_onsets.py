@@ -24,7 +24,7 @@ from proofroll.report.comparison.plots import Bound, point_curves
 from proofroll.report.comparison.records import ReportedRun
 from proofroll.report.comparison.scores import scores
 from proofroll.report.labels import MEANINGS, SYMBOLS
-from proofroll.report.page.growing import write_report
+from proofroll.report.page.growing import begun
 from proofroll.report.page.html import page
 from proofroll.report.page.records import ReportContent, ReportedTruth, report_content
 from proofroll.report.terminal.tables import closing_lines, console, verdict_table
@@ -242,7 +242,7 @@ def test_times_are_shown_to_the_digits_of_their_brackets(event: tuple[float, ...
 
 def test_written_report_names_no_finite_number_it_has_not(slipping: tuple[Outcome, Store], tmp_path: Path) -> None:
     """The file is JSON that every reader accepts, infinite distances included."""
-    write_report([slipping[0]], tmp_path, COMMAND)
+    begun([slipping[0]], COMMAND).write(tmp_path)
     text = (tmp_path / "report.json").read_text(encoding="utf-8")
     assert "Infinity" not in text
     assert "NaN" not in text

@@ -50,7 +50,7 @@ def _draw(file: SoundFile, plot: Path) -> None:
         raise InputError("--plot", plot, "a drawn scene is a page: end the name of the file in .html")
     options.require_pages()
     options.require_writable(plot, "--plot")
-    from proofroll.report.page.scene_page import scene_page
+    from proofroll.report.page.scene_sheet import scene_page
     from proofroll.running.store import write_text
 
     write_text(plot, scene_page(file.path, file.start))

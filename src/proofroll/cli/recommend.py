@@ -80,9 +80,7 @@ def recommend(
     for text in engine or []:
         require_engine(parse_engine(text).name)
     unit = question.loaded.observables[question.quantity].unit
-    required = Requirements(
-        question.quantity, _tolerance(tolerance, unit), _positive("budget", budget), tuple(engine or ())
-    )
+    required = Requirements(question.quantity, _tolerance(tolerance, unit), _seconds(budget), tuple(engine or ()))
     ranges = ranges_of(question, over) if over is not None else None
     study = _stored_study(question, engine or [], claims, ranges, out, jobs, measure_first=measure_first)
     known = {*study.absent, *(point.engine for point in study.points)}
@@ -142,10 +140,10 @@ def _tolerance(text: str, unit: str) -> Any:
         raise InputError("tolerance", text, advice) from None
 
 
-def _positive(name: str, value: float | None) -> float | None:
-    if value is not None and not 0 < value < float("inf"):
-        raise InputError(name, value, "give a positive number of seconds")
-    return value
+def _seconds(budget: float | None) -> float | None:
+    if budget is not None and not 0 < budget < float("inf"):
+        raise InputError("budget", budget, "give a positive number of seconds")
+    return budget
 
 
 def _stored_study(

@@ -109,12 +109,7 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     """The worker's side: reads, evaluates, and writes the arrays to a file."""
     from proofroll.running.worker import one_line
 
-    reader = load_reader(here(engine))
-    content = json.loads(Path(asked).read_text(encoding="utf-8"))
-    content["path"], content["gravity"] = Path(content["path"]), np.array(content["gravity"])
-    content["states"], content["robot"] = states_from(content["states"]), robot_from(content["robot"])
-    content["torques"] = {name: np.array(rows) for name, rows in content["torques"].items()}
-    request = Request(**content)
+    reader, request = load_reader(here(engine)), _request(asked)
     for option in request.options:
         value = request.options[option]
         require_known(f"{engine}: {option}", option, reader.options, "there is no such option; it has", value)
@@ -139,6 +134,15 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
     np.savez(arrays, **parts)
     names = {name: list(getattr(reading, name)) for name in (*_BY_JOINT, "joints", "dofs", "coupled", "remarks")}
     return told | {"refused": ""} | names
+
+
+def _request(asked: str) -> Request:
+    """The request in a file that the other side wrote."""
+    content = json.loads(Path(asked).read_text(encoding="utf-8"))
+    content["path"], content["gravity"] = Path(content["path"]), np.array(content["gravity"])
+    content["states"], content["robot"] = states_from(content["states"]), robot_from(content["robot"])
+    content["torques"] = {name: np.array(rows) for name, rows in content["torques"].items()}
+    return Request(**content)
 
 
 class _Flawed(Exception):  # noqa: N818 -- becomes the row of the engine
@@ -168,8 +172,7 @@ def ask_as_written(
         WorkerDied: the process crashed or took longer than ``time_limit`` [s].
     """
     asked = folder / "as_written.json"
-    content = {name: getattr(request, name) for name in ("kind", "base", "base_joint", "options", "gravity")}
-    asked.write_text(json.dumps(plain(content) | {"path": str(original.resolve())}), encoding="utf-8")
+    asked.write_text(json.dumps(plain(request) | {"path": str(original.resolve())}), encoding="utf-8")
     told = worker.request(call(read_as_written, engine=engine, asked=str(asked)), time_limit)
     return AsWritten(Whole(*told["whole"]) if told["whole"] else None, told["refused"]) if "whole" in told else None
 
@@ -179,13 +182,9 @@ def read_as_written(engine: str, asked: str) -> dict[str, Any]:
     reader = load_reader(here(engine))
     if not hasattr(reader, "as_written"):
         return {}
-    content = json.loads(Path(asked).read_text(encoding="utf-8"))
-    content["path"], content["gravity"] = Path(content["path"]), np.array(content["gravity"])
-    nothing = RobotStates({}, {}, {}, {}, {})
-    request = Request(**content, children={}, states=nothing, torques={}, robot=Robot("", {}, ()))
     try:
         with contextlib.chdir(Path(asked).parent):  # where an engine may leave its log
-            whole = reader.as_written(request)
+            whole = reader.as_written(_request(asked))
     except Exception as error:  # whatever an importer raises is its refusal
         return {"whole": None, "refused": words_of(error)}
     return {"whole": [whole.velocities, whole.mass], "refused": ""}

@@ -120,16 +120,6 @@ def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), le
     return Report(content, [point_curves(outcome) for outcome in outcomes], replay)
 
 
-def write_report(outcomes: list[Outcome], out: Path, command: str) -> ReportContent:
-    """Writes the files of a report of comparisons alone into a folder, and returns their content.
-
-    The rest is as for :func:`begun`. Raises ProofrollError if the folder cannot be written.
-    """
-    report = begun(outcomes, command)
-    report.write(out)
-    return report.content
-
-
 def _replay(outcomes: list[Outcome]) -> Replay | None:
     """The replay of the comparisons, one kind of scenes after the other."""
     kinds = {id(item): kind_of(item.scene) for item in outcomes}

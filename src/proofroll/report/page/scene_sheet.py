@@ -11,6 +11,7 @@ from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.files.scene_parameters import Parameter
 from proofroll.report.kinds import kind_of
 from proofroll.report.labels import symbol, unit
+from proofroll.report.pages import environment, rendered
 from proofroll.report.pen import Picture
 
 # Values of one parameter that are listed one by one.
@@ -47,6 +48,11 @@ def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> SceneSheet:
     return sheet_of(
         read_scene_file(scene), points, [load_scene(scene, **point) for point in points] or [load_scene(scene)]
     )
+
+
+def scene_page(scene: str, start: Sequence[str]) -> str:
+    """The page of a scene with sentences on its start; everything from the scene's file is escaped."""
+    return rendered(environment(), "scene_page.html", sheet=scene_sheet(scene, []), start=start)
 
 
 def sheet_of(file: SceneFile, points: Sequence[dict[str, float]], scenes: Sequence[Scene]) -> SceneSheet:
