@@ -41,6 +41,8 @@ TINY = (
     inertial(mass="1e-9", ixx="1e-12", iyy="1e-12", izz="1e-12", ixy="0").replace("0.002", "0").replace("-0.001", "0")
 )
 TWO = '<joint name="k2" axis="1 0 0" pos="0.02 0 0.1"/><joint name="k3" axis="0 1 0" pos="0 0.05 0"/>'
+LEAF = '<body name="leaf" pos="0.5 0 0"><joint name="k9" axis="1 0 0"/><geom type="sphere" size="0.1"/></body>'
+FRAMED = ("pinocchio", {"frames_ignored"})
 OTHER = '<body name="other" pos="1 0 0"><joint name="far" type="slide" axis="0 0 1"/><geom size="0.1"/></body>'
 LOOSE = '<body name="loose"><freejoint/><geom size="0.1 0.2 0.3" type="box"/></body>'
 FLYING = """<mujoco model="f"><worldbody><body name="b" pos="0.2 0.3 1" euler="90 20 0"><freejoint name="f"/>
@@ -110,6 +112,7 @@ REAL: list[tuple[str, str, str, set[str]]] = [
     ("total mass", mjcf(compiler='settotalmass="7"'), "pinocchio", {"total_mass_ignored"}),
     ("gravity", mjcf(option='gravity="0 1 -3"'), "pinocchio", {"default_gravity"}),
     ("two trees", mjcf(extra=OTHER), "pinocchio", {"first_tree_only"}),
+    ("a frame", mjcf().replace("</body></body>", f"<frame euler='0 0 30'>{LEAF}</frame></body></body>"), *FRAMED),
     ("two worlds", mjcf().replace("<actuator>", FLOOR), "pinocchio", {"tree_read_again"}),
     (
         "two worlds",

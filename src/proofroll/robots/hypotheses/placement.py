@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
+from xml.etree.ElementTree import Element
 
 import numpy as np
 
@@ -56,12 +58,33 @@ def first_tree_only(evidence: RobotEvidence) -> Robot | None:
         if joint.parent in kept and not (joint.parent == WORLD and joints):
             kept.add(joint.child)
             joints.append(joint)
-    if len(joints) == len(robot.joints):
-        return None
-    moving = {joint.name for joint in joints}
+    return _with_joints(robot, joints) if len(joints) < len(robot.joints) else None
+
+
+def _with_joints(robot: Robot, joints: Sequence[RobotJoint]) -> Robot:
+    """The robot with some of its joints, and what they carry."""
+    moving, kept = {joint.name for joint in joints}, {joint.child for joint in joints}
     mimics = tuple(mimic for mimic in robot.mimics if {mimic.joint, mimic.other} <= moving)
     bodies = {name: body for name, body in robot.bodies.items() if name in kept}
     return robot.change(joints=tuple(joints), bodies=bodies, mimics=mimics)
+
+
+@hypothesis({"pinocchio": "4.1.0"}, "write the poses of what stands in a <frame> without it")
+def frames_ignored(evidence: RobotEvidence) -> Robot | None:
+    """What stands in a <frame> is not read."""
+    frames = list(evidence.root.iter("frame"))
+    if not frames:
+        return None
+    lost = {body.get("name") for frame in frames for body in frame.iter("body")}
+    robot = evidence.edited(_without_frames) or evidence.robot
+    return _with_joints(robot, [joint for joint in robot.joints if joint.child.partition("/")[0] not in lost])
+
+
+def _without_frames(root: Element) -> bool:
+    for parent in list(root.iter()):
+        for frame in parent.findall("frame"):
+            parent.remove(frame)
+    return True
 
 
 @hypothesis({"pinocchio": "4.1.0"}, "write one <worldbody>")
