@@ -110,6 +110,25 @@ def test_round_off_that_an_unstable_motion_enlarges_shows_no_order() -> None:
     assert not single.shown
 
 
+@pytest.mark.parametrize(("noise", "order"), [(0.0, 2.0), (1.0, math.nan)])
+def test_in_single_precision_one_law_of_the_step_has_an_order(noise: float, order: float) -> None:
+    """Differences near round-off show their order where all have one shape; changes of several shapes show none."""
+    first, middle, fine = (curve(h, 2) for h in (4e-2, 2e-2, 1e-2))
+    last = float(np.max(np.abs(fine - middle)))
+    found = richardson([first, middle, fine + noise * last * np.cos(9 * T)], (4, 2, 1), 2, scatter=last / 10)
+    assert found.order == pytest.approx(order, abs=0.1, nan_ok=True)
+    assert found.rounded is bool(noise)
+
+
+@pytest.mark.parametrize("curves", [(0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.1 + 1e-9, 0.0)])
+def test_tolerances_that_change_round_off_alone_are_saturated(curves: tuple[float, ...]) -> None:
+    """Where one of two tightenings changes nothing, something else limits the steps, and the bar is the other change."""
+    found = tightest([LIMIT + off for off in curves])
+    assert found.saturated
+    assert not found.shown
+    assert found.error_bar == pytest.approx(0.1, rel=1e-6)
+
+
 def test_equal_curves() -> None:
     """Curves that do not depend on the step are their own limit, with no order."""
     found = richardson([LIMIT, LIMIT, LIMIT], (4, 2, 1))
