@@ -122,7 +122,7 @@ def test_in_single_precision_one_law_of_the_step_has_an_order(noise: float, orde
 
 @pytest.mark.parametrize("curves", [(0.1, 0.0, 0.0), (0.1, 0.1, 0.0), (0.1, 0.1 + 1e-9, 0.0)])
 def test_tolerances_that_change_round_off_alone_are_saturated(curves: tuple[float, ...]) -> None:
-    """Where one of two tightenings changes nothing, something else limits the steps, and the bar is the other change."""
+    """Where one of two tightenings changes nothing, something else limits the steps: the bar is the other change."""
     found = tightest([LIMIT + off for off in curves])
     assert found.saturated
     assert not found.shown
