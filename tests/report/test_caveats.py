@@ -11,9 +11,11 @@ from invented import stability_study, tradeoff_study
 
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import TellsCaveats
+from proofroll.core.first_steps import certificate
 from proofroll.core.plugins import engine_names, load_engine
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.files.scene_file import load_scene
 from proofroll.report.labels import caveat_lines, family_and_caveat, with_caveat
 from proofroll.report.stability.tables import silent_lines
 from proofroll.report.tradeoff.tables import answer_lines
@@ -102,6 +104,25 @@ def test_formulations_of_contact_say_which_law_they_have() -> None:
                     name,
                     formulation,
                 )
+
+
+@pytest.mark.parametrize(
+    ("engine", "formulation", "preset", "scene", "words"),
+    [
+        ("mujoco", "geoms", "matched", "sled", ["contact by a convex cone, whose sliding parts"]),
+        ("mujoco", "chart", "matched", "slide_to_roll", ["contact by a convex cone, whose sliding parts"]),
+        ("projection", "rotating_frame", "default", "slide_to_roll", ["hard contact by Coulomb's law"]),
+        ("mujoco", "joints", "default", "pendulum", []),
+    ],
+)
+def test_a_certificate_names_the_law_of_contact(
+    engine: str, formulation: str, preset: str, scene: str, words: list[str]
+) -> None:
+    """Of bodies that touch and of balls that slip alike; where a scene asks for no such law there is no line."""
+    kind = load_engine(engine)
+    settings, loaded = kind.presets[formulation][preset], load_scene(scene)
+    told = [line.quantity for line in certificate(kind, kind.build(loaded, settings), loaded, settings)]
+    assert [text for text in told if "law of contact" in text] == [f"law of contact: {law}" for law in words]
 
 
 def test_a_recommendation_says_which_law_a_choice_has() -> None:

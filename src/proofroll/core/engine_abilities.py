@@ -96,6 +96,12 @@ class TellsFamily(Protocol):
         """Clause on the law that a model with these settings follows, by the capability that it is of."""
 
 
+def laws(engine: Any, settings: Any) -> dict[str, str]:
+    """Clauses on the laws of what a formulation provides, by capability; none where the engine tells none."""
+    told = engine.family(settings) if isinstance(engine, TellsFamily) else {}
+    return {need: clause for need, clause in told.items() if need in engine.provides[settings.formulation]}
+
+
 @runtime_checkable
 class LowersOrder(Protocol):
     """Ability of an engine whose order of convergence drops with something in a scene."""

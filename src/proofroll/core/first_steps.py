@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.certificate import ROUNDINGS, Line, Standing, certify
+from proofroll.core.certificate import EXACT, ROUNDINGS, Line, Standing, certify
 from proofroll.core.element import Element, FirstMotion
 from proofroll.core.engine import EPSILON, fixed_step, precision_of
-from proofroll.core.engine_abilities import declared_order
+from proofroll.core.engine_abilities import declared_order, laws
 from proofroll.core.errors import Diverged, InputError, Refused
 from proofroll.core.multi_element import build, sample_of, shaped
 from proofroll.core.number_format import number
@@ -109,7 +109,7 @@ def softness(engine: Any, scene: Scene) -> float:
 
 
 def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Line]:
-    """Certificate of a freshly built engine: its own account, and the acceleration of its first steps.
+    """Certificate of a freshly built engine: its own account, its laws, and the acceleration of its first steps.
 
     Numbers that only repeat the scene's prove nothing. An acceleration that an engine reports is held to the
     scene exactly; its steps may differ by :data:`_STIFF`, and by what is granted to a softened one.
@@ -120,7 +120,13 @@ def certificate(kind: Any, engine: Any, scene: Scene, settings: Any) -> list[Lin
     for line in derivable(kind, scene, settings):
         said = granted.get(line.quantity.replace(OF_FIRST_STEPS, ""))
         derived.append(line if said is None else replace(line, tolerance=max(line.tolerance, _STIFF) + said))
-    return [*lines, *derived]
+    told = [
+        Line(scene.label(element, f"law of contact: {clause}"), "", (), (), 0.0, EXACT)
+        for element in scene.elements
+        for need, clause in laws(kind, settings).items()
+        if need in element.requires
+    ]
+    return [*lines, *told, *derived]
 
 
 def derivable(kind: Any, scene: Scene, settings: Any) -> list[Line]:

@@ -74,7 +74,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         code = digest(sorted({place for truth in load_truths() for place in _of(truth)}))
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
     from proofroll.core.engine import precision_of
-    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, TellsFamily
+    from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, laws
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.loading import load
 
@@ -90,17 +90,11 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         lowered=dict(kind.lowered(settings)) if isinstance(kind, LowersOrder) else {},
         shares=list(kind.shares.get(settings.formulation, ())) if isinstance(kind, SharesEquations) else [],
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
-        families=_families(kind, settings) if isinstance(kind, TellsFamily) else {},
+        families=laws(kind, settings),
         precision=precision_of(settings),
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)
-
-
-def _families(kind: Any, settings: Any) -> dict[str, str]:
-    """Laws of what the formulation provides."""
-    provided = kind.provides[settings.formulation]
-    return {need: clause for need, clause in kind.family(settings).items() if need in provided}
 
 
 def used(settings: Any) -> dict[str, Any]:

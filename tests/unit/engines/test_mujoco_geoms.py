@@ -72,8 +72,7 @@ def read_back(mechanism, **options):
 def test_shapes_over_a_plane_are_read_back(kind, order):
     """Gap, normal, place and friction of every shape over a tilted plane are the scene's, either way round."""
     found = read_back(free(FLOOR, SHAPES[kind], pairs=(Pair("p", order, 0.3),)))
-    assert len(found) == 6
-    assert "law of contact: contact by a convex cone, whose sliding parts" in found
+    assert len(found) == 5
     assert max(found.values()) < 1e-9
 
 

@@ -71,7 +71,6 @@ def test_a_start_is_certified(name: str) -> None:
         "responses of contacts",
         "friction of contacts",
         "acceleration",
-        "law of contact: hard contact by Coulomb's law",
     } <= told
     known = ~np.isnan(element.first_press)
     np.testing.assert_allclose(run.sample().contact_force[known], element.first_press[known], atol=1e-8)

@@ -10,7 +10,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.certificate import ROUNDINGS, Line, require_shapes, tolerated
 from proofroll.core.engine import EPSILON, Regularised
-from proofroll.core.errors import Diverged, Refused
+from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.start import TOUCHING, touches
 from proofroll.elements.mechanism.dataset import along, reactions
@@ -55,8 +55,6 @@ _Compare = Callable[[str, str, Any, Any, float], None]
 def _require_readable(built: MechanismBuilt) -> None:
     """Raises Diverged, with the name of the field, for what is of another shape or kind than the protocol says."""
     require_shapes(built, _SHAPES)
-    if not isinstance(built.contact_family, str | None):
-        raise Diverged("the engine's built() gave contact_family that is no text")
 
 
 def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismSample) -> list[Line]:
@@ -100,7 +98,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     if len(mechanism.joints):
         compare("joint positions", "m", places, built.joint_position, size)
         compare("joint axes", "1", axes, built.joint_axis, 1.0)
-    _compare_contacts(element, built, compare, lines)
+    _compare_contacts(element, built, compare)
     compare("mobility", "1", element.analysis.mobility, built.mobility, 1.0)
     compare("error of the mass matrix", "1", 0.0, built.mass_matrix_error, 1.0)
     compare("position", "m", start.p_WB[0], sample.p_WB, size)
@@ -117,8 +115,8 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     return lines
 
 
-def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare: _Compare, lines: list[Line]) -> None:
-    """Compares gaps, normals, places and coefficients of contacts, and names the law that the model has."""
+def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:
+    """Compares gaps, normals, places and coefficients of contacts."""
     contacts = element.mechanism.contacts
     if not contacts:
         return
@@ -129,8 +127,6 @@ def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare:
     friction = [contact.friction for contact in contacts]
     compare("friction of contacts", "1", friction, built.contact_friction, max(friction) or 1.0)
     restitution = [contact.restitution for contact in contacts]
-    if built.contact_family:
-        lines.append(Line(f"law of contact: {built.contact_family}", "", (), (), 0.0, COMPOSED))
     compare("restitution of contacts", "1", restitution, built.contact_restitution, max(restitution) or 1.0)
     _compare_response(element, built, compare)
 

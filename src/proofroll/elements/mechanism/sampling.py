@@ -62,7 +62,6 @@ class MechanismBuilt:
         contact_friction, contact_restitution: coefficients that the engine made of the pair's, shape (contacts,).
         contact_response: what unit forces on body a of each contact do to the rates of all slides, world axes [1/kg]
             (the Delassus matrix), shape (contacts, 3, contacts, 3); of a pair without friction along normals alone.
-        contact_family: law of contact that the model has, see :mod:`proofroll.elements.mechanism.contacts.family`.
         rows: number of the engine's constraint rows.
         rank: number of independent ones among them.
         mobility: velocities of the engine's model less ``rank``.
@@ -93,7 +92,6 @@ class MechanismBuilt:
     contact_friction: Array | None = None
     contact_restitution: Array | None = None
     contact_response: Array | None = None
-    contact_family: str | None = None
 
 
 def mechanism_of(scene: Any) -> Mechanism:

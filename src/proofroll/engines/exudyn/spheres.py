@@ -157,7 +157,6 @@ class Spheres(Redundant):
             contact_place=np.array(places),
             contact_friction=np.array([self.system.GetObject(made.item)["dynamicFriction"] for made in self._contacts]),
             contact_restitution=np.zeros(len(self._contacts)),
-            contact_family=family(self._contact_settings)[_CAPABILITY.CONTACT],
         )
         larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by as much as it is pressed in")
         if self._builds_up:  # then the first accelerations tell nothing of what holds

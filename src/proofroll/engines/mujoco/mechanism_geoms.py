@@ -97,7 +97,6 @@ class MujocoGeoms(MujocoMechanism):
         plain = super().built()
         read = self._contacts.read(self._evaluated(), self._rows)
         told = {f"contact_{name}": value for name, value in read._asdict().items()}
-        told["contact_family"] = family(self._settings)[_CAPABILITY.CONTACT]
         if not self._evaluated().ncon:
             return replace(plain, **told)
         softened, unsaid = dict(plain.regularised), dict[str, None]()

@@ -169,7 +169,6 @@ class ImpulseSteps:
             "contact_friction": np.array([point.getFriction() for point in solver.points]),
             "contact_restitution": self.restitution.copy(),
             "contact_response": np.einsum("kin,nm,ljm->kilj", world, inverse, world),
-            "contact_family": family(self._settings)[_CAPABILITY.CONTACT],
         }
 
     def terms(self, q: Array, v: Array, span: float) -> tuple[Array, Array, Array, list[Touching]]:

@@ -20,7 +20,6 @@ from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
-from proofroll.elements.mechanism.contacts.family import Family
 from proofroll.elements.mechanism.contacts.start import closed_and_still, scale_of
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
@@ -192,7 +191,6 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             "contact_friction": self.friction.copy(),
             "contact_restitution": np.array([contact.restitution for contact in self.contacts]),
             "contact_response": np.einsum("kin,nlj->kilj", now.J, now.response),
-            "contact_family": Family.HARD.value,
         }
 
     def _rates(self, y: Array) -> Array:

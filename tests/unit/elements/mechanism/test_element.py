@@ -131,7 +131,7 @@ def test_how_far_a_model_may_soften_says_why() -> None:
 @pytest.mark.parametrize("wrong", [np.zeros((2, 5)), "heavy"], ids=["shape", "text"])
 @pytest.mark.parametrize(
     "name",
-    [item.name for item in dataclasses.fields(MechanismBuilt) if item.name not in {"regularised", "contact_family"}],
+    [item.name for item in dataclasses.fields(MechanismBuilt) if item.name != "regularised"],
 )
 def test_what_is_built_of_another_shape_is_named(name: str, wrong: object) -> None:
     """Whatever an engine says that it built is of the shape that the protocol says, or the field is named."""
@@ -156,13 +156,6 @@ def test_a_wrong_delassus_matrix_is_noticed() -> None:
     assert not noticed(smooth, built)
     response[0, 2, 1, 2] *= 1.001
     assert noticed(smooth, built) == {"responses of contacts"}
-
-
-def test_a_family_of_contact_is_a_text() -> None:
-    """Numbers where the name of a law of contact belongs are named."""
-    element = element_of("slider_crank")
-    with pytest.raises(Diverged, match="gave contact_family that is no text"):
-        noticed(element, dataclasses.replace(right(element), contact_family=np.zeros(3)))
 
 
 @pytest.mark.parametrize(

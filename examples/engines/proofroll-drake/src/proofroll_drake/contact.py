@@ -21,7 +21,6 @@ from pydrake.multibody.plant import CoulombFriction, DiscreteContactApproximatio
 
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.capabilities import MechanismCapability
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.sampling import MechanismBuilt
@@ -102,15 +101,14 @@ class DrakeContacts:
                 found[number] += on_b
         return found
 
-    def built(self, found: MechanismBuilt, settings: DrakeSettings) -> MechanismBuilt:
-        """Model that was built, with the law of its contacts."""
+    def built(self, found: MechanismBuilt) -> MechanismBuilt:
+        """Model that was built, with the coefficients of its contacts."""
         count = len(self._mechanism.pairs)
         friction = self._mechanism.pairs[0].friction
         return replace(
             found,
             contact_friction=np.full(count, friction),
             contact_restitution=np.zeros(count),
-            contact_family=family(settings)[MechanismCapability.CONTACT],
         )
 
 

@@ -258,7 +258,7 @@ class DrakeMechanism:
             regularised=soft,
             **rates,
         )
-        return self._contacts.built(found, self._settings) if self._contacts else found
+        return self._contacts.built(found) if self._contacts else found
 
 
 def _axis(context: Any, joint: Joint, built: Any) -> Any:

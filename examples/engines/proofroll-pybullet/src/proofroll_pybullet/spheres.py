@@ -13,7 +13,6 @@ from proofroll.core.errors import Diverged, Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Mechanism
 from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.contacts.family import Family
 from proofroll.elements.mechanism.rotations import from_quaternion, to_quaternion
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample, mechanism_of
 from proofroll_pybullet.settings import PybulletSettings
@@ -159,6 +158,5 @@ class PybulletSpheres:
         return MechanismBuilt(
             np.array(mass), np.array(com), np.array(inertia), gravity=self._world.gravity(),
             contact_friction=np.full(count, told[1] ** 2), contact_restitution=np.full(count, told[5] ** 2),
-            contact_family=Family.ANISOTROPIC.value,
             regularised={name: Regularised(_ASIDE, _TURNED) for name in ("acceleration", "angular_acceleration")},
         )  # fmt: skip
