@@ -118,3 +118,22 @@ def arithmetic(
         found = matrix(asked, files, tests, out, jobs, advance)
     show({"arithmetic": found}, as_json, lambda: [arithmetic_table(found), *arithmetic_lines(found)])
     raise typer.Exit(OK if all(item.same for item in found) else CONTRADICTED)
+
+
+@drill.command()
+def published(
+    scenes: Annotated[
+        list[str] | None, typer.Argument(help="Scenes; by default all of which there are numbers.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Hold truths and errors of engines against numbers that were found elsewhere; exit 1 if a true value misses."""
+    from proofroll_drill.published import held
+    from proofroll_drill.table import published_table
+
+    with progress_bar("scenes") as advance:
+        rows = list(held(scenes or [], advance))
+    missed = sum(row.misses for row in rows)
+    said = f"{len(rows)} numbers held, {missed} missed."
+    show({"held": len(rows), "missed": missed, "numbers": rows}, as_json, lambda: [published_table(rows), said])
+    raise typer.Exit(CONTRADICTED if any(row.misses and not row.what.startswith("error of") for row in rows) else OK)

@@ -1,0 +1,99 @@
+"""Values and errors that were measured elsewhere, and the same of this machine beside them."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from proofroll.core.arrays import FloatArray
+from proofroll.core.errors import ProofrollError
+from proofroll.core.events import events_of
+from proofroll.files.scene_file import load_scene
+from proofroll.running.simulation import simulate
+
+FILE = Path(__file__).with_name("numbers.toml")
+DIGITS = 1e-10  # to which published values of true motions are held; they have ten to eighteen digits
+FACTOR = 2.0  # by which an error may be larger than one that was measured elsewhere
+SAMPLES = 0.02  # between samples of an engine's run [s]
+_FIRST = 1e-3  # the step of the first error of an engine [s]; each that follows is of a tenth of it
+
+
+@dataclass(frozen=True)
+class Held:
+    """A published number beside ours.
+
+    Attributes:
+        scene, what: which.
+        published, ours: the numbers; nan where there is no run.
+        misses: True if a value is further off than its digits, or an error larger than allowed.
+        why: reason that there is no run, or that an error is ``smaller``.
+    """
+
+    scene: str
+    what: str
+    published: float
+    ours: float
+    misses: bool
+    why: str = ""
+
+
+def held(scenes: list[str], advance: Callable[[str], None] = lambda _: None) -> Iterator[Held]:
+    """Every published number of some scenes, all if none is named."""
+    file = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    for kind, hold in (("truths", _truths), ("errors", _errors)):
+        for entry in file[kind]:
+            if not scenes or entry["scene"] in scenes:
+                yield from hold(entry)
+                advance(f"{kind} of {entry['scene']}")
+
+
+def _truths(entry: Mapping[str, Any]) -> Iterator[Held]:
+    name, at = entry["scene"], entry["at"]
+    scene = load_scene(name, **entry.get("parameters", {}))
+    found = simulate(scene, "truth", until=at, every=at / 2)
+    for variable, published in entry.get("values", {}).items():
+        values = np.ravel(found[variable].to_numpy()[-1])
+        for place, one in enumerate(np.atleast_1d(published)):
+            if np.isfinite(one):
+                said = f"{variable}{f'[{place}]' if np.size(published) > 1 else ''} at {at:g} s"
+                yield _value(name, said, float(one), float(values[place]))
+    # What happens at once, as two feet that stop together, is one time
+    groups = itertools.groupby((event.time for event in events_of(found)), lambda time: round(time, 9))
+    times = [next(group) for _, group in groups]
+    for number, time in enumerate(entry.get("events", []), 1):
+        yield _value(name, f"event {number} [s]", time, times[number - 1] if number <= len(times) else np.nan)
+    if "rests" in entry:
+        yield _value(name, "rest [s]", entry["rests"], times[-1])
+
+
+def _value(scene: str, what: str, published: float, ours: float) -> Held:
+    return Held(scene, what, published, ours, not abs(ours - published) <= DIGITS * max(1.0, abs(published)))
+
+
+def _errors(entry: Mapping[str, Any]) -> Iterator[Held]:
+    name, until = entry["scene"], entry["until"]
+    scene = load_scene(name)
+    of = entry.get("of", "p_WB")
+    true = simulate(scene, "truth", until=until, every=SAMPLES)[of].to_numpy()
+    for engine, errors in entry["engines"].items():
+        for power, published in enumerate(errors):
+            dt = _FIRST / 10**power
+            ours, why = np.nan, ""
+            try:
+                ours = _distance(simulate(scene, engine, until=until, every=SAMPLES, dt=dt)[of].to_numpy(), true)
+            except ProofrollError as error:
+                why = str(error)
+            why = "smaller" if ours < published / FACTOR else why
+            yield Held(name, f"error of {engine}, {dt:g} s", published, ours, not ours <= FACTOR * published, why)
+
+
+def _distance(path: FloatArray, true: FloatArray) -> float:
+    if path.shape != true.shape:  # it ended early
+        return float("nan")
+    return float((np.linalg.norm(path - true, axis=-1) if path.ndim > 1 else np.abs(path - true)).max())

@@ -1,0 +1,34 @@
+"""Numbers that were found elsewhere beside ours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from proofroll_drill import published
+
+NUMBERS = """
+[[truths]]
+scene = "servo"
+at = 0.5
+values = { "q.slide" = 1.0055444518, "v.slide" = -3.6894821932 }
+events = [0.1]
+
+[[errors]]
+scene = "servo"
+until = 0.1
+engines = { "projection[formulation=dependent,preset=default]" = [1e-30], "mujoco[formulation=chart]" = [1.0] }
+"""
+
+
+def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A tenth digit that differs, an event or a run that there is not, and a larger error miss; the rest holds."""
+    (tmp_path / "numbers.toml").write_text(NUMBERS, encoding="utf-8")
+    monkeypatch.setattr(published, "FILE", tmp_path / "numbers.toml")
+    rows = list(published.held([]))
+    assert [row.misses for row in rows] == [False, False, True, True, True]
+    assert "chart" in rows[-1].what
+    assert rows[-1].why
+    assert list(published.held(["sled"])) == []
+    (tmp_path / "numbers.toml").write_text(NUMBERS.replace("4518,", "4528,").replace("1e-30", "1"), encoding="utf-8")
+    assert [row.misses for row in published.held([])] == [True, False, True, False, True]
