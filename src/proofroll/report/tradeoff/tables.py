@@ -114,23 +114,28 @@ def point_table(
     points: Sequence[MeasuredPoint],
     quantities: Sequence[str],
     title: str,
-    ties: Collection[int] = (),
+    ties: Collection[int] | None = None,
 ) -> Table:
     """Table of points, one line each: its cost, and its error in each quantity.
 
-    ``ties`` are the numbers of points on a front whose cost is not distinguishable from that of the next.
+    ``ties`` are the numbers of points on a front whose cost is not distinguishable from that of the next; a front shows
+    the errors by which it is one, the largest of a run and of the next finer ones.
     """
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
         caption += Text("; ≈ a tie: the cost cannot be told from that of the next line, which is more accurate")
+    lucky = [name for p in points for name in quantities if name in p.error and p.held(name) > (p.error[name] or 0.0)]
+    if lucky and ties is not None:
+        caption += Text("; errors: where a run comes close by luck that of the next finer ones, which are worse")
     errors = numeric(*(f"{study.quantities[name].symbol} [{study.quantities[name].unit}]" for name in quantities))
     table = plain_table(*unbroken("engine formulation setting", "step", "cost s/s"), *errors, title=title)
     table.caption = caption
     for point in points:
-        shown = [error(point.error.get(name)) if name in point.error else "–" for name in quantities]
+        by_name = point.error if ties is None else point.envelope
+        shown = [error(by_name.get(name)) if name in point.error else "–" for name in quantities]
         if point.status != "done":
             shown = [str(point.status), *[""] * (len(quantities) - 1)]
-        mark = " ≈" if point.id in ties else ""
+        mark = " ≈" if point.id in (ties or ()) else ""
         table.add_row(Text(name_of(point)), step(point.resolution, point.step), cost_of(point) + mark, *shown)
     return table
 

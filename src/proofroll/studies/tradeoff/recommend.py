@@ -19,6 +19,7 @@ from proofroll.studies.tradeoff.requirements import MARGIN, Requirements, absolu
 _OF_A_POINT = (
     "engine", "settings", "resolution", "step", "level", "seconds_per_second", "interval", "confidence", "measurements",
 )  # fmt: skip
+_CLOSEST = "the most accurate that was measured, nothing beyond is guessed"
 # Rungs of the ladder that are worked out for a scene by hand rather than modelled in an engine.
 _BY_HAND = frozenset({Level.CLOSED_FORM, Level.REDUCED, Level.PROJECTION})
 
@@ -129,15 +130,14 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
             return None
         return Choice(point, point.error.get(required.quantity), reason or _holds(study, point, required, absolute))
 
-    def best(points: Iterable[MeasuredPoint], reason: str) -> Choice | None:
-        return told(min(points, key=lambda p: p.held(required.quantity), default=None), reason)
+    def best(points: Iterable[MeasuredPoint]) -> MeasuredPoint | None:
+        return min(points, key=lambda p: p.held(required.quantity), default=None)
 
     asked = [p for p in timed if _asked(p, required)]
     choice = next((p for p in asked if why_not(p) is None), None)
     affordable = choice is not None and (required.budget is None or choice.cost <= required.budget)
     others = [p for p in asked if choice is not None and p.id != choice.id and why_not(p) is None]
-    cheaper = asked if choice is None else asked[: asked.index(choice)]
-    failing = min(cheaper, key=lambda p: p.held(required.quantity), default=None)
+    failing, closest = (best(asked[: asked.index(choice)]), None) if choice else (None, best(asked))
     hand = next((p for p in timed if by_hand(p.level) and why_not(p) is None), None)
     answer = Answer(
         quantity=required.quantity,
@@ -149,7 +149,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         runner_up=told(next((p for p in others if choice and _model(p) != _model(choice)), None)),
         first_failure=told(failing, why_not(failing) or "") if failing is not None else None,
         least_model=None if hand is not None and choice is not None and hand.id == choice.id else told(hand),
-        closest=best(asked, "the most accurate that was measured; nothing beyond is guessed") if not choice else None,
+        closest=told(closest, f"{why_not(closest)}; {_CLOSEST}") if closest is not None else None,
     )
     within = [p for p in asked if required.budget is not None and p.cost <= required.budget]
     return Recommendation(
@@ -158,7 +158,7 @@ def recommend(study: TradeoffStudy, required: Requirements) -> Recommendation:
         study.parameters,
         required.budget,
         affordable,
-        None if affordable else best(within, "the most accurate within the budget"),
+        None if affordable else told(best(within), "the most accurate within the budget"),
         CheckedOver(
             {name: [min(values), max(values)] for name, values in study.over.items()},
             max((len(p.corners) for p in study.points if p.corners is not None), default=0),

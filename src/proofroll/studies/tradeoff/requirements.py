@@ -118,4 +118,7 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
         return f"the step is too small for single precision, the best one is {number(budget.best_step)} s"
     if budget.model_form - (budget.model_form_bar or 0.0) > absolute:
         return f"no step would do, for {number(budget.model_form)} remain in the limit of small steps"
+    if budget.model_form + (budget.model_form_bar or 0.0) > absolute:
+        known = f"{number(budget.model_form)} off, known to {number(budget.model_form_bar or 0.0)}"
+        return f"whether a finer step would do is not known: the limit of small steps is {known}"
     return "the step is too coarse"

@@ -131,8 +131,7 @@ def test_no_error_is_seen_below_the_truths_own() -> None:
     exact = point(4, "exact", 1e-2, 0.0)
     assert recommend(study(exact), required(1.9e-13))["choice"] is None
     assert (
-        "the truth itself is known only to 1e-13 m"
-        in recommend(study(exact), required(1.9e-13))["first_failure"]["reason"]
+        "the truth itself is known only to 1e-13 m" in recommend(study(exact), required(1.9e-13))["closest"]["reason"]
     )
     assert recommend(study(exact), required(1e-12))["choice"]["reason"].startswith("at least 10 times better")
 
@@ -181,6 +180,8 @@ def test_nothing_beyond_what_was_measured() -> None:
     assert answer["choice"] is None
     assert answer["closest"]["engine"] == "middle"
     assert "nothing beyond is guessed" in answer["closest"]["reason"]
+    assert "z is off by 1e-4 m" in answer["closest"]["reason"]
+    assert answer["first_failure"] is None, "what is not chosen has nothing that is cheaper"
 
 
 def test_a_budget_that_is_too_small() -> None:
@@ -219,6 +220,9 @@ def test_why_a_finer_step_would_not_do() -> None:
     budgets = [invented_budget(curve=FAST.curve, model_form=5e-3, model_form_bar=1e-5)]
     answer = recommend(study(FAST, MIDDLE, budgets=budgets), required(1e-3))
     assert "no step would do" in answer["first_failure"]["reason"]
+    unsure = [invented_budget(curve=FAST.curve, model_form=5e-3, model_form_bar=4.9e-3)]
+    said = recommend(study(FAST, MIDDLE, budgets=unsure), required(1e-3))["first_failure"]["reason"]
+    assert "whether a finer step would do is not known: the limit of small steps is 5e-3 off, known to 4.9e-3" in said
 
 
 def test_ties_are_marked_on_the_front() -> None:
@@ -231,6 +235,15 @@ def test_ties_are_marked_on_the_front() -> None:
         names, costs = (list(table.columns[index].cells) for index in (0, 2))
         assert [str(name).split()[0] for name, cost in zip(names, costs, strict=True) if "≈" in str(cost)] == marked
         assert ("≈" in str(table.caption)) == bool(marked)
+
+
+def test_a_front_shows_the_errors_by_which_it_is_one() -> None:
+    """A coarse run that is close by luck has the error of its finer neighbours there, and the caption says so."""
+    lucky = point(1, "fast", 1e-3, 1e-6, envelope={"z": 1e-2})
+    fronts: dict[str, Any] = {"pareto": {"z": [1, 2]}, "pareto_engines": {"z": [1, 2]}}
+    (table,) = front_tables(study(lucky, MIDDLE, **fronts), ["z"])
+    assert [str(cell) for cell in table.columns[-1].cells] == ["0.01", "1e-4"]
+    assert "by luck" in str(table.caption)
 
 
 def test_what_has_no_curve_is_no_column() -> None:
