@@ -197,10 +197,13 @@ def _asked(point: MeasuredPoint, required: Requirements) -> bool:
 
 def fits(point: MeasuredPoint, text: str) -> bool:
     """True if a point is of the engine, and has the settings, of ``name[key=value,…]``."""
+    return chosen_by(text, point.engine, point.settings)
+
+
+def chosen_by(text: str, engine: str, settings: Mapping[str, Any]) -> bool:
+    """True if ``name[key=value,…]`` is of this engine, with values that are among the settings."""
     spec = parse_engine(text)
-    if point.engine != spec.name:
-        return False
-    return all(_same(point.settings.get(key), value) for key, value in spec.options.items())
+    return engine == spec.name and all(_same(settings.get(key), value) for key, value in spec.options.items())
 
 
 def covers(measured: Sequence[str], asked: Sequence[str]) -> bool:

@@ -58,7 +58,8 @@ def make_tradeoff(
         InputError: something that does not exist.
         ProofrollError: there is no truth, or the folder cannot be written.
     """
-    outcome = tradeoff(question, runner, engines=engines, over=over, brief=brief, progress=progress)
+    claimed = [item.engine for kind in (claims.holds, claims.converges) for item in kind] if claims else []
+    outcome = tradeoff(question, runner, engines=engines, over=over, brief=brief, claimed=claimed, progress=progress)
     study = tradeoff_study(outcome)
     judged = claims if not engines else None
     said = JudgedFile(

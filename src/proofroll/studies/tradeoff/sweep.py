@@ -102,20 +102,22 @@ def sweep(
     curves: list[Curve],
     runner: Runner,
     progress: Progress | None = None,
-    finer: Sequence[float] = FINER,
+    finer: Callable[[Curve], Sequence[float]] = lambda _: FINER,
     gain: float = GAIN,
 ) -> dict[float, Reference]:
     """Fills the curves with points, and returns the truth by sampling interval.
 
-    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to ``finer`` ones,
-    in sampling intervals, while each takes off this part of the error, ``gain``.
+    Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to its ``finer``
+    ones, in sampling intervals, while each takes off this part of the error, ``gain``.
     """
     references: dict[float, Reference] = {}
     for first in (True, False, False, False):
         wanted = [
             (curve, value)
             for curve in curves
-            for value in (_first(question, curve) if first else _further(question, curve, references, finer, gain))
+            for value in (
+                _first(question, curve) if first else _further(question, curve, references, finer(curve), gain)
+            )
         ]
         if not wanted:
             break

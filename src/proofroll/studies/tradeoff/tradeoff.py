@@ -27,6 +27,7 @@ from proofroll.running.worker_pool import Workers
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
 from proofroll.studies.tradeoff.pareto import front
+from proofroll.studies.tradeoff.recommend import chosen_by
 from proofroll.studies.tradeoff.records import Corner
 from proofroll.studies.tradeoff.sweep import FINER, GAIN, curves_of, sweep
 
@@ -35,9 +36,10 @@ from proofroll.studies.tradeoff.sweep import FINER, GAIN, curves_of, sweep
 # A shorter measurement scatters more, which the interval of the rounds shows. Any study measures once a run that takes
 # ten times as long as its own motion: seven rounds of it would last longer than all the others.
 BRIEF_ROUNDS, BRIEF_ONCE, BRIEF_SECONDS, ONCE = 2, 0.1, 0.02, 10.0
-# The finest steps take as long as all others together, and tell little of a choice: at most this part of an interval,
-# and only where a step takes off as much of the error as with order 2: with order 1 the curve goes on as it came.
-BRIEF_FINER, BRIEF_GAIN = tuple(part for part in FINER if part >= 1e-3), 0.65
+# The finest steps take as long as all others together, and tell little of a choice: at least this part of an interval,
+# or that one where a claim is about the curve, and only where a step takes off as much of the error as with order 2:
+# with order 1 the curve goes on as it came.
+BRIEF_FINER, BRIEF_CLAIMED, BRIEF_GAIN = 2e-3, 1e-3, 0.65
 
 
 @dataclass
@@ -89,6 +91,7 @@ def tradeoff(
     over: Mapping[str, Sequence[float]] | None = None,
     rounds: int = ROUNDS,
     brief: bool = False,
+    claimed: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> Tradeoff:
     """Runs the study.
@@ -100,7 +103,8 @@ def tradeoff(
         over: parameter -> values; every combination is a corner of the range.
         rounds: how often every speed is measured.
         brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
-            finest steps, but for those of curves that fall with order 2 or more.
+            finest steps, but for those of curves that fall with order 2 or more, and most of these, too.
+        claimed: engines, ``name[key=value,…]``, whose curves are followed further in a brief study.
         progress: called with a short text after every run and every measurement.
 
     Raises:
@@ -117,7 +121,7 @@ def tradeoff(
     def told(case: Case, _: Result) -> None:
         tell(case.engine.name)
 
-    finer, gain = (BRIEF_FINER, BRIEF_GAIN) if brief else (FINER, GAIN)
+    finer, gain = (partial(_briefly, claimed), BRIEF_GAIN) if brief else (lambda _: FINER, GAIN)
     references = sweep(question, curves, runner, told, finer, gain)
     ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
     study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief)
@@ -126,6 +130,12 @@ def tradeoff(
     if ranges:
         _check(study, truth, runner, told)
     return study
+
+
+def _briefly(claimed: Sequence[str], curve: Curve) -> list[float]:
+    """Finer steps of a curve in a brief study, in sampling intervals."""
+    named = any(chosen_by(text, curve.facts.name, curve.facts.settings) for text in claimed)
+    return [part for part in FINER if part >= (BRIEF_CLAIMED if named else BRIEF_FINER)]
 
 
 def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:

@@ -12,8 +12,10 @@ from proofroll.core.time_grid import off_grid, time_grid
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
+from proofroll.studies.tradeoff import tradeoff
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
-from proofroll.studies.tradeoff.sweep import BROKEN, _first, _further, curves_of, sweep
+from proofroll.studies.tradeoff.sweep import BROKEN, FINER, _first, _further, curves_of, sweep
+from proofroll.studies.tradeoff.tradeoff import _briefly
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.1, "z")
 
@@ -108,6 +110,14 @@ def test_how_far_a_curve_goes_does_not_hang_on_how_fast_the_machine_is() -> None
         curve.points = [point(2e-4, 4e-4, slowness), point(1e-4, 1e-4, 2 * slowness)]
         found.append(_further(QUESTION, curve, {QUESTION.every: reference}))  # type: ignore[dict-item]
     assert found[0] == found[1] != []
+
+
+def test_a_brief_study_follows_furthest_what_is_claimed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The curve that a claim names has a finer step than the others; none has the finest."""
+    monkeypatch.setattr(tradeoff, "FINER", FINER)
+    curves, _ = curves_of(["projection[formulation=rotating_frame,preset=default]", "reduced[formulation=equations]"])
+    found = {curve.facts.name: _briefly(["projection[preset=default]"], curve) for curve in curves}
+    assert found == {"projection": [*FINER[:2]], "reduced": [*FINER[:1]]}
 
 
 @pytest.mark.parametrize(("bar", "error"), [(1e-6, 5e-7), (1e-15, 2e-13)])
