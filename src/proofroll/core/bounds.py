@@ -14,11 +14,7 @@ class OutOfBounds(InputError, ValueError):  # noqa: N818 -- says what is wrong, 
 def bounded(
     name: str, value: float, *, above: float = -math.inf, at_least: float = -math.inf, unbounded: bool = False
 ) -> None:
-    """Refuses a number that is nan, infinite (unless ``unbounded``) or too small.
-
-    Raises:
-        OutOfBounds: with the name of the number.
-    """
+    """Raises OutOfBounds for a number that is nan, infinite (unless ``unbounded``) or too small."""
     if math.isnan(value) or (math.isinf(value) and not (unbounded and value > 0)):
         raise OutOfBounds(name, value, "the value must be a number" + ("" if unbounded else ", and finite"))
     if not unbounded and value <= above:

@@ -53,11 +53,7 @@ def time_grid(until: float, every: float) -> FloatArray:
 
 
 def require_whole_steps(times: FloatArray, step: float | None) -> None:
-    """Refuses a fixed ``step`` [s] that does not divide the intervals of a grid [s]; None: there is none.
-
-    Raises:
-        InputError: an interval is no whole number of steps.
-    """
+    """Raises InputError if a fixed ``step`` [s] does not divide the intervals of a grid [s]; None: there is none."""
     if step is not None and len(times) > 1:
         for start, end in (times[:2].tolist(), times[-2:].tolist()):  # all others are as the first
             whole_steps(start, end, step)

@@ -158,11 +158,7 @@ def _require_state(scene: Scene, first: AnySample, sample: AnySample, t: float) 
 
 
 def require_unit(q_WB: FloatArray, where: str) -> None:
-    """Checks the length of quaternions, shape (…, 4).
-
-    Raises:
-        Diverged: it is not 1; with the length and ``where``.
-    """
+    """Raises Diverged, with the length and ``where``, if a quaternion, shape (…, 4), is not of unit length."""
     lengths = np.sqrt(np.sum(q_WB**2, axis=-1)).ravel()
     worst = float(lengths[np.argmax(np.abs(lengths - 1))])
     if abs(worst - 1) > _UNIT:

@@ -1,4 +1,4 @@
-"""A scene as a whole, drawn by the kind of its wall; one without a drawing of its own as a net of coordinate lines."""
+"""Drawings of a ball with symbols: where it touches, and as a whole, by the kind of its wall or as coordinate lines."""
 
 from __future__ import annotations
 

@@ -35,11 +35,7 @@ def slides(body: RollingBall) -> bool:
 
 
 def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
-    """Constant local coefficients of a homogeneous surface.
-
-    Raises:
-        Refused: the surface is not homogeneous.
-    """
+    """Constant local coefficients of a homogeneous surface; any other is refused."""
     generators = surface.generators
     if generators is None:
         raise Refused(

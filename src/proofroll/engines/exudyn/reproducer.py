@@ -30,11 +30,7 @@ def run(times):
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`: the adapter's ``model`` of a ball, cut out.
-
-    Raises:
-        Refused: the scene has a term that the program has not.
-    """
+    """See :class:`proofroll.core.engine_abilities.Reproduces`: the adapter's ``model`` of a ball, cut out."""
     if body.flies:
         raise Refused("there is no program with impacts yet")
     if isinstance(model, Generic) and math.isfinite(body.contact.mu_static):

@@ -37,11 +37,7 @@ class Chart(Formulation):
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Lays the joints along the surface's motions.
-
-        Raises:
-            Refused: the surface has no such motions, or the file's joints are of another kind.
-        """
+        """Lays the joints along the surface's motions; refuses one without, and a file with joints of another kind."""
         surface = body.surface
         if surface.generators is None:
             raise Refused("chart needs a surface that two rigid motions slide along itself")

@@ -46,11 +46,7 @@ _STEPS = 3.5
 
 
 def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
-    """Rejects what MuJoCo would silently change or cannot hold.
-
-    Raises:
-        Refused: the first such contact.
-    """
+    """Refuses the first contact that MuJoCo would change without a word or cannot hold."""
     moving = _moving(mechanism)
     for contact in mechanism.contacts:
         check_coefficients([contact.friction], settings, "a contact")

@@ -55,11 +55,7 @@ def run(times):
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`; from the model as MuJoCo writes it, and at time 0.
-
-    Raises:
-        Refused: the scene or the settings have something that the program has not.
-    """
+    """See :class:`proofroll.core.engine_abilities.Reproduces`; from the model as MuJoCo writes it, and at time 0."""
     contact, formulation = body.contact, {"free": Free, "chart": Chart, "facets": Facets}[settings.formulation]
     bounded = math.isfinite(contact.mu_static)
     if bounded and contact.mu_static != contact.mu_kinetic:

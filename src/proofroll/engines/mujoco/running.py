@@ -27,11 +27,7 @@ _DIGITS, _ALL, _USUAL = "_mjPRIVATE__set_xml_precision", 17, 6
 
 
 def compiled(spec: Any) -> Any:
-    """The model; MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units.
-
-    Raises:
-        Refused: MuJoCo does not accept the numbers.
-    """
+    """The model, or Refused: MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units."""
     try:
         return spec.compile()
     except ValueError as error:
@@ -117,11 +113,7 @@ class SteppedModel:
 
 
 def raise_if_fatal(data: Any, t: float) -> None:
-    """Looks at MuJoCo's warnings after steps up to ``t`` [s].
-
-    Raises:
-        Diverged: one of them means that the state is worthless.
-    """
+    """Raises Diverged if MuJoCo's warnings after steps up to ``t`` [s] mean that the state is worthless."""
     warnings = data.warning
     if not any(warnings.number.tolist()):
         return

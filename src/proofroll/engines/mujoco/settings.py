@@ -1,4 +1,4 @@
-"""Settings of MuJoCo, and the three presets of each formulation."""
+"""Settings of MuJoCo, the three presets of each formulation, and the terms of its model that a setting switches."""
 
 from __future__ import annotations
 
@@ -244,11 +244,7 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
 
 
 def check_restitution(settings: MujocoSettings) -> None:
-    """Rejects settings with which an impact would not follow the law of restitution.
-
-    Raises:
-        Refused: the integrator has stages, or the contact is edited.
-    """
+    """Refuses settings with which an impact would not follow the law of restitution."""
     if settings.integrator != "Euler" or settings.curvature or settings.cone_correction:
         raise Refused(
             "an impact is one step of damping in MuJoCo, which needs integrator=Euler and a contact as MuJoCo has it "

@@ -123,11 +123,7 @@ class ContactSteps:
         return self.dt if self.started or not self.leapfrog else 0.5 * self.dt
 
     def advance(self, end: float) -> None:
-        """Advances to ``end`` [s].
-
-        Raises:
-            Diverged: Pinocchio's solver did not find the impulse.
-        """
+        """Advances to ``end`` [s]; raises Diverged where Pinocchio's solver does not find the impulse."""
         model, dt, start = self.contact.model, self.dt, self._time
         for number in range(whole_steps(start, end, dt)):
             self._time = start + number * dt

@@ -119,11 +119,7 @@ class ImpulseSteps:
             )
 
     def step(self) -> None:
-        """One step from the present state.
-
-        Raises:
-            Diverged: Pinocchio's solver does not find the impulses.
-        """
+        """One step from the present state; raises Diverged where Pinocchio's solver does not find the impulses."""
         kick = self.kick(self.q, self.v)
         if self._midpoint:
             middle = pin.integrate(self._model, self.q, 0.5 * self._dt * self.v)

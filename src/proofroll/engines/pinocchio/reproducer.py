@@ -94,11 +94,7 @@ def run(times):
 
 
 def mechanism_source(run: MechanismRun, settings: PinocchioSettings) -> str:
-    """The program's part that runs a mechanism; of the dynamics it has that of the settings.
-
-    Raises:
-        Refused: drives change in time.
-    """
+    """The program's part that runs a mechanism, with the dynamics of the settings; drives that change are refused."""
     if run.tree.varies:
         raise Refused("programs hold no drives in time yet")
     mechanism: Any = run.tree.mechanism

@@ -120,11 +120,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
         self._stepper.begin(t, y, lambda y: np.append(self._rates(y), 1.0), self._accepted, np.ones(len(y)))
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s].
-
-        Raises:
-            Diverged: modes alternate without end, or the integration gave up.
-        """
+        """Moves to time t [s]; raises Diverged where modes alternate without end, or the integration gives up."""
         stepper = self._stepper
         stepper.aim(t)
         while stepper.t < t:

@@ -212,11 +212,7 @@ def _without_loops(space: Space, _: Array, push: Array) -> tuple[Array, Array]:
 
 
 def solved(H: Array, push: Array) -> Array:
-    """ν of H ν = push, of one or several right-hand sides (nv, …); H by its upper triangle.
-
-    Raises:
-        LinAlgError: H is not positive definite.
-    """
+    """ν of H ν = push, of one or several right-hand sides (nv, …); H, positive definite, by its upper triangle."""
     from scipy.linalg.lapack import dposv  # here: whoever runs a ball need not wait for it
 
     _, velocities, failed = dposv(H, push)

@@ -100,11 +100,7 @@ class Uniform:
         self._parts = [(part @ matrix(self._start[0])).T.ravel().tolist() for part in (np.eye(3), cross, cross @ cross)]
 
     def at(self, u: Sequence[float]) -> tuple[Frame, Shape]:
-        """See :meth:`GeneralSurface.at`.
-
-        Raises:
-            ArithmeticError: the coordinates are not finite.
-        """
+        """See :meth:`GeneralSurface.at`."""
         if self.column is None:
             return self._start
         angle = u[self.column]

@@ -98,11 +98,7 @@ class Switching:
         return self.mode.force(self.stepper.x)
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s].
-
-        Raises:
-            Diverged: the ball leaves the wall, or the integration gave up.
-        """
+        """Moves to time t [s]; raises Diverged where the ball leaves the wall, or the integration gives up."""
         if self._lost:
             raise Diverged(self._lost)
         stepper = self.stepper
