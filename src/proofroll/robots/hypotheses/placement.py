@@ -71,7 +71,7 @@ def _with_joints(robot: Robot, joints: Sequence[RobotJoint]) -> Robot:
 
 @hypothesis({"pinocchio": "4.1.0"}, "write the poses of what stands in a <frame> without it")
 def frames_ignored(evidence: RobotEvidence) -> Robot | None:
-    """What stands in a <frame> is not read."""
+    """Elements inside a <frame> are not read."""
     frames = list(evidence.root.iter("frame"))
     if not frames:
         return None
