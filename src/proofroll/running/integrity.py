@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import operator
 import sys
 from collections.abc import Iterator
 from types import FunctionType, ModuleType
@@ -32,12 +33,12 @@ def changed(kind: Any) -> str | None:
     """
     if not _watched:
         return None
-    now, package = _held(), kind.__module__.partition(".")[0]
-    for name, held in now.items():
-        before = _watched.setdefault(name, held)
-        if any(one is not other for one, other in zip(before, held, strict=True)):
+    package = kind.__module__.partition(".")[0]
+    foreign = package != OWN.name
+    for name, held in _held().items():
+        if not all(map(operator.is_, _watched.setdefault(name, held), held)):
             return name
-        if package != OWN.name and str(getattr(held[0], "__module__", "")).partition(".")[0] == package:
+        if foreign and str(getattr(held[0], "__module__", "")).partition(".")[0] == package:
             return name
     return None
 
