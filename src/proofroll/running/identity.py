@@ -25,17 +25,7 @@ from proofroll.running.program import path_of
 # Folders on which every result rests; reports and the command line are not among them.
 FOUNDATION = ("core", "elements", "files", "running")
 # Modules and folders that only show results, wherever they lie.
-ASIDE = frozenset(
-    {
-        "reproducer",
-        "reproducer_source",
-        "robot_reader",
-        "robot_compiled",
-        "report",
-        "failure_program",
-        "diagnosis",
-    }
-)
+ASIDE = frozenset({"reproducer", "reproducer_source", "robot_reader", "report", "failure_program", "diagnosis"})
 
 
 def describe(engine: str) -> dict[str, Any]:
