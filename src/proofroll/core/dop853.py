@@ -25,13 +25,11 @@ class Rise(NamedTuple):
 
     Attributes:
         time: [s].
-        width: half the width of its bracket [s].
         state: there.
         guard: its number.
     """
 
     time: float
-    width: float
     state: FloatArray
     guard: int
 
@@ -146,7 +144,7 @@ def located(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leavin
             rises.append((rise, number))
     if not rises:
         return None
-    (time, number), width, span = min(rises), 0.0, 1e-4 * (end - start)
+    (time, number), span = min(rises), 1e-4 * (end - start)
     state = inside_last_step(solver, time)
     for _ in range(4):
         rates = solver.fun(time, state)
@@ -154,8 +152,7 @@ def located(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leavin
         better = time - float(guards(state)[number]) / slope if slope > 0 else time
         if not start - span <= better <= end + span or abs(better - time) > 0.1 * (end - start):
             break  # a crest that only touches zero has no slope to go by
-        width = abs(better - time)
-        if width <= 2 * np.spacing(time):
+        if abs(better - time) <= 2 * np.spacing(time):
             break
         time, state = better, inside_last_step(solver, better)
-    return Rise(time, width, state, number)
+    return Rise(time, state, number)

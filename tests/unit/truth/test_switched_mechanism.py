@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from proofroll.core.errors import InputError, Refused
+from proofroll.core.errors import InputError, NotUnique, Refused
 from proofroll.elements.mechanism.complementarity import complementary
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -53,6 +53,25 @@ def test_a_hinge_that_rubs_turns_where_the_work_of_friction_says() -> None:
     assert found.record.q[1, 0] == pytest.approx(-1.61813930684291, abs=TIGHT)
     assert [event.kind for event in found.events] == ["turn", "turn"]
     assert found.bars["q"][-1] < TIGHT
+
+
+def test_an_impact_that_presses_two_stops_has_no_unique_outcome() -> None:
+    """A block that rebounds from the end of a box and pushes it against its own stop leaves more than one motion."""
+    joints = (
+        Joint("box", "prismatic", "world", "box", axis=(1, 0, 0), limits=(0.0, 1.0)),
+        Joint("slot", "prismatic", "box", "block", (0.1, 0, 0), axis=(1, 0, 0), limits=(-0.1, 1.0), v0=(-1.0,),
+              restitution=0.5),
+    )  # fmt: skip
+    bodies = tuple(Body(name, 1.0, inertia=(1.0, 1.0, 1.0)) for name in ("box", "block"))
+    with pytest.raises(NotUnique, match="presses several stops at once"):
+        truth_of(Mechanism(bodies, joints, gravity=(0.0, 0.0, 0.0)), np.array([0.0, 0.3]))
+
+
+def test_rebounds_are_summed_by_the_fastest_impact() -> None:
+    """An impact settles against the fastest one at its stop, which need not be the first."""
+    mechanism = load_scene("stop").elements[0].mechanism  # type: ignore[attr-defined]
+    tree = SwitchedTree(JointCoordinates(mechanism), 1e-14)
+    assert [tree._settles(0, speed, 0.5) for speed in (1.0, 100.0, 1e-4)] == [False, False, True]
 
 
 def test_a_stop_without_restitution_carries_the_weight() -> None:

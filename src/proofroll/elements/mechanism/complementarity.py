@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
@@ -108,7 +108,7 @@ def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, respon
         The velocities, and how far from another outcome it is, relative.
 
     Raises:
-        Refused: several stops share the impact and one of them returns speed, so that its order decides.
+        NotUnique: several stops share the impact and one of them returns speed, so that its order decides.
     """
     resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}]
     at_stop = sorted({hit, *resting})
@@ -119,7 +119,7 @@ def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, respon
     low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
     _, impulse, left = complementary(returned, response[at], low, high)
     if np.count_nonzero(impulse) > 1 and any(joints[number].restitution for number in at_stop):
-        raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+        raise NotUnique("an impact presses several stops at once: with restitution its outcome hangs on their order")
     v = v + response @ impulse
     for number, rest in zip(at_stop, left, strict=True):
         joint = joints[number]

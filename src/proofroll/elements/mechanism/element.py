@@ -14,7 +14,7 @@ from proofroll.core.arrays import FloatArray, read_only
 from proofroll.core.columns import Columns
 from proofroll.core.element import FirstMotion, OptionalTerm, Sign, StepNumber
 from proofroll.core.element_abilities import RunWatch
-from proofroll.core.errors import NotUnique
+from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
 from proofroll.core.observable import Observable, Role
 from proofroll.core.program_text import FailedRun
@@ -123,14 +123,13 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts, and what these do at the start; None: none, no law says, or joints switch as well."""
+        """Equations of contacts with laws of joints, and what these do at the start; None: no contacts, or no law."""
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
-        if not self.mechanism.contacts or self._equations.switched:
-            return None
-        dynamics = ContactDynamics(self.mechanism)
-        with contextlib.suppress(NotUnique):
-            return dynamics, dynamics.begin()[0]
+        if self.mechanism.contacts:
+            with contextlib.suppress(Refused):
+                dynamics = ContactDynamics(self.mechanism)
+                return dynamics, dynamics.begin()[0]
         return None
 
     @cached_property

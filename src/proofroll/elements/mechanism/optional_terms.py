@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from proofroll.core.element import OptionalTerm
+from proofroll.elements.mechanism.contacts.geometry import Pair
+from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.model import Mechanism
 
 # Laws of joints and of contacts that the ladder of models can leave out, by their key.
@@ -20,18 +22,29 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
     terms = [
         OptionalTerm(name, because, {}, {key: 0.0})
         for key, name in _OF_JOINTS.items()
-        if parameters.get(key) and any(getattr(joint, key) for joint in mechanism.joints)
+        if key in _owned(parameters, key, mechanism.joints, mechanism.pairs)
     ]
     if "limit" in parameters and any(item.limit is not None for item in mechanism.actuators):
         said = f"the scene has them; here without, as {_FAR:g} times what they are"
         terms.append(OptionalTerm("limits of efforts", said, {}, {"limit": _FAR * parameters["limit"]}))
     rubbing: dict[str, float] = {}
     for key, name in _OF_PAIRS.items():
-        own = {parameter: value for parameter, value in parameters.items() if parameter.endswith(key) and value}
-        if own and any(getattr(pair, key) for pair in mechanism.pairs):
+        if own := _owned(parameters, key, mechanism.pairs, mechanism.joints):
             terms.append(OptionalTerm(name, because, {}, dict.fromkeys(own, 0.0)))
             rubbing = rubbing or {parameter: _ROLLS * value for parameter, value in own.items() if key == "friction"}
     if rubbing:
         said = f"friction is bounded; here by {_ROLLS:g} times as much, with which what touches sticks or rolls"
         terms.append(OptionalTerm("slip of contacts", said, {}, rubbing))
     return terms
+
+
+def _owned(
+    parameters: Mapping[str, float], key: str, parts: Sequence[Joint | Pair], others: Sequence[Joint | Pair]
+) -> dict[str, float]:
+    """Parameters, not zero, whose names end with a key and which some parts have; where others have it, by value."""
+    own, theirs = ({getattr(part, key, 0.0) for part in group} - {0.0} for group in (parts, others))
+    return {
+        name: value
+        for name, value in parameters.items()
+        if own and value and name.endswith(key) and (not theirs or value in own - theirs)
+    }

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
@@ -195,7 +195,9 @@ class SwitchedBodies(JointStretches):
         if best[0] < -SLACK:
             raise Refused("no outcome of an impact on several stops keeps all its inequalities")
         if best[2] and (restitution or any(joints[k].restitution for k in resting)):
-            raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+            raise NotUnique(
+                "an impact presses several stops at once: with restitution its outcome hangs on their order"
+            )
         return best[1], max(best[0], 0.0)
 
 

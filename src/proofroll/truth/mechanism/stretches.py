@@ -52,7 +52,7 @@ class Stretches(ABC, Generic[ModeT]):
 
         Speeds are in natural units: the first, too, may come from a fall that is hardly more than round-off.
         """
-        fastest = self._fastest.setdefault(which, max(speed, 1.0))
+        fastest = self._fastest[which] = max(speed, self._fastest.get(which, 1.0))
         return 0.0 < restitution < 1.0 and speed < SETTLED * fastest
 
     @staticmethod

@@ -320,7 +320,7 @@ def test_engines_with_laws_of_joints_beside_contacts_are_certified(laws: dict[st
     run = plugin.build(replace(scene, elements=(stopped,)), plugin.presets["geoms"]["tuned"])
     lines = stopped.certify(run.built(), run.sample())
     assert [str(line) for line in lines if not line.holds] == []
-    assert {"gaps", "responses of contacts"} <= {line.quantity for line in lines}
+    assert {"gaps", "responses of contacts", "acceleration", "forces of contact"} <= {line.quantity for line in lines}
     assert not any(np.isnan(line.expected).all() for line in lines if len(line.expected))
 
 

@@ -18,6 +18,7 @@ from proofroll.elements.mechanism.signal import value_at
 Effort = Callable[[Actuator, float, float, float], float]
 _COVERS = ("motion", *COVERED, "effort")
 _STILL = 1e-9
+_AT_STOP = 1e-3  # of the way of a joint: where parabolas through samples turn back at its stop
 # A velocity that changes by so many times what it does before and after jumps.
 _JUMPS = 5.0
 
@@ -132,7 +133,10 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
     "stops", "the engine's joint rests at one other place than at the true stop, or turns back at one each time"
 )
 def of_stops(evidence: Evidence) -> Iterator[Cause]:
-    """Another place of a stop, by where the joint rests, or else by where it rebounds."""
+    """Another place of a stop, by where the joint rests, or by where it rebounds if the true joint does at its stop.
+
+    Other things turn joints back, too: contacts of bodies, other stops.
+    """
     mechanism, found = evidence.element.mechanism, both(evidence)
     if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
         return
@@ -142,13 +146,16 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
         if not joint.limits:
             continue
         at, rated = mechanism.place_of(joint.name)
-        turns = _rebounds(times, seen[:, at], speeds[:, rated])
+        turns, expected = (_rebounds(times, q[:, at], v[:, rated]) for q, v in ((seen, speeds), (true, rates)))
         for limit, side in zip(joint.limits, (1.0, -1.0), strict=True):
             size = max(abs(limit), float(np.ptp(true[:, at])))
             rests = (np.abs(true[:, at] - limit) <= _STILL * size) & (np.abs(rates[:, rated]) <= _STILL * size)
             does, off = "rests", seen[rests, at] - limit
             if len(off) < 2:
                 does, off = "turns back", turns[turns[:, 1] == side, 0] - limit
+                theirs = expected[expected[:, 1] == side, 0] - limit
+                if not len(theirs) or np.max(np.abs(theirs)) > _AT_STOP * size:
+                    continue
             if len(off) < 2 or not above_round_off(float(np.max(np.abs(off))), size):
                 continue
             shift = float(np.median(off))

@@ -31,6 +31,21 @@ def test_one_step_early_is_told_of_few_samples() -> None:
     assert said.startswith("every sample is one step (0.002 s) early")
 
 
+@pytest.mark.parametrize(("limit", "named"), [(0.0, True), (-0.5, False)])
+def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: float, named: bool) -> None:
+    """A joint that turns back a centimetre too low has another stop, unless something else turns the true one back."""
+    scene, times = load_scene("stop", restitution=0.5), np.arange(0.0, 1.0, 0.02)
+    (element,) = scene.elements
+    assert isinstance(element, MechanismElement)
+
+    def with_stop(at: float) -> Scene:
+        joints = (replace(joint, limits=(at, 10.0)) for joint in element.mechanism.joints)
+        return replace(scene, elements=(replace(element, mechanism=replace(element.mechanism, joints=tuple(joints))),))
+
+    told = _told(with_stop(limit), truth(with_stop(-0.01), times), truth(with_stop(0.0), times))
+    assert any("turns back" in said for said in told) == named
+
+
 def test_round_off_of_a_moment_that_is_zero_has_no_cause() -> None:
     """Moments of 1e-15 N m that an engine gives as zero are not left out."""
     scene, times = load_scene("double_pendulum"), np.arange(0, 0.12, 0.006)
