@@ -25,11 +25,13 @@ class Rise(NamedTuple):
 
     Attributes:
         time: [s].
+        width: half the width of its bracket [s].
         state: there.
         guard: its number.
     """
 
     time: float
+    width: float
     state: FloatArray
     guard: int
 
@@ -144,7 +146,8 @@ def located(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leavin
             rises.append((rise, number))
     if not rises:
         return None
-    (time, number), span = min(rises), 1e-4 * (end - start)
+    (time, number), width = min(rises), 1e-4 * (end - start)
+    span = width
     state = inside_last_step(solver, time)
     for _ in range(4):
         rates = solver.fun(time, state)
@@ -152,7 +155,8 @@ def located(solver: Any, guards: Guards, noise: FloatArray | float = 0.0, leavin
         better = time - float(guards(state)[number]) / slope if slope > 0 else time
         if not start - span <= better <= end + span or abs(better - time) > 0.1 * (end - start):
             break  # a crest that only touches zero has no slope to go by
-        if abs(better - time) <= 2 * np.spacing(time):
+        width = abs(better - time)
+        if width <= 2 * np.spacing(time):
             break
         time, state = better, inside_last_step(solver, better)
-    return Rise(time, state, number)
+    return Rise(time, max(width, 2 * float(np.spacing(time))), state, number)
