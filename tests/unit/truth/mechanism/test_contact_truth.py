@@ -400,7 +400,7 @@ def test_what_has_no_truth_is_held_to_the_laws_of_contact_alone() -> None:
 
 
 def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A scene whose laws have one answer that is merely not found stays refused, with the reason."""
+    """A scene whose laws have one answer that is merely not found is refused with the reason, its engines are not."""
     table = load_scene("free_turntable")
     (element,) = table.elements
     assert isinstance(element, MechanismElement)
@@ -415,8 +415,7 @@ def test_what_no_route_follows_is_refused_and_not_called_ill_posed(monkeypatch: 
     assert isinstance(element, MechanismElement)
     with pytest.raises(Refused, match="are not found in 0 sweeps"):
         truth(sled, np.array([0.0, 0.1]))
-    with pytest.raises(Refused, match="are not found in 0 sweeps"):
-        _ = replace(element).first_motion
+    assert np.isnan(replace(element).first_motion.acceleration).all()
 
 
 def test_residuals_of_the_truth_are_within_their_bars() -> None:
