@@ -16,7 +16,7 @@ from proofroll.truth.mechanism.contact_equations import ContactEquations
 from proofroll.truth.mechanism.contact_tree import ContactTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCE, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCES, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, matched
 
 
@@ -40,9 +40,9 @@ def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotio
     dynamics, second = ContactDynamics(own), MaximalCoordinates(own)
     check_start(dynamics.equations, second, units.length)
     size = _size(dynamics)
-    tree = ContactTree(dynamics, TOLERANCE, size)
+    tree = ContactTree(dynamics, TOLERANCES[0], size)
     equations = ContactEquations(own, second.lean)
-    bodies = ContactBodies(equations, TOLERANCE, size)
+    bodies = ContactBodies(equations, TOLERANCES[1], size)
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = paths[0].leg_at(times)

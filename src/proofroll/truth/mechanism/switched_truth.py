@@ -18,7 +18,7 @@ from proofroll.truth.mechanism.contact_truth import contact_truth
 from proofroll.truth.mechanism.joint_switching import SwitchedTree
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.natural_units import Units, natural_units
-from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCE, refuse_uncovered, two_route_motion
+from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCES, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
 
 # rad, natural lengths, or part of a limit by which a stop or a limit must be passed to act; more than the look ahead is
@@ -82,7 +82,10 @@ def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) 
     """The truth at times in natural units, by routes of the mechanism in these units, its ``own``."""
     equations, second = JointCoordinates(own), MaximalCoordinates(own)
     check_start(equations, second, units.length)
-    tree, bodies = SwitchedTree(equations, TOLERANCE), SwitchedBodies(second.lean, equations.switched, TOLERANCE)
+    tree, bodies = (
+        SwitchedTree(equations, TOLERANCES[0]),
+        SwitchedBodies(second.lean, equations.switched, TOLERANCES[1]),
+    )
     until, kinks = float(times[-1]), breaks(own.signals)
     paths = follow(tree, until, kinks, CLOSE), follow(bodies, until, kinks, CLOSE)
     legs = [min(number, len(paths[1].legs) - 1) for number in paths[0].leg_at(times)]
