@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 
 import numpy as np
 import pytest
-from honest import FORMULATIONS, Jointed, Rolling
+from honest import FORMULATIONS, Jointed, Rolling, Switching
 from liars import ALL, EVERY, UNTIL, Lie, liar, scene_of
 from lies import table
 from tiny import Tiny, TinySettings
@@ -199,6 +199,12 @@ ROLL: dict[str, dict[str, float]] = {
     "sphere_in_cylinder": {}, "inclined_plane": {"normal_spin": 3.0}, "tilted_cylinder": {}, "bowl": {}, "cone": {},
     "torus_rim": {}, "rolling_stop": {},
 }  # fmt: skip
+# A servo that leaves its limit at 0.016 s, a mass that hits its stop at 0.09 s, and a sled that slides.
+SWITCH: dict[str, Callable[[], Scene]] = {
+    "servo": lambda: scene_of("servo"),
+    "stop": lambda: load_scene("stop", height=0.04, restitution=0.5),
+    "sled": lambda: scene_of("sled"),
+}
 SWING = ("double_pendulum", "pendulum", "oscillators", "gyroscope_cart", "driven", "chain")
 FACTORS = (1.0, 0.5, 0.25)
 # Every method on a ball and on a tree, and two of them on each other scene; one on each in every run of the tests.
@@ -208,7 +214,7 @@ HONEST = [
         formulation,
         marks=() if place == (index + 1) % len(FORMULATIONS) and scene != "chain" else pytest.mark.drill,
     )
-    for scenes in (tuple(ROLL), SWING)
+    for scenes in (tuple(ROLL), SWING, tuple(SWITCH))
     for index, scene in enumerate(scenes)
     for place, formulation in enumerate(FORMULATIONS)
     if index == 0 or (place - index) % len(FORMULATIONS) in {0, 1, 3}
@@ -218,6 +224,8 @@ HONEST = [
 def _honest_scene(name: str) -> tuple[Scene, Any]:
     if name in ROLL:
         return load_scene(name, **ROLL[name]), Rolling
+    if name in SWITCH:
+        return SWITCH[name](), Switching
     return scene_of(name) if name == "driven" else load_scene(name), Jointed
 
 
@@ -240,6 +248,8 @@ def test_an_honest_engine(name: str, formulation: str) -> None:
         ladder = [curves[factor][item] for factor in factors]
         order = kind.presets[formulation]["matched"].order
         limit = richardson(ladder, factors, order) if field == "dt" else tightest(ladder)
+        smallest = coarse * factors[-1] if field == "dt" else None
+        limit = replace(limit, beside=reference.beside(item, limit.values, runs[factors[-1]], smallest))
         true, bar = reference.true(item, curve)
         size = reference.sizes.get(item, 1.0)
         judgements.append(

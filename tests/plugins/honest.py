@@ -14,6 +14,8 @@ from tiny import Tiny
 from proofroll.core.arrays import FloatArray
 from proofroll.core.engine import whole_steps
 from proofroll.core.scene import Scene
+from proofroll.elements.mechanism.capabilities import MechanismCapability
+from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.engines.projection import Projection
@@ -132,10 +134,45 @@ class Jointed:
         """See :class:`proofroll.core.engine.Engine`."""
         from scipy.spatial.transform import Rotation
 
-        motion = self.equations.solve(*self._halves(self.x)).motion
+        motion = self.equations.tree.at(*self._halves(self.x))
         turned = Rotation.from_matrix(motion.R_WB[:-1]).as_quat(scalar_first=True)
         return MechanismSample(motion.p_WB[:-1], motion.v_WB[:-1], motion.w_WB[:-1], turned)
 
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`; its first acceleration is derived from its steps."""
         return MechanismBuilt(gravity=np.asarray(self.mechanism.gravity))
+
+
+class Switching(Jointed):
+    """A mechanism with efforts at their limits, a stop, or contacts that slide; no event is located.
+
+    An impact on a stop acts at the end of a step, of ``dt`` with an adaptive method, too.
+    """
+
+    name: ClassVar[str] = "switching"
+    provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(FORMULATIONS, frozenset(MechanismCapability))
+
+    def __init__(self, scene: Scene, settings: Any) -> None:
+        super().__init__(scene, settings)
+        self.contacts = ContactDynamics(self.mechanism) if self.mechanism.contacts else None
+        self.mode: Any = self.contacts.begin()[0] if self.contacts else ("free",) * len(self.equations.switched)
+        self.between = settings.dt if self.equations.switched else np.inf
+
+    def _rates(self, x: FloatArray) -> FloatArray:
+        if self.contacts:
+            return np.asarray(self.contacts.rate(np.append(x, self.t), self.mode)[:-1])
+        return np.asarray(self.equations.rate(self.t, x, self.mode or None))
+
+    def advance(self, t: float) -> None:
+        """See :class:`proofroll.core.engine.Engine`."""
+        pieces = max(1, round((t - self.t) / self.between))
+        for end in np.linspace(self.t, t, pieces + 1)[1:]:
+            super().advance(float(end))
+            for joint in self.equations.switched:
+                at = self.mechanism.nq + joint.velocity
+                if self.x[joint.coordinate] <= joint.low and self.x[at] < 0:
+                    self.x[at] *= -joint.restitution
+
+    def _halves(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        nq = self.mechanism.nq
+        return self.equations.tree.normalised(x[:nq]), x[nq:]

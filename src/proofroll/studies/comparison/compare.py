@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
-from proofroll.core.beside_events import beside_events
 from proofroll.core.comparison import Band, Comparison
 from proofroll.core.convergence import Limit, floor_of, richardson, scatter_of, tightest
 from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.errors import Missing, ProofrollError
-from proofroll.core.observable import Role
 from proofroll.core.verdict import Judgement, Verdict, judge_curve
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import LASTING, Case, EngineFacts, Result, Status
@@ -275,18 +273,8 @@ def _with_events(
     if limit is None or not isinstance(run.facts, EngineFacts):
         return limit
     factor = run.row.ladder[-1]
-    finest, times = trajectories[factor], reference.dataset["time"].to_numpy()
-    step = run.facts.step
-    if reference.scene.observables[name].role is Role.EVENT:
-        return replace(limit, beside=2 * reference.own_bar(name, finest))
-    times = times[len(times) - len(limit.values) :] if len(limit.values) <= len(times) else times
-    if len(times) != len(limit.values):
-        return limit  # what has a time of its own for each value
-    events = reference.events_of(finest)
-    late = max((event.time_high - event.time_low for event in events), default=0.0)
-    if step is not None:
-        late = min(late, step * factor)
-    return replace(limit, beside=beside_events(times, limit.values, [event.time for event in events], late))
+    step = None if run.facts.step is None else run.facts.step * factor
+    return replace(limit, beside=reference.beside(name, limit.values, trajectories[factor], step))
 
 
 def _lost(run: Planned, results: dict[str, Result]) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
+from proofroll.core.beside_events import beside_events
 from proofroll.core.dataset import Key, common_span, observe, part, scales
 from proofroll.core.element_abilities import KnowsAnotherScene
 from proofroll.core.events import EVENT_ORDER, Event, events_of
@@ -114,6 +115,23 @@ class Reference:
         if item.role != Role.EVENT or item.name == EVENT_ORDER:
             return 0.0
         return max((event.time_high - event.time_low for event in self.events_of(dataset)), default=0.0) / 2
+
+    def beside(self, name: str, values: FloatArray, dataset: xr.Dataset, step: float | None) -> float:
+        """Change of an observable's values of a run by one step [s] beside its events.
+
+        Where a run tells no events they are the true ones. ``step``: None: it adapts, and ends at samples.
+        """
+        if self.scene.observables[name].role == Role.EVENT:
+            return 2 * self.own_bar(name, dataset)
+        times = self.dataset["time"].to_numpy()
+        times = times[len(times) - len(values) :] if len(values) <= len(times) else times
+        if len(times) != len(values):
+            return 0.0  # what has a time of its own for each value
+        told = any("event_kind" in part(self.scene, item, dataset) for item in self.scene.elements)
+        events = self.events_of(dataset) if told else self.events
+        widest = max((event.time_high - event.time_low for event in events), default=0.0)
+        late = min(widest if told else 2 * self.sampled_bar, step or np.inf)
+        return beside_events(times, values, [event.time for event in events], late)
 
     @property
     def sampled_bar(self) -> float:

@@ -71,6 +71,15 @@ def test_hops_shorter_than_the_samples_resolve_accuse_nobody(monkeypatch: pytest
     assert said(monkeypatch, t, gap, rate) == []
 
 
+def test_flights_that_are_no_parabolas_prove_no_delay(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Impacts a step late by the nearest samples are not told where the next ones miss their parabola."""
+    t, gap, rate = bounces(STEP)
+    hits = np.flatnonzero((rate[:-1] < 0) & (rate[1:] > 0))
+    off = np.where(np.isin(np.arange(len(t)), [hits, hits + 1]), 0.0, 1e-4)
+    assert said(monkeypatch, t, gap + off, rate) == []
+    assert len(said(monkeypatch, t, gap + 1e-3 * off, rate)) == 1
+
+
 def test_one_impact_proves_no_delay(monkeypatch: pytest.MonkeyPatch) -> None:
     """A delay that is fitted to a single impact explains no more than itself."""
     t, gap, rate = bounces(STEP)
