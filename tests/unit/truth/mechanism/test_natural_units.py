@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from proofroll.core.errors import Refused
+from proofroll.core.quantity import powers_of
+from proofroll.core.validation import units_of_kind
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
+from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.joint import Joint
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Body, Loop, Point, Spring
+from proofroll.elements.mechanism.reader import KINDS
 from proofroll.elements.mechanism.record import gathered
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
@@ -118,6 +122,56 @@ def test_a_mechanism_in_other_units_has_the_same_equations() -> None:
         assert getattr(found, name) == pytest.approx(getattr(records[0], name), rel=1e-12, abs=1e-12, nan_ok=True), name
     energy = found.placed(mechanism).energy()
     assert energy == pytest.approx(records[0].placed(mechanism).energy(), rel=1e-12)
+
+
+# Numbers whose unit is that of a joint elsewhere; equations of motion with all of them are compared above.
+BY_JOINT = {"target", "kp", "kd", "limit", "ratio", "offset"}
+
+
+def numbers_of(value: object) -> list[float]:
+    """Numbers of a field, of a formula its value at one time."""
+    if isinstance(value, tuple):
+        return [number for part in value for number in numbers_of(part)]
+    return [float(value)] if isinstance(value, float | int) and not isinstance(value, bool) else []
+
+
+def test_every_field_of_every_table_is_scaled_by_its_own_unit() -> None:
+    """A field that a table of the scene file has is in its natural unit, and one without a unit is known."""
+    loop = Loop("pin", "revolute", "arm", "loose", (0.2, 0.0, 0.0), (0.0, 0.4, 0.0))
+    stop = Joint("stop", "prismatic", "slider", "end", limits=(-0.3, 0.7), friction=0.6, torque=0.3, restitution=0.5)
+    all_of_it, units = everything(), Units(0.125, 8.0, 0.25)
+    shapes = (
+        Geometry("ball", "arm", "sphere", (0.1, 0.0, 0.2), radius=0.3),
+        Geometry("stone", "arm", "ellipsoid", axes=(0.3, 0.2, 0.1)),
+        Geometry("brick", "loose", "box", size=(0.3, 0.2, 0.1)),
+    )
+    mechanism = replace(
+        all_of_it, loops=(loop,), joints=(*all_of_it.joints, stop), bodies=(*all_of_it.bodies, Body("end", 0.3)),
+        geometries=shapes,
+    )  # fmt: skip
+    own, base, seen = (
+        units.mechanism(mechanism),
+        {"m": units.length, "kg": units.mass, "s": units.time},
+        set[tuple[type, str]](),
+    )
+    for table, made in KINDS.items():
+        for one, two in zip(getattr(mechanism, table), getattr(own, table), strict=True):
+            stated = units_of_kind(made, getattr(one, "kind", None))
+            for item in fields(one):
+                given, found = (numbers_of(getattr(part, item.name)) for part in (one, two))
+                if not given or (item.name in BY_JOINT and made in {Actuator, Coupling}):
+                    continue
+                unit = stated[item.name]
+                assert unit or not any(given), f"{table}.{item.name} has no unit"
+                for k, (before, after) in enumerate(zip(given, found, strict=True)):
+                    sizes = powers_of(unit if isinstance(unit, str) else unit[k])
+                    factor = float(np.prod([base[name] ** power for name, power in sizes.items()]))
+                    assert after * factor == pytest.approx(before, rel=1e-14), f"{table}.{one.name}.{item.name}"
+                    seen |= {(made, item.name)} if before else set()
+    stated_units = [(made, item, item.metadata.get("unit", "")) for made in KINDS.values() for item in fields(made)]
+    assert {
+        (made, item.name) for made, item, unit in stated_units if not isinstance(unit, str) or powers_of(unit)
+    } <= seen
 
 
 def test_loops_and_shapes_have_lengths_too() -> None:
