@@ -15,6 +15,13 @@ from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts
 from proofroll.studies.stability.records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking
 
+# A run that is further off, in ranges of the quantity, has left every picture: how far is not told.
+_BEYOND = 1e6
+
+
+def _off(error: float) -> str:
+    return "more than a million times" if error > _BEYOND else f"{number(100 * error, 3)} % of"
+
 
 def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
     """A map that is kept in ``path``: its boundaries, the worst silent cases, and what else is to be known."""
@@ -38,11 +45,11 @@ def headline(study: StabilityStudy) -> str:
     if counts:
         said += f" Beyond: {counts}."
     if study.refused:
-        said += f" {study.refused} points were refused before the run."
+        said += f" Refused before the run: {counted(study.refused, 'points')}."
     if study.wrong_model:
         said += f" {study.wrong_model} were not run, for what the engine built is not the scene."
     if study.never_accurate:
-        said += f" At {study.never_accurate} points no step or tolerance that was affordable holds 1 %."
+        said += f" At {counted(study.never_accurate, 'points')} no step or tolerance that was affordable holds 1 %."
     return " ".join([said, *told_hosts(study.hosts)])
 
 
@@ -123,7 +130,7 @@ def silent_lines(study: StabilityStudy) -> Iterator[str]:
             continue
         seen.add((point.curve, point.axis))
         side = point.shown
-        wrong = "" if side.error is None else f", off by {number(100 * side.error, 3)} % of the range"
+        wrong = "" if side.error is None else f", off by {_off(side.error)} the range"
         finest = step(point.resolution, point.finest)
         if side.largest is not None:
             beyond = f"just beyond {step(point.resolution, side.largest)}"

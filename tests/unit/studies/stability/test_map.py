@@ -164,6 +164,10 @@ def test_reports_of_a_map(small: Any) -> None:
         ({"too_slow": 1e-5}, "sank in down to dt 1.25e-4 s, finer ones have too many steps"),
         ({"resolution": "rtol", "finest": 1e-9}, "sank in at every tolerance down to rtol 1e-9"),
         ({"sides": {"stable": Boundary(1e-3, True, {}, 2e-3, "", True, None, None, None)}}, "just beyond dt 1e-3 s"),
+        (
+            {"sides": {"stable": Boundary(1e-3, True, {}, 2e-3, "", True, 4e288, None, None)}},
+            "off by more than a million times the range",
+        ),
     ],
 )
 def test_the_worst_case_says_where_and_up_to_which_step(more: dict[str, Any], said: str) -> None:
@@ -171,6 +175,13 @@ def test_the_worst_case_says_where_and_up_to_which_step(more: dict[str, Any], sa
     point = boundary_point(**({"value": 200.0, "finest": 1.25e-4} | more))
     (line,) = silent_lines(dataclasses.replace(invented_map(), points=[point]))
     assert said in line
+
+
+def test_one_point_is_told_as_one() -> None:
+    """A map of which one point never holds, and one is refused, says so in the singular."""
+    said = headline(dataclasses.replace(invented_map(), never_accurate=1, refused=1))
+    assert "At 1 point no step" in said
+    assert "before the run: 1 point." in said
 
 
 @pytest.fixture(scope="module")
