@@ -24,10 +24,6 @@ from proofroll.core.source_code import code_of
 _NOTHING = "nothing of this scene can be asked for besides its motion; leave it out"
 
 
-# Endings of files in the formats of engines, and of the meshes that these name.
-_MODELS = frozenset({".xml", ".mjcf", ".urdf", ".sdf", ".obj", ".stl", ".msh", ".dae"})
-
-
 @dataclass(frozen=True)
 class Scene:
     """One mechanical problem.
@@ -39,6 +35,7 @@ class Scene:
         parameters: the numbers a user can set by name, SI units.
         folder: where the scene's file and its engine-native models lie.
         asks: what is wanted besides the motion; what is not asked for need not be modelled.
+        files: names of the engine-native models in the folder, and of what these read.
 
     Raises:
         InputError: no elements, two of one name, or something is asked that no element has.
@@ -50,6 +47,7 @@ class Scene:
     parameters: Mapping[str, float] = field(default_factory=dict)
     folder: Path = Path()
     asks: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Checks what concerns the scene as a whole, and makes the arrays of its elements read-only."""
@@ -127,12 +125,6 @@ class Scene:
         code = code_of(self.elements)
         everything = [self.name, content, self.asks, *([code] if code else [])]
         digest = hashlib.sha256(json.dumps(everything, sort_keys=True, default=str).encode())
-        if self.folder != Path():
-            for file in model_files(self.folder):
-                digest.update(file.name.encode() + file.read_bytes())
+        for name in self.files:
+            digest.update(name.encode() + (self.folder / name).read_bytes())
         return digest.hexdigest()[:16]
-
-
-def model_files(folder: Path) -> list[Path]:
-    """Files of a scene's folder that an engine may read: models by their endings; results beside them are no matter."""
-    return [file for file in sorted(folder.iterdir()) if file.suffix.lower() in _MODELS and file.is_file()]

@@ -41,6 +41,7 @@ class SceneFile:
         duration: length of a run that shows what it is about [s].
         dt: step that is short enough for engines with a fixed one [s]; shown where a run with a longer one fails, and
             taken by a first look.
+        files: models beside it in the formats of engines, e.g. ``mujoco_free.xml``, with the meshes that these read.
         tables: all others, which kinds of elements read.
     """
 
@@ -52,6 +53,7 @@ class SceneFile:
     reason: str = ""
     duration: float | None = None
     dt: float | None = None
+    files: list[str] = field(default_factory=list)
     tables: dict[str, Any] = field(default_factory=dict)
 
 
@@ -166,6 +168,7 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
             parameters=values,
             folder=path.parent if own else Path(),
             asks=tuple(dict.fromkeys([*file.asks, *wanted])),
+            files=tuple(sorted(file.files)),
         )
     except InputError as error:
         raise error if error.field == "asks" and error.value in wanted else error.of(where) from None
@@ -231,5 +234,9 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
         value = getattr(file, name)
         if value is not None and not 0 < value < math.inf:
             raise InputError(f"{path}: {name}", value, "give a positive, finite time in s")
+    for own_file in file.files:
+        if Path(own_file).name != own_file or not (path.parent / own_file).is_file():
+            advice = "there is no such file in the folder of the scene; copy it there, or take out its name"
+            raise InputError(f"{path}: files", own_file, advice)
     check_parameters(file.parameters, _units(), path)
     return file

@@ -24,9 +24,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from proofroll.core.errors import InputError, Missing, ProofrollError
-from proofroll.core.scene import model_files
 from proofroll.files.data_folders import data_folder
-from proofroll.files.scene_file import scene_folder
+from proofroll.files.scene_file import read_scene_file, scene_folder
 from proofroll.files.scene_sources import source_of
 from proofroll.running import cluster_task
 from proofroll.running.case import Case, Result, Status
@@ -106,6 +105,9 @@ class Cluster:
                 except OSError as error:  # of this case alone, and not of the scheduler
                     said = InputError("scene", case.scene, f"{error.filename} cannot be read: {error.strerror}")
                     arrived(case, partial(_raise, said))
+                    continue
+                except InputError as error:
+                    arrived(case, partial(_raise, error))
                     continue
                 future = self._submit(self._task, (content, files), case.key)
                 with self._room:
@@ -237,7 +239,8 @@ def _files(case: Case) -> dict[str, bytes]:
         return {source[1].name: source[1].read_bytes()}
     if not case.scene or (folder := scene_folder(case.scene)).parent == data_folder("models"):
         return {}
-    return {file.name: file.read_bytes() for file in (folder / "scene.toml", *model_files(folder))}
+    own = {"scene.toml": (folder / "scene.toml").read_bytes()}
+    return own | {name: (folder / name).read_bytes() for name in read_scene_file(case.scene).files}
 
 
 def _connected(address: str) -> tuple[Any, Any]:

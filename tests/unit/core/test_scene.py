@@ -139,7 +139,7 @@ def test_orientation_is_required_only_if_asked_for() -> None:
     assert asking.requires - plain.requires == {BallCapability.ORIENTATION}
     assert asking.digest != plain.digest
     # Another digest than this would leave every stored result of the scene behind.
-    assert dataclasses.replace(plain, folder=Path()).digest == "6c267d2f3e7001a5"
+    assert dataclasses.replace(plain, files=()).digest == "6c267d2f3e7001a5"
 
 
 @pytest.mark.parametrize(("asks", "value"), [(("colour",), "colour"), ("orientations", "orientations"), (3, 3)])
@@ -193,11 +193,12 @@ def test_code_of_another_package_is_in_the_digest(tmp_path: Path, monkeypatch: p
 
 
 def test_what_lies_beside_a_scene_and_is_no_model_is_no_matter(tmp_path: Path) -> None:
-    """Results beside a scene change no digest and go to no cluster; a file that an engine may read does both."""
+    """What lies beside a scene changes no digest and goes to no cluster; a file that the scene names does both."""
     folder = tmp_path / "own"
     shutil.copytree(data_folder("models") / "inclined_plane", folder)
     before = load_scene(str(folder)).digest
     (folder / "run.nc").write_bytes(b"x" * 1000)
+    (folder / "other.xml").write_text("<mujoco/>")
     (folder / "out").mkdir()
     scene = load_scene(str(folder))
     assert scene.digest == before

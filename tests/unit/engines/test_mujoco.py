@@ -406,8 +406,11 @@ def test_file_of_another_surface_is_refused(tmp_path) -> None:
     """A chart whose joints are not the surface's motions is refused, not run."""
     plane = load_scene(PLANE)
     (tmp_path / "mujoco_chart.xml").write_text((plane.folder / "mujoco_chart.xml").read_text())
+    cylinder = dataclasses.replace(load_scene(CYLINDER), folder=tmp_path)
     with pytest.raises(Refused, match="u1"):
-        build(dataclasses.replace(load_scene(CYLINDER), folder=tmp_path), "mujoco")
+        build(cylinder, "mujoco")
+    with pytest.raises(Refused, match=r'files = \["mujoco_chart.xml"\]'):
+        build(dataclasses.replace(cylinder, files=()), "mujoco")
     (tmp_path / "mujoco_chart.xml").write_text("<mujoco><worldbody><bo")
     with pytest.raises(Refused, match="cannot read"):
         build(dataclasses.replace(plane, folder=tmp_path), "mujoco")

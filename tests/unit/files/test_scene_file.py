@@ -3,6 +3,7 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -29,7 +30,8 @@ def edited(tmp_path: Path) -> Callable[[str, str], str]:
     """A copy of the sphere's scene with one text replaced; its folder."""
 
     def edit(old: str, new: str) -> str:
-        text = (data_folder("models") / CYLINDER / "scene.toml").read_text(encoding="utf-8")
+        shutil.copytree(data_folder("models") / CYLINDER, tmp_path, dirs_exist_ok=True)
+        text = (tmp_path / "scene.toml").read_text(encoding="utf-8")
         assert old in text
         (tmp_path / "scene.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
         return str(tmp_path)
@@ -215,7 +217,11 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
         ('title = "', 'duration = 0\ntitle = "', ["duration = 0", "positive, finite time in s"]),
         ('title = "', 'duration = true\ntitle = "', ["duration = True", "not a number"]),
         ('title = "', 'asks = ["colour"]\ntitle = "', ["asks = 'colour'", "choose orientation"]),
-        ('title = "', 'wheels = 4\ntitle = "', ["wheels = 4", "no such key", "duration, gravity", "balls, surfaces"]),
+        (
+            'title = "',
+            'wheels = 4\ntitle = "',
+            ["wheels = 4", "no such key", "duration, files, gravity", "balls, surfaces"],
+        ),
         ("direction = [0, 0, -1]", "direction = [0, 1]", ["gravity.direction = [0, 1]", "list is too short"]),
     ],
 )
@@ -300,8 +306,8 @@ def test_a_scene_file_that_asks(edited: Callable[[str, str], str]) -> None:
 def test_an_unknown_key_is_told_the_known_ones(tmp_path: Path, old: str, new: str, keys: str) -> None:
     """Whoever misspells a key reads which there are, of that table and that kind of wall."""
     folder = tmp_path / "mine"
-    folder.mkdir()
-    text = (data_folder("models") / "inclined_plane" / "scene.toml").read_text(encoding="utf-8")
+    shutil.copytree(data_folder("models") / "inclined_plane", folder)
+    text = (folder / "scene.toml").read_text(encoding="utf-8")
     (folder / "scene.toml").write_text(text.replace(f"\n{old}", f"\n{new}", 1), encoding="utf-8")
     with pytest.raises(InputError, match=f"there is no such key here; the keys are {keys}"):
         load_scene(str(folder))

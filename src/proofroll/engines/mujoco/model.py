@@ -69,11 +69,13 @@ def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
     """The scene's file for this formulation, or where it has none a model of the same structure.
 
     Raises:
-        Refused: MuJoCo cannot read the file, or there is no model without one.
+        Refused: the scene does not name the file, MuJoCo cannot read it, or there is no model without one.
     """
     path = scene.folder / f"mujoco_{formulation}.xml"
     if scene.folder == Path() or not path.is_file():
         return mujoco.MjSpec.from_string(_written(body, scene.name, formulation))
+    if path.name not in scene.files:
+        raise Refused(f'the scene does not name the model beside it; write files = ["{path.name}"] into scene.toml')
     try:
         return mujoco.MjSpec.from_file(str(path))
     except ValueError as error:
