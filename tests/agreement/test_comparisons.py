@@ -28,8 +28,8 @@ LATE = {
     ("accuracy", "mujoco[formulation=free,friction_damping=1.9,dt=1e-4]"): 1.5,
 }
 
-# Their motions are as long as their verdicts need, which takes a minute.
-OF_CONTACT = {"sled", "two_spheres"}
+# Their motions are as long as their verdicts need, which takes half a minute each.
+DEAR = {"sled", "two_spheres", "stick_slip"}
 
 
 def loaded(name: str) -> Comparison:
@@ -48,7 +48,7 @@ ROWS = [
         comparison,
         row,
         id=f"{comparison.name}-{row.engine}",
-        marks=[pytest.mark.drill] if comparison.name in OF_CONTACT else [],
+        marks=[pytest.mark.drill] if comparison.name in DEAR else [],
     )
     for comparison in map(loaded, comparison_names())
     for row in comparison.rows
