@@ -118,7 +118,7 @@ def test_formulations_of_contact_say_which_law_they_have() -> None:
 def test_a_certificate_names_the_law_of_contact(
     engine: str, formulation: str, preset: str, scene: str, words: list[str]
 ) -> None:
-    """Of bodies that touch and of balls that slip alike; where a scene asks for no such law there is no line."""
+    """Bodies that touch and balls that slip have a line on their law of contact; where none is asked for is none."""
     kind = load_engine(engine)
     settings, loaded = kind.presets[formulation][preset], load_scene(scene)
     told = [line.quantity for line in certificate(kind, kind.build(loaded, settings), loaded, settings)]

@@ -57,9 +57,10 @@ def published_table(rows: Sequence[Held]) -> Table:
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("")
     for row in rows:
-        digits = ".2g" if row.what.startswith("error of") else ".13g"
+        digits = ".2g" if row.kind == "error" else ".13g"
         marks = Text(row.why or "MISSES", style="bold red") if row.misses else Text(row.why or "holds", style="green")
-        table.add_row(row.scene, row.what, f"{row.published:{digits}}", f"{row.ours:{digits}}", marks)
+        what = f"error of {row.what}" if row.kind == "error" else row.what
+        table.add_row(row.scene, what, f"{row.published:{digits}}", f"{row.ours:{digits}}", marks)
     return table
 
 

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -30,12 +30,14 @@ class Held:
 
     Attributes:
         scene, what: which.
+        kind: a true ``value``, or the ``error`` of an engine.
         published, ours: the numbers; nan where there is no run.
         misses: True if a value is further off than its digits, or an error larger than allowed.
         why: reason that there is no run, or that an error is ``smaller``.
     """
 
     scene: str
+    kind: Literal["value", "error"]
     what: str
     published: float
     ours: float
@@ -73,7 +75,7 @@ def _truths(entry: Mapping[str, Any]) -> Iterator[Held]:
 
 
 def _value(scene: str, what: str, published: float, ours: float) -> Held:
-    return Held(scene, what, published, ours, not abs(ours - published) <= DIGITS * max(1.0, abs(published)))
+    return Held(scene, "value", what, published, ours, not abs(ours - published) <= DIGITS * max(1.0, abs(published)))
 
 
 def _errors(entry: Mapping[str, Any]) -> Iterator[Held]:
@@ -90,7 +92,8 @@ def _errors(entry: Mapping[str, Any]) -> Iterator[Held]:
             except ProofrollError as error:
                 why = str(error)
             why = "smaller" if ours < published / FACTOR else why
-            yield Held(name, f"error of {engine}, {dt:g} s", published, ours, not ours <= FACTOR * published, why)
+            misses = not ours <= FACTOR * published  # nan misses
+            yield Held(name, "error", f"{engine}, {dt:g} s", published, ours, misses, why)
 
 
 def _distance(path: FloatArray, true: FloatArray) -> float:
