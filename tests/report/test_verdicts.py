@@ -240,6 +240,22 @@ def test_rows_of_one_scheme_are_no_witnesses_for_one_another(
     assert (said in closing_lines(outcome_content(outcome))) is alike
 
 
+@pytest.mark.parametrize(("third", "shared"), [("semi-implicit Euler", True), ("RK4", False)])
+def test_rows_of_one_declared_scheme_are_named_whatever_their_errors(
+    made: tuple[Outcome, Store], third: str, shared: bool
+) -> None:
+    """Settings of two engines that declare one scheme of fixed steps are no witnesses for one another, others are."""
+    content = outcome_content(made[0])
+    declared = ["", "semi-implicit Euler", third, ""]
+    rows = [dataclasses.replace(row, scheme=said) for row, said in zip(content.rows, declared, strict=True)]
+    said = (
+        "One scheme has one error, whoever computes it, so no evidence for one another: "
+        "alpha fine default (dt 1e-3 s), beta only (dt 1e-3 s) (semi-implicit Euler)."
+    )
+    lines = closing_lines(dataclasses.replace(content, rows=rows))
+    assert (said in lines) is shared
+
+
 def test_closest_is_nobody_who_rests_on_the_truth(made: tuple[Outcome, Store]) -> None:
     """A row that shares the truth's equations is not named as the closest, however small its error is."""
     content, choice = outcome_content(made[0]), report_content([made[0]], "proofroll report invented").choice

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, ClassVar, Protocol, Self
 
 from proofroll.core.arrays import FloatArray
@@ -54,7 +55,8 @@ class Regularised:
 class Settings(Protocol):
     """A frozen dataclass with at least these fields; every field has a default.
 
-    One of an engine that computes in single precision has ``precision = "single"`` besides, see :func:`precision_of`.
+    One of an engine that computes in single precision has ``precision = "single"`` besides, see :func:`precision_of`;
+    ``scheme`` names the rule of its steps, see :class:`Scheme`.
     Names in ``unused``, if there is that, are fields that the formulation does not have: a run does not list them.
     """
 
@@ -117,6 +119,19 @@ class Engine(Protocol):
 
     def built(self) -> Any:
         """Model read back from the engine, in the form of its kind of element. At time 0; changes nothing."""
+
+
+class Scheme(StrEnum):
+    """Rules of fixed steps that several engines have; settings declare one, or another in a text, as ``scheme``."""
+
+    SEMI_IMPLICIT_EULER = "semi-implicit Euler"
+    LEAPFROG = "leapfrog"
+    RK4 = "classical Runge-Kutta"
+
+
+def scheme_of(settings: Any) -> str:
+    """Rule of the steps that some settings declare; empty: none."""
+    return str(getattr(settings, "scheme", ""))
 
 
 # Machine epsilon of the arithmetic in which an engine may compute, by its precision.

@@ -89,6 +89,7 @@ class EngineFacts:
         families: of the laws that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
         family: those of them that a scene asks for; empty: none.
         precision: in which it computes, see :func:`proofroll.core.engine.precision_of`.
+        scheme: rule of its steps, see :class:`proofroll.core.engine.Scheme`; empty: it declares none.
         libraries: versions of Python, numpy and scipy, on which the last digits hang; in another interpreter also a
             hash of all its packages.
     """
@@ -105,6 +106,7 @@ class EngineFacts:
     families: dict[str, str] = field(default_factory=dict)
     family: str = ""
     precision: str = "double"
+    scheme: str = ""
     libraries: dict[str, str] = field(default_factory=dict)
 
     @property

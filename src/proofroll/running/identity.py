@@ -63,7 +63,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
         code = digest(sorted({place for truth in load_truths() for place in _of(truth)}))
         return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
-    from proofroll.core.engine import precision_of
+    from proofroll.core.engine import precision_of, scheme_of
     from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, laws
     from proofroll.core.plugins import resolve_settings
     from proofroll.running.loading import load
@@ -82,6 +82,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
         caveat=kind.caveat(settings) if isinstance(kind, TellsCaveats) else "",
         families=laws(kind, settings),
         precision=precision_of(settings),
+        scheme=scheme_of(settings),
         libraries=libraries(engine),
     )
     return dataclasses.asdict(facts)

@@ -8,6 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt, Interval
 
+from proofroll.core.engine import Scheme
 from proofroll.core.errors import InputError
 
 
@@ -56,6 +57,11 @@ class ExudynSettings:
     def order(self) -> int:
         """Both implicit methods are of second order in positions, velocities and multipliers."""
         return EXPLICIT.get(self.integrator, 2)
+
+    @property
+    def scheme(self) -> Scheme | str:
+        """See :class:`proofroll.core.engine.Settings`."""
+        return Scheme.RK4 if self.integrator == "rk44" else self.integrator
 
     def __post_init__(self) -> None:
         """Accepts only settings that have an effect, and all that the formulation needs."""

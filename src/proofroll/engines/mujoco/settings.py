@@ -10,6 +10,7 @@ import mujoco
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BeforeValidator
 
+from proofroll.core.engine import Scheme
 from proofroll.core.engine_abilities import Term
 from proofroll.core.errors import InputError, Refused, refuse_first
 from proofroll.core.plugins import release
@@ -122,6 +123,13 @@ class MujocoSettings:
         if self.time_constant is None and self.formulation == "chart":
             return ORDER_OF_TURNING if self.integrator == "RK4" else 1
         return 2 if self.curvature or self.formulation == "chart" else 1
+
+    @property
+    def scheme(self) -> Scheme | str:
+        """See :class:`proofroll.core.engine.Settings`; both of first order take the new velocity for the position."""
+        if self.curvature:
+            return Scheme.LEAPFROG
+        return {"RK4": Scheme.RK4, "Euler": Scheme.SEMI_IMPLICIT_EULER}.get(self.integrator, self.integrator)
 
     @property
     def velocity_lag(self) -> float:

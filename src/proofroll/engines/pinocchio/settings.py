@@ -9,10 +9,16 @@ from typing import Annotated, Literal
 from annotated_types import Ge, Gt
 
 from proofroll.core.dop853 import TIGHTEST
+from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
 from proofroll.elements.ball_on_surface.model import BallCapability
 
 _ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
+_SCHEMES = {
+    "semi_implicit_euler": Scheme.SEMI_IMPLICIT_EULER,
+    "leapfrog": Scheme.LEAPFROG,
+    "rk4": Scheme.RK4,
+}
 # Formulations of mechanisms, and their integrators.
 OF_MECHANISMS = {
     "null_space": ("rk4", "dop853"),
@@ -126,6 +132,11 @@ class PinocchioSettings:
         if self.integrator == "rk4" and not self.orientation:
             return 4
         return _ORDERS.get(self.integrator)
+
+    @property
+    def scheme(self) -> Scheme | str:
+        """See :class:`proofroll.core.engine.Settings`."""
+        return _SCHEMES.get(self.integrator, self.integrator)
 
 
 def lowered(settings: PinocchioSettings) -> Mapping[str, int]:

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from annotated_types import Gt
 
 from proofroll.core.dop853 import TIGHTEST
+from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.elements.ball_on_surface.compiled import library
@@ -87,6 +88,11 @@ class ProjectionSettings:
     def order(self) -> int | None:
         """Declared order of convergence in dt; None with an adaptive step."""
         return None if self.integrator == "taylor" else INTEGRATORS[self.integrator].order
+
+    @property
+    def scheme(self) -> Scheme | str:
+        """See :class:`proofroll.core.engine.Settings`."""
+        return Scheme.RK4 if self.integrator == "rk4" else self.integrator
 
 
 # default: what a reader of the paper writes down, a classical fixed-step method with elimination of violations.

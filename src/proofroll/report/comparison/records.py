@@ -80,6 +80,7 @@ class Setting:
     caveat: str
     family: str
     precision: str
+    scheme: str
 
 
 @dataclass(frozen=True, kw_only=True)

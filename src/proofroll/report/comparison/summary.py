@@ -212,6 +212,7 @@ def settings_of(run: Run) -> dict[str, Any]:
         "caveat": facts.caveat,
         "family": facts.family,
         "precision": facts.precision,
+        "scheme": facts.scheme,
     }
 
 

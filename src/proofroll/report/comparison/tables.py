@@ -163,22 +163,35 @@ def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int,
 
 
 def one_scheme(content: ReportedComparison) -> list[str]:
-    """Sentence that names the rows with one step and the same errors, whoever computed them; nothing if there are none.
+    """Sentences that name the rows of several engines with one declared scheme, and further ones with the same errors.
 
     Codes with one scheme print the same digits, right or wrong; so do those with one wrong model.
     """
-    groups: list[list[tuple[str, ReportedRow]]] = []
+    schemes: dict[str, dict[str, ReportedRow]] = {}
+    groups: list[dict[str, ReportedRow]] = []
     for name, row, _ in content.lines():
-        group = next((each for each in groups if _same_digits(each[0][1], row)), None)
+        if row.scheme and row.resolution == "dt":
+            schemes.setdefault(row.scheme, {})[name] = row
+        group = next((each for each in groups if _same_digits(next(iter(each.values())), row)), None)
         if group is None:
-            groups.append([(name, row)])
+            groups.append({name: row})
         else:
-            group.append((name, row))
-    told = [", ".join(name for name, _ in group) for group in groups if len(group) > 1]
-    if not told:
-        return []
-    same = "Same step and errors to three digits, of one scheme or one wrong model, so no evidence for one another"
-    return [f"{same}: {'; '.join(told)}."]
+            group[name] = row
+    declared = {key: rows for key, rows in schemes.items() if len({row.name for row in rows.values()}) > 1}
+    alike = [
+        rows for rows in groups if len(rows) > 1 and not any(rows.keys() <= all_.keys() for all_ in declared.values())
+    ]
+    said = (
+        (
+            "One scheme has one error, whoever computes it, so no evidence for one another",
+            [f"{', '.join(rows)} ({scheme})" for scheme, rows in declared.items()],
+        ),
+        (
+            "Same step and errors to three digits, of one scheme or one wrong model, so no evidence for one another",
+            [", ".join(rows) for rows in alike],
+        ),
+    )
+    return [f"{words}: {'; '.join(told)}." for words, told in said if told]
 
 
 def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:

@@ -13,7 +13,7 @@ from annotated_types import Gt, Le
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from proofroll.core.engine import whole_steps
+from proofroll.core.engine import Scheme, whole_steps
 from proofroll.core.errors import Diverged, InputError
 from proofroll.core.scene import Scene
 from proofroll.elements.mechanism import WORLD, Joint, Mechanism
@@ -70,6 +70,11 @@ class DartSettings:
     def order(self) -> int | None:
         """Order of semi-implicit Euler."""
         return 1 if self.formulation == "world" else None
+
+    @property
+    def scheme(self) -> str:
+        """Rule of a world's steps; scipy adapts its own."""
+        return Scheme.SEMI_IMPLICIT_EULER if self.formulation == "world" else ""
 
 
 class Dart:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from annotated_types import Gt, Le
 
+from proofroll.core.engine import Scheme
 from proofroll.core.errors import InputError
 
 
@@ -53,6 +54,11 @@ class DrakeSettings:
     def order(self) -> int | None:
         """Order of the discrete plant's semi-implicit Euler."""
         return 1 if self.resolution == "dt" else None
+
+    @property
+    def scheme(self) -> str:
+        """Rule of the discrete plant's steps; a continuous one adapts them."""
+        return Scheme.SEMI_IMPLICIT_EULER if self.resolution == "dt" else ""
 
 
 PRESETS: Mapping[str, Mapping[str, DrakeSettings]] = {

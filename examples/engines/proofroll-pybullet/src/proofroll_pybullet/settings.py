@@ -8,6 +8,8 @@ from typing import Annotated, ClassVar, Literal
 
 from annotated_types import Gt
 
+from proofroll.core.engine import Scheme
+
 
 @dataclass(frozen=True)
 class PybulletSettings:
@@ -27,6 +29,7 @@ class PybulletSettings:
     iterations: Annotated[int, Gt(0)] = 200
 
     resolution: ClassVar[str] = "dt"
+    scheme: ClassVar[str] = Scheme.SEMI_IMPLICIT_EULER
 
     @property
     def order(self) -> int | None:
