@@ -75,6 +75,8 @@ MESHED = '<geom type="mesh" mesh="t" mass="0.1" pos="0.1 0.2 0.3" euler="10 20 3
 RODS = '<geom class="k" type="capsule" size="0.05 0.2"/><geom type="box" size="0.1 0.2 0.3" pos="0 0.1 0" mass="2"/>'
 GROUPS = '<geom type="box" size=".1 .2 .3"/><geom type="box" size=".1 .2 .1" pos=".3 0 0" group="3"/>'
 HAND = f'<body name="b" pos="0.3 0 0" euler="20 30 40"><joint name="k2" axis="0 0.6 0.8"/>{_OWN.format(_SLIM)}</body>'
+LONG = HAND.replace('euler="20 30 40"', 'axisangle="1 1 0 40"')
+LIMB = 'type="box" size="0.1 0.2 0.3" pos="0 0.1 0"'
 BALL = 'type="sphere" size="0.05"'
 BOUNDED = held_by(f"{{}}{HAND}", outside='<compiler boundmass="0.01" boundinertia="1e-4"/>' + PLAIN_CLASS, inertial="")
 ARMED = """<mujoco model="m"><worldbody><body name="a" pos="0 0 1"><joint name="f" type="free" armature="0.1"/>
@@ -211,6 +213,21 @@ REAL: list[tuple[str, str, str, set[str]]] = [
         "pinocchio",
         {"axisangle_not_normalised"},
     ),
+    *[
+        ("long axis of a pose", text, "pinocchio", {"axisangle_not_normalised", *more})
+        for text, more in (
+            (held_by(LONG, outside=PLAIN_CLASS), ()),
+            (held_by(LONG, outside=PLAIN_CLASS + '<option gravity="0 1 -3"/>'), ["default_gravity"]),
+            (held_by(LONG.replace('<joint name="k2" axis="0 0.6 0.8"/>', ""), outside=PLAIN_CLASS), ()),
+            (held_by(f'<geom axisangle="0 2 1 30" {LIMB}/>', outside=PLAIN_CLASS, inertial=""), ()),
+            (
+                held_by(
+                    f'<geom class="k" {LIMB}/>', outside=CLASS_K.format('damping="0.7"', 'mass="1"') + "", inertial=LONG
+                ),
+                ["class_mass_ignored", "damping_left_out"],
+            ),
+        )
+    ],
     ("armature of a free joint", ARMED, "pinocchio", {"armature_of_free_joints_turns"}),
     ("armature of a free joint", ARMED, "mujoco", set()),
     (
@@ -276,8 +293,12 @@ def test_real_engines(
         robot, _ = defining.compiled(robot_workers("mujoco"), file, written, 60)
     truth = RobotTruth.of(robot, random_states(robot, 5, 1))
     request = _request(written, file, truth, reading.options_of(spec.options, spec.name))
-    answer = reading.ask(robot_workers(spec.name), spec.name, request, place, 60)
-    row = judged(file, truth, 1e-14, spec, answer)
+
+    def ask(path: Path) -> reading.ReaderAnswer:
+        asked = dataclasses.replace(request, path=path)
+        return reading.ask(robot_workers(spec.name), spec.name, asked, place, 60)
+
+    row = judged(file, truth, 1e-14, spec, ask(written), ask=ask)
     assert row.message is None
     assert row.unexplained is None, row.layers
     assert {cause.id for cause in row.causes} == expected

@@ -86,10 +86,18 @@ def check(
         )
 
         def row(spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
-            own = dataclasses.replace(request, options=options)
-            try:
+            def ask(given: Path) -> reading.ReaderAnswer:
                 with lent.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
-                    answer = reading.ask(worker, spec.name, own, Path(place), time_limit)
+                    return reading.ask(
+                        worker,
+                        spec.name,
+                        dataclasses.replace(request, path=given, options=options),
+                        Path(place),
+                        time_limit,
+                    )
+
+            try:
+                answer = ask(written)
             except Missing as error:
                 if engines:
                     raise
@@ -97,7 +105,7 @@ def check(
             except WorkerDied as error:
                 return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
             try:
-                importer = judged(file, truth, bar, spec, answer, lent)
+                importer = judged(file, truth, bar, spec, answer, lent, ask)
             except Exception as error:  # one engine's odd answer must not end the rows of the others
                 said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
                 return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)

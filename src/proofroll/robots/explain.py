@@ -45,9 +45,10 @@ class RobotCause:
 
 @dataclasses.dataclass(frozen=True)
 class _Step:
-    """Truth of the robot as changed by the causes found so far."""
+    """Truth of the robot, and the engine's reading, as changed by the causes found so far."""
 
     truth: RobotTruth
+    reading: Reading
     found: dict[str, float]
     causes: tuple[RobotCause, ...] = ()
 
@@ -61,7 +62,7 @@ class Search:
         reading: what the engine holds.
         engine: its name.
         tolerances: up to which a layer holds.
-        recompiled: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
+        recompiled, reread: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
     """
 
     file: RobotFile
@@ -69,6 +70,7 @@ class Search:
     engine: str
     tolerances: dict[str, float]
     recompiled: Callable[[Element], Robot | None] = lambda _: None
+    reread: Callable[[Element], Reading | None] = lambda _: None
 
     def causes(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
         """The causes of all differences, and the first layer that they leave unexplained.
@@ -76,24 +78,31 @@ class Search:
         They are looked for at a few of the states, and proven at all; where that fails all states are searched.
         """
         if truth.states.count > _TRIED_AT:
-            few = dataclasses.replace(self, reading=self.reading.first(_TRIED_AT))
+            few = dataclasses.replace(self, reading=self.reading.first(_TRIED_AT), reread=self._reread_at_few)
             causes, layer = few._searched(truth.first(_TRIED_AT))
             step = self._proven(truth, causes)
             if step is not None and first_failing(step.found, self.tolerances) == layer:
                 return step.causes, layer
         return self._searched(truth)
 
+    def _reread_at_few(self, root: Element) -> Reading | None:
+        reading = self.reread(root)
+        return None if reading is None else reading.first(_TRIED_AT)
+
     def _proven(self, truth: RobotTruth, causes: tuple[RobotCause, ...]) -> _Step | None:
         """The step after causes that were found at other states; None: one gives no other robot here."""
         known = {item.id: item for item in hypotheses()}
-        step: _Step | None = _Step(truth, differences(truth, self.reading))
+        step: _Step | None = self._begun(truth)
         for cause in causes:
             step = None if step is None else self._tried(step, known[cause.id], cause.layer)
         return step
 
+    def _begun(self, truth: RobotTruth) -> _Step:
+        return _Step(truth, self.reading, differences(truth, self.reading))
+
     def _searched(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
         """See :meth:`causes`, at the states of the truth."""
-        step = _Step(truth, differences(truth, self.reading))
+        step = self._begun(truth)
         while (layer := first_failing(step.found, self.tolerances)) is not None:
             closed = self._closed(step, layer)
             if closed is None:
@@ -122,17 +131,23 @@ class Search:
 
     def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str, most: float = math.inf) -> _Step | None:
         """The step after a hypothesis; None: no other robot comes of it, or the layer is off by more than ``most``."""
-        robot = hypothesis.change(RobotEvidence(self.file, step.truth.robot, self.reading, self.recompiled))
-        if robot is None or robot is step.truth.robot or (self.reading.joints and not robot.moving):
+        truth, reading = step.truth, step.reading
+        changed = hypothesis.change(RobotEvidence(self.file, truth.robot, reading, self.recompiled, self.reread))
+        if changed is None or changed is truth.robot:
             return None
-        truth = RobotTruth.of(robot, step.truth.states, like=step.truth)
-        if not differences(truth, self.reading, layer).get(layer, math.inf) <= most:
+        if isinstance(changed, Reading):
+            reading = changed
+        elif reading.joints and not changed.moving:
             return None
-        left = differences(truth, self.reading)
+        else:
+            truth = RobotTruth.of(changed, truth.states, like=truth)
+        if not differences(truth, reading, layer).get(layer, math.inf) <= most:
+            return None
+        left = differences(truth, reading)
         known = ", ".join(f"{name} {versions}".strip() for name, versions in hypothesis.known.items())
         before, after = step.found[layer], left[layer]
         cause = RobotCause(hypothesis.id, hypothesis.name, layer, before, after, hypothesis.remedy, known)
-        return _Step(truth, left, (*step.causes, cause))
+        return _Step(truth, reading, left, (*step.causes, cause))
 
     def _rank(self, step: _Step, layer: str) -> tuple[int, float]:
         """Best first: one after which the most layers hold from the start, then the smallest difference."""

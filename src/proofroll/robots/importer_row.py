@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 from xml.etree.ElementTree import Element, fromstring, tostring
 
 import numpy as np
@@ -20,11 +21,11 @@ from proofroll.robots import reading
 from proofroll.robots.explain import Search
 from proofroll.robots.layers import LAYERS, TOLERANCE, RobotTruth, differences, first_failing
 from proofroll.robots.meaning import meaning
-from proofroll.robots.model import Robot
 from proofroll.robots.places import worst_place
 from proofroll.robots.protocol import Reading, Whole
 from proofroll.robots.records import HeldLayer, ImporterRow
 from proofroll.robots.robot_file import RobotFile
+from proofroll.running.process import WorkerDied
 from proofroll.running.worker_pool import Workers
 
 # The two formulations must agree to a tenth of any tolerance; else their difference raises it.
@@ -38,10 +39,11 @@ def judged(
     spec: EngineSpec,
     answer: reading.ReaderAnswer,
     workers: Workers | None = None,
+    ask: Callable[[Path], reading.ReaderAnswer] | None = None,
 ) -> ImporterRow:
     """The row of an engine that answered; the two formulations of the truth differ by ``bar``.
 
-    Changed files are compiled by one of the ``workers``.
+    Changed files are compiled by one of the ``workers``, and read by the engine if ``ask`` is given.
     """
     row = ImporterRow(
         engine=str(spec), status="refused", version=answer.version, message=answer.refused, says=answer.says
@@ -54,7 +56,15 @@ def judged(
     layers = {
         layer: HeldLayer(value, tolerances[layer], bool(value <= tolerances[layer])) for layer, value in off.items()
     }
-    search = Search(file, answer.reading, plain_name(spec.name), tolerances, _recompiler(file, workers))
+    recompiled = _of_changed(file, lambda changed, written: meaning(changed, written, TIME_LIMIT, workers)[0])
+    search = Search(
+        file,
+        answer.reading,
+        plain_name(spec.name),
+        tolerances,
+        recompiled if file.kind == "mjcf" else Search.recompiled,
+        Search.reread if ask is None else _of_changed(file, lambda _, written: ask(written).reading),
+    )
     causes, unexplained = search.causes(truth)
     holds = all(layer.holds for layer in layers.values())
     return dataclasses.replace(
@@ -89,17 +99,20 @@ def with_the_copy(given: reading.AsWritten, row: ImporterRow) -> str:
     return f"{said}, the copy that is compared with {own} and {weight:.6g} kg"
 
 
-def _recompiler(file: RobotFile, workers: Workers | None) -> Callable[[Element], Robot | None]:
-    """Function from a changed file to its robot; None: no meaning, or we read the format. Each is compiled once."""
+_Made = TypeVar("_Made")
+
+
+def _of_changed(file: RobotFile, make: Callable[[RobotFile, Path], _Made | None]) -> Callable[[Element], _Made | None]:
+    """Function from a changed file to the product of its written copy, made once of each; None: it is refused."""
 
     @cache
-    def compiled(content: bytes) -> Robot | None:
+    def made(content: bytes) -> _Made | None:
         changed = dataclasses.replace(file, root=fromstring(content))
-        with tempfile.TemporaryDirectory() as folder, contextlib.suppress(InputError):
-            return meaning(changed, reading.write(changed, Path(folder)), TIME_LIMIT, workers)[0]
+        with tempfile.TemporaryDirectory() as folder, contextlib.suppress(InputError, WorkerDied):
+            return make(changed, reading.write(changed, Path(folder)))
         return None
 
-    return lambda root: None if file.kind == "urdf" else compiled(tostring(root, "utf-8"))
+    return lambda root: made(tostring(root, "utf-8"))
 
 
 def _offending(truth: RobotTruth, held: Reading) -> list[str]:

@@ -1,7 +1,8 @@
 """Known causes why an engine holds another robot than the file describes, a function each.
 
 A cause is proven by computation: the truth is evaluated for the robot that the engine would hold because of it, and
-the engine's difference from that has to vanish.
+the engine's difference from that has to vanish. Where what it holds is no robot, the engine reads a file without the
+occasion instead, and its difference from the truth has to vanish.
 """
 
 from __future__ import annotations
@@ -52,12 +53,14 @@ class RobotEvidence:
         robot: what the file describes, with the causes found so far.
         reading: what the engine holds.
         recompiled: meaning of a changed file, for a format that an engine defines; None where it has none.
+        reread: what the engine holds of a changed file; None where it cannot be asked, or refuses.
     """
 
     file: RobotFile
     robot: Robot
     reading: Reading
     recompiled: Callable[[Element], Robot | None] = lambda _: None
+    reread: Callable[[Element], Reading | None] = lambda _: None
 
     @property
     def root(self) -> Element:
@@ -104,7 +107,7 @@ def _moved(part: _Part, before: _Part | None, after: _Part | None) -> _Part:
     return dataclasses.replace(part, **changed) if changed else part
 
 
-Change = Callable[[RobotEvidence], Robot | None]
+Change = Callable[[RobotEvidence], Robot | Reading | None]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,7 +119,8 @@ class RobotHypothesis:
         name: what the engine does, in a few words.
         known: engine -> versions in which it was seen; those are tried first.
         remedy: what a user does about it.
-        change: the robot that the engine would hold; None, or the same robot: the file gives no occasion for it.
+        change: the robot that the engine would hold, or what it holds of a file that means the same and gives no
+            occasion; None, or the same robot: the file gives no occasion for it.
     """
 
     id: str

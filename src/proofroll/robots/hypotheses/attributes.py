@@ -11,10 +11,12 @@ import numpy as np
 
 from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothesis
 from proofroll.robots.mjcf_classes import with_classes
-from proofroll.robots.model import Array, Robot, RobotBody
-from proofroll.robots.two_formulations import skew
+from proofroll.robots.model import Robot, RobotBody
+from proofroll.robots.protocol import Reading
 
 _POSES = ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis")
+# Round-off of the length of an axis that was written as of length 1.
+_UNIT = 1e-12
 _REWRITE = "write it at each element, or compile once with MuJoCo and save (mj_saveLastXML, six digits)"
 
 
@@ -107,26 +109,19 @@ def _other(body: RobotBody, before: RobotBody) -> bool:
 
 
 @hypothesis({"pinocchio": "3.9.0 to 4.1.0"}, "write the axis of axisangle with length 1, or a quaternion")
-def axisangle_not_normalised(evidence: RobotEvidence) -> Robot | None:
-    """An inertial's axisangle is taken with its axis as long as it is written, which gives no rotation."""
-    degrees = not any(each.get("angle") == "radian" for each in evidence.file.root.iter("compiler"))
-    stretched = []
-    for name, inertial in _inertials(evidence.file.root):
-        body = evidence.robot.bodies.get(name)
-        if body is None or not inertial.get("axisangle") or not inertial.get("diaginertia"):
-            continue
-        *axis, angle = (float(part) for part in inertial.get("axisangle", "").split())
-        R = _unnormalised(np.array(axis), np.radians(angle) if degrees else angle)
-        moments = np.diag([float(part) for part in inertial.get("diaginertia", "").split()])
-        stretched.append(dataclasses.replace(body, inertia=R @ moments @ R.T))
-    return evidence.robot.with_bodies(stretched) if stretched else None
+def axisangle_not_normalised(evidence: RobotEvidence) -> Reading | None:
+    """The axis of axisangle is taken as long as it is written, which gives no rotation.
 
-
-def _unnormalised(axis: Array, angle: float) -> Array:
-    """Rodrigues' formula with an axis of any length."""
-    return np.asarray(
-        np.cos(angle) * np.eye(3) + np.sin(angle) * skew(axis) + (1 - np.cos(angle)) * np.outer(axis, axis)
-    )
+    No robot has such a pose: the engine reads the file with axes of length 1.
+    """
+    root, long = copy.deepcopy(evidence.file.root), False
+    for each in root.iter():
+        *axis, angle = (float(part) for part in each.get("axisangle", "0").split())
+        length = float(np.linalg.norm(axis))
+        if length and abs(length - 1) > _UNIT:
+            each.set("axisangle", " ".join(repr(part) for part in (*(part / length for part in axis), angle)))
+            long = True
+    return evidence.reread(root) if long else None
 
 
 # Radius of a ball of 1 kg with unit moments [m]: ⅖ r² = 1.
