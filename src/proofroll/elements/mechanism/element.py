@@ -123,13 +123,17 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts with laws of joints, and what these do at the start; None: no contacts, or no law."""
+        """Equations of contacts with laws of joints, and what these do at the start.
+
+        None: no contacts, or their laws leave it open.
+        """
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
         if self.mechanism.contacts:
             with contextlib.suppress(Refused):
                 dynamics = ContactDynamics(self.mechanism)
-                return dynamics, dynamics.begin()[0]
+                mode, margin = dynamics.begin()
+                return (dynamics, mode) if margin else None
         return None
 
     @cached_property

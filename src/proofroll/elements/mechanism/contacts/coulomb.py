@@ -23,8 +23,9 @@ _RESTS = 1e-10  # of the loads: a contact that moves less does not move
 # Part of friction's bound beyond which a contact slides: nearer to it round-off decides, and no direction of slip is
 # found; that it hangs on less than parameters are known to is :func:`sure`'s to say.
 _AT_BOUND = 1e-9
-# Part of the loads and of friction by which an outcome is tried on both sides; if it changes, it hangs on nothing.
-_NUDGE = 1e-6
+# Part of the loads and of friction by which an outcome is tried on both sides; if it changes, it hangs on nothing. Each
+# further contact takes another part more, of no ratio to the first: equal ones cancel between two walls.
+_NUDGE, _APART = 1e-6, 0.382
 # Between two of them the direction of slip is looked for; those of the axes lie in between.
 _DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
 PAINLEVE = (
@@ -94,8 +95,8 @@ def sure(
     force, done = solved(G, c, friction, sliding, names, bounds)
     own = np.diag(G)[::3]
     # as a force of each contact, which what holds the others takes up
-    lift = np.tile([1.0, 0.0, 0.0], len(friction)) * np.repeat(np.where(own > 0, 1 / np.where(own > 0, own, 1), 0.0), 3)
-    nudge = _NUDGE * float(np.abs(c).max()) * G @ lift
+    lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
+    nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
 
     def outcome(force: Array, done: Sequence[Outcome]) -> list[Outcome]:
         little = least * float(np.abs(force).max())

@@ -63,3 +63,10 @@ def test_a_tie_is_no_answer() -> None:
     assert not sure(G, np.array([-1.0, 0.3, 0.0]), mu, [None], ["c"])[2]
     assert sure(G, np.array([-1.0, 0.2997, 0.0]), mu, [None], ["c"])[1:] == (["stick"], True)
     assert sure(G, np.array([-1.0, 0.3003, 0.0]), mu, [None], ["c"])[1:] == (["slip"], True)
+
+
+def test_what_two_walls_may_jam_is_no_answer() -> None:
+    """A ball between two walls that press it equally, or not at all, may fall or hold: nothing says which."""
+    J = np.concatenate([np.eye(3), np.diag([-1.0, 1.0, 1.0])])  # normals against each other
+    loads = J @ np.array([0.0, 0.0, -9.81])
+    assert not sure(J @ J.T, loads, np.full(2, 0.5), [None] * 2, ["left", "right"])[2]
