@@ -241,7 +241,7 @@ def test_a_table_of_ones_own(header: str, words: str, tmp_path: Path) -> None:
 def test_a_word_in_a_table(tmp_path: Path) -> None:
     """The line of a CSV file in which no number stands is named."""
     (file := tmp_path / "own.csv").write_text("time [s],q.pivot [rad]\n0.0,2.8\n0.1,none\n", encoding="utf-8")
-    with pytest.raises(InputError, match=r"line 3: could not convert string to float: 'none'\)$"):
+    with pytest.raises(InputError, match=r"line 3: 'none' is no number\)$"):
         proofroll.judge(file, "pendulum")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from proofroll.core.errors import InputError
 
@@ -21,3 +22,9 @@ def bounded(
         raise OutOfBounds(name, value, f"the value must be above {above:g}")
     if value < at_least:
         raise OutOfBounds(name, value, f"the value must be at least {at_least:g}")
+
+
+def require_pair(field: str, pair: Sequence[float]) -> None:
+    """Raises InputError unless these are a lowest and a highest number."""
+    if len(pair) != 2 or not pair[0] <= pair[1]:
+        raise InputError(field, list(pair), "write [low, high]")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 _PACKAGE = Path(__file__).parents[1]
 _ENGINES = _PACKAGE / "engines"
+_LONGEST_FIELD = 300  # characters: a path and the keys that lead to a value; a key itself may have any length
 
 
 class ProofrollError(Exception):
@@ -25,10 +26,10 @@ class InputError(ProofrollError):
     """
 
     def __init__(self, field: str, value: object, advice: str) -> None:
-        self.field = field
+        self.field = _short(field, _LONGEST_FIELD)
         self.value = value
         self.advice = advice
-        super().__init__(f"{field} = {_shown(value)}: {advice}")
+        super().__init__(f"{self.field} = {_shown(value)}: {advice}")
 
     def within(self, field: str, value: object) -> InputError:
         """The same error, of a larger thing that holds this one."""
@@ -130,5 +131,8 @@ def choices(names: Iterable[str]) -> str:
 def _shown(value: object) -> str:
     if isinstance(value, Path):
         return repr(str(value))  # whole, or nobody finds the file
-    text = repr(value) if isinstance(value, str) else str(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return _short(repr(value) if isinstance(value, str) else str(value), 60)
+
+
+def _short(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."

@@ -8,7 +8,7 @@ import operator
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from simpleeval import InvalidExpression, SimpleEval
+from simpleeval import FeatureNotAvailable, InvalidExpression, SimpleEval
 
 from proofroll.core.errors import InputError
 from proofroll.core.quantity import Quantity, UnitsDiffer, powers_of
@@ -71,6 +71,8 @@ def evaluated(
         raise InputError(field, text, "divides by zero; change the expression or its parameters") from None
     except UnitsDiffer as error:
         raise InputError(field, text, f"{error}; change the formula, or the unit of a parameter in it") from None
+    except FeatureNotAvailable:
+        raise InputError(field, text, f"is no arithmetic; use numbers, + - * / ^ and {_list(known)}") from None
     except InvalidExpression as error:
         problem = str(error).splitlines()[0].rstrip(".")
         raise InputError(field, text, f"{problem}; use + - * / ^ and {_list(known)}") from None

@@ -132,6 +132,7 @@ def _first_problem(
 def advice(kind: str, said: str) -> str:
     """Advice in our words for a problem of pydantic's, from its type and its message."""
     words = said.removeprefix("Value error, ").replace("Input should", "it must").replace(" after validation", "")
+    words = words.replace("Tuple ", "the list ").replace("List ", "the list ")
     return _WORDS.get(kind.partition("_")[0], words[0].lower() + words[1:])
 
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import bounded, require_pair
 from proofroll.core.comparison import Band, Comparison, Edge, ExceptAt, Row, Tolerance
 from proofroll.core.errors import InputError, require_known, told_of
 from proofroll.core.observable import Observable
@@ -110,6 +110,7 @@ def _check_times(comparison: Comparison) -> None:
         advice = f"samples lie further apart than the run is long, {comparison.until:g} s; sample more often"
         raise InputError("every", comparison.every, advice)
     bounded("time_limit", comparison.time_limit, above=0)
+    bounded("order", comparison.order, unbounded=True)
 
 
 def _table(where: str, value: object) -> dict[str, Any]:
@@ -121,8 +122,8 @@ def _table(where: str, value: object) -> dict[str, Any]:
 def _band(where: str, content: object) -> Band:
     table = _table(where, content)
     because = table.pop("because", "")
-    if not because:
-        raise InputError(f"{where}.because", "nothing", "every tolerance needs its reason; add it")
+    if not (isinstance(because, str) and because):
+        raise InputError(f"{where}.because", because or "nothing", "every tolerance needs its reason; add it")
     return Band(because, {name: Tolerance.parse(f"{where}.{name}", text) for name, text in table.items()})
 
 
@@ -153,6 +154,8 @@ def _check(where: str, row: Row, comparison: Comparison, known: Mapping[str, Obs
         _check_ladder(where, row.ladder)
     _check_expectations(where, row)
     _check_bounds(where, known, dict.fromkeys([*row.expect_for, *row.order]))
+    for name, pair in row.order.items():
+        require_pair(f"{where}.order.{name}", pair)
     _check_bounds(where, known, row.limit)
     _check_bounds(where, known, row.bound)
     _check_points(f"{where}.only", comparison, row.only)

@@ -103,11 +103,15 @@ def _numbers(header: list[str], rows: list[list[str]]) -> Any:
             continue
         if len(row) != len(header):
             raise ValueError(f"line {line} has {len(row)} fields, the header {len(header)}")
-        try:
-            numbers.append([float(field) for field in row])
-        except ValueError as error:
-            raise ValueError(f"line {line}: {error}") from None
+        numbers.append([_number(field, line) for field in row])
     return np.array(numbers).reshape(len(numbers), len(header))
+
+
+def _number(field: str, line: int) -> float:
+    try:
+        return float(field)
+    except ValueError:
+        raise ValueError(f"line {line}: {field[:60]!r} is no number") from None
 
 
 def _array(name: str, columns: Mapping[tuple[str, ...], Any]) -> tuple[Any, list[tuple[str, ...]]]:

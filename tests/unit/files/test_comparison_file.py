@@ -212,6 +212,9 @@ def test_tolerances_of_another_form(text: object) -> None:
         ("every = 0.01", "every = 0.01\ntime_limit = inf", ["time_limit = inf", "finite"]),
         ("[vary]", "brief = { sped = [4] }\n[vary]", ["brief", "sped", "rolling_resistance, speed"]),
         ("[vary]", "brief = { speed = [5] }\n[vary]", ["brief", "keep at least one"]),
+        ("[vary]", "order = nan\n[vary]", ["order = nan", "must be a number"]),
+        ("order = { z = [0.9, 1.1] }", "order = { z = [nan, 1] }", ["order.z = [nan, 1.0]", "write [low, high]"]),
+        ('because = "round-off"', "because = nan", ["tolerances.tight.because = nan", "needs its reason"]),
     ],
 )  # fmt: skip
 def test_broken_comparisons(load: Callable[..., Comparison], old: str, new: str, words: list[str]) -> None:

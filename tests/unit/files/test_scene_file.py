@@ -223,6 +223,8 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
             ["wheels = 4", "no such key", "duration, files, gravity", "balls, surfaces"],
         ),
         ("direction = [0, 0, -1]", "direction = [0, 1]", ["gravity.direction = [0, 1]", "list is too short"]),
+        ("direction = [0, 0, -1]", "direction = [0, 0, 0, 1]", ["[0, 0, 0, 1]: the list should have at most 3 items"]),
+        ('mass = "$mass"', 'mass = "= mass.real"', ["mass = ' mass.real': is no arithmetic; use numbers, + - * / ^"]),
     ],
 )
 def test_broken_scene_files(edited: Callable[[str, str], str], old: str, new: str, words: list[str]) -> None:
@@ -293,6 +295,13 @@ def test_a_scene_file_that_asks(edited: Callable[[str, str], str]) -> None:
     folder = edited('title = "', 'asks = ["orientation"]\ntitle = "')
     for asks in ((), ("orientation",)):
         assert load_scene(folder, asks=asks).asks == ("orientation",)
+
+
+def test_a_key_of_any_length_is_one_short_line(edited: Callable[[str, str], str]) -> None:
+    """The line about a wrong key is short, however long the key."""
+    text = str(problem(edited("[gravity]", f"{'a' * 5000} = 1\n[gravity]")))
+    assert len(text) < 1000
+    assert text.index("aaa") < text.index("there is no such key")
 
 
 @pytest.mark.parametrize(

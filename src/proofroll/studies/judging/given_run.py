@@ -160,11 +160,11 @@ def _dataset(run: Run) -> xr.Dataset:
         try:
             run = _from_file(Path(run))
         except FileNotFoundError:
-            raise InputError("run", str(run), "there is no such file") from None
+            raise InputError("run", Path(run), "there is no such file") from None
         except (OSError, ValueError, LookupError) as error:  # a file that was cut off ends in any of them
             how = "" if Path(run).suffix in {CSV, STORED} else _WRITE_NETCDF
             advice = f"it cannot be read ({error}){how}"
-            raise InputError("run", str(run), advice) from None
+            raise InputError("run", Path(run), advice) from None
     if isinstance(run, xr.Dataset):
         if "time" not in run.variables:
             raise InputError("run", ", ".join(map(str, run.variables)), "it has no time; add the times in s as time")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from proofroll.core.bounds import require_pair
 from proofroll.core.errors import InputError, require_known, told_of
 from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
@@ -194,6 +195,8 @@ def _check(where: str, file: StabilityFile) -> None:
         at = f"{where}: claims.{index}"
         if not claim.because:
             raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
+        with told_of(at):
+            parse_engine(claim.engine)
         for name in claim.axes:
             require_known(f"{at}.axes", name, known, "there is no such axis; choose from")
         for failure in claim.failure:
@@ -203,9 +206,9 @@ def _check(where: str, file: StabilityFile) -> None:
         if (claim.number is None) != (not claim.between):
             raise InputError(f"{at}.between", claim.between, "number and between = [low, high] go together")
         for name in ("between", "values"):
-            pair = getattr(claim, name)
-            if pair and (len(pair) != 2 or pair[0] > pair[1]):
-                raise InputError(f"{at}.{name}", pair, "write [low, high]")
+            if pair := getattr(claim, name):
+                require_pair(f"{at}.{name}", pair)
 
 
-strict(StabilityFile, Claim, Axis, AxisTerm)
+strict(StabilityFile, Claim, Axis)
+strict(AxisTerm, finite=True)

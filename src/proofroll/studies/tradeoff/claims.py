@@ -13,10 +13,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from proofroll.core.bounds import bounded
+from proofroll.core.bounds import bounded, require_pair
 from proofroll.core.comparison import Tolerance
 from proofroll.core.engine_abilities import Level
 from proofroll.core.errors import InputError, told_of
+from proofroll.core.plugins import parse_engine
 from proofroll.core.validation import strict, validated
 from proofroll.files.scene_file import load_scene
 from proofroll.files.toml import study_content, study_files
@@ -246,11 +247,19 @@ def _check(where: str, file: TradeoffClaims) -> None:
         raise InputError(f"{where}: cheapest", "nothing", advice)
     for kind in ("cheapest", "holds", "converges"):
         for index, claim in enumerate(getattr(file, kind)):
+            at = f"{where}: {kind}.{index}"
             if not claim.because:
-                raise InputError(f"{where}: {kind}.{index}.because", "nothing", "every claim needs its reason; add it")
+                raise InputError(f"{at}.because", "nothing", "every claim needs its reason; add it")
+            for text in claim.engine if kind == "cheapest" else [claim.engine]:
+                with told_of(at):
+                    parse_engine(text)
+            if kind == "holds":
+                bounded(f"{at}.step", claim.step, above=0)
+            if kind == "converges":
+                require_pair(f"{at}.order", claim.order)
             tolerance = getattr(claim, "tolerance", None)
             if tolerance is not None and not tolerance.relative and tolerance.unit != unit:
-                raise InputError(f"{where}: {kind}.{index}.tolerance", tolerance.unit, f"its unit is {unit}")
+                raise InputError(f"{at}.tolerance", tolerance.unit, f"its unit is {unit}")
     for name, values in file.over.items():
         for value in values:
             load_scene(file.scene, **{**file.parameters, name: value})

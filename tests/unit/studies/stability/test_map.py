@@ -406,6 +406,9 @@ BROKEN = [
     ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
     ("values = [1, 2]", "values = [1, nan]", "give a number"),
     ("values = [1, 2]", "values = [1, inf]\nhorizon = true", "positive and finite"),
+    ("speed = {}", "speed = { times = inf }", "give a finite number"),
+    ("between = [0, 1]", "between = [nan, 1]", r"\[low, high\]"),
+    ('engine = "mujoco"', 'engine = "= mass"', "claims.0: engine = '= mass': write name"),
 ]
 FILE = """
 study = "stability"

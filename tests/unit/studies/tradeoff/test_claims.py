@@ -144,15 +144,19 @@ def test_steps_and_orders_are_judged_exactly_in_a_brief_study_too(tmp_path: Path
         ("speed = [3, 5]", "haste = [3, 5]", "haste"),
         ("until = 1.0", "until = 1.0\nwheels = 4", "wheels"),
         ('scene = "sphere_in_cylinder"', 'scene = "nowhere"', "there is no such scene"),
-        (TEXT[TEXT.index("[[cheapest]]") :], "", "claims nothing"),
+        (TEXT[TEXT.index("[[cheapest]]") :] + EXACT, "", "claims nothing"),
         ('title = "A claim"', "title = A claim", "the file is broken"),
+        ("fast[formulation=only]", "= mass < 1", "cheapest.0: engine = '= mass < 1': write name"),
+        ("step = 1e-3", "step = 0", "holds.0.step = 0.0: the value must be above 0"),
+        ("order = [1.9, 2.1]", "order = [nan, 2]", r"converges.0.order = \[nan, 2.0\]: write \[low, high\]"),
     ],
 )
 def test_a_broken_file_is_one_line(tmp_path: Path, old: str, new: str, words: str) -> None:
     """Every mistake is one line that names where it is."""
-    assert old in TEXT
+    whole = TEXT + EXACT
+    assert old in whole
     with pytest.raises(InputError, match=words) as raised:
-        load_claims(written(tmp_path, TEXT.replace(old, new)))
+        load_claims(written(tmp_path, whole.replace(old, new)))
     assert "\n" not in str(raised.value)
 
 
