@@ -30,6 +30,7 @@ PLANTED = {
     "flat to nothing": (urdf(tip=ROD), "warning", "link tip", "a principal moment of zero"),
     "inertia without mass": (urdf(tip=MASSLESS), "error", "link tip", "it has inertia but no mass"),
     "nothing to move": (urdf(tip=EMPTY), "error", "joint j3", "it moves no mass"),
+    "spherical": (urdf(kinds=("spherical", "fixed", "fixed")), "warning", "joint j1", "no spherical joints"),
     "turned inertial": (urdf(tip=inertial(rpy="0.1 0 0")), "note", "link tip", "rpy together with products"),
     "axis": (urdf().replace("0 0.6 0.8", "0 0.6 0.9"), "warning", "joint j1", "its axis has length 1.08"),
     "damping": (urdf(first='<dynamics damping="1"/>'), "warning", "joints", "damping on 1 of 3"),

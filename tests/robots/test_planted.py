@@ -83,6 +83,10 @@ ARMED = """<mujoco model="m"><worldbody><body name="a" pos="0 0 1"><joint name="
 <geom type="box" size="0.1 0.2 0.3" pos="0.1 0.2 0.3"/><body name="b" pos="0.4 0 0">
 <joint name="k" axis="0 1 0"/><geom type="box" size="0.1 0.2 0.1"/></body></body></worldbody></mujoco>"""
 
+BALLS = held_by(HAND, outside=PLAIN_CLASS).replace('axis="0 1 0"', 'type="ball" pos="0.1 0 0.2" damping="0.3"')
+BALLS = BALLS.replace('axis="0 0.6 0.8"', 'type="ball"')
+BALLS_URDF = urdf(kinds=("spherical", "prismatic", "spherical"), first=DAMPED).replace("-1.5", "0")
+
 # What a file holds, the engine that reads it, and the causes that must be named.
 REAL: list[tuple[str, str, str, set[str]]] = [
     *[(f"plain arm in {name}", urdf(), name, set()) for name in ("mujoco", "pinocchio", "exudyn")],
@@ -240,6 +244,7 @@ REAL: list[tuple[str, str, str, set[str]]] = [
         "pinocchio",
         {"root_pose_dropped", "class_pose_ignored", "euler_sequence_in_small_letters"},
     ),
+    *[("ball joints", text, name, set()) for text in (BALLS, BALLS_URDF) for name in ("mujoco", "exudyn")],
     ("two joints", mjcf(second=TWO), "pinocchio", set()),
     ("two joints", mjcf(second=TWO), "mujoco", set()),
     ("free body", mjcf(extra=LOOSE), "mujoco", set()),

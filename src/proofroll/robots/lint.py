@@ -46,7 +46,7 @@ def _bodies(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
         elif body.moments[0] <= 0:
             yield "warning", where, "its inertia has a principal moment of zero; some engines refuse that"
     for joint in robot.moving:
-        if joint.kind == "free" or robot.groups[joint.name].mass:
+        if robot.groups[joint.name].mass:
             continue
         if not any(robot.welded[other.parent][0] == joint.name for other in robot.moving):
             yield "error", f"joint {joint.name}", "it moves no mass: the mass matrix is singular"
@@ -103,10 +103,12 @@ def _urdf(file: RobotFile, robot: Robot) -> Iterator[_Noticed]:
 def _urdf_joint(joint: Element) -> Iterator[_Noticed]:
     where, kind = f"joint {joint.get('name')}", joint.get("type")
     axis, limit = joint.find("axis"), joint.find("limit")
-    if axis is not None and kind != "fixed":
+    if axis is not None and kind not in {"fixed", "spherical"}:
         length = math.hypot(*numbers(axis, "xyz", "1 0 0", 3))
         if abs(length - 1) > _UNIT:
             yield "warning", where, f"its axis has length {length:.6g}, not 1"
+    if kind == "spherical":
+        yield "warning", where, "the specification has no spherical joints; few engines read them"
     if kind in {"revolute", "prismatic"} and limit is None:
         yield "warning", where, f"a {kind} joint needs <limit>; engines refuse it or take it as unlimited"
     if kind == "fixed" and joint.find("mimic") is not None:

@@ -174,9 +174,9 @@ def numbers(element: Element, attribute: str, default: str | None, count: int) -
     try:
         values = [float(part) for part in text.split()]
     except ValueError:
-        raise InputError(field, text, "write numbers") from None
+        raise InputError(field, text, "write numbers, with spaces between them") from None
     if len(values) != count:
-        raise InputError(field, text, f"write {count} number{'s' if count > 1 else ''}")
+        raise InputError(field, text, f"write {count} number{'s' if count > 1 else ''}, not {len(values)}")
     if not all(map(math.isfinite, values)):
         raise InputError(field, text, "numbers must be finite")
     return values

@@ -12,12 +12,13 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from proofroll.core.errors import InputError, choices, told_of
-from proofroll.robots.model import WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
+from proofroll.robots.model import DOFS, WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
 # What carries the root; no name in a file begins so.
 BASE_JOINT = "(base)"
-_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed"}
+# The last is no kind of the specification: Bullet and MuJoCo read it.
+_KINDS = {kind: kind for kind in ("revolute", "prismatic", "fixed", "spherical")} | {"continuous": "revolute"}
 _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
 
@@ -71,7 +72,7 @@ def read_urdf(file: RobotFile) -> Robot:
     """The robot.
 
     Raises:
-        InputError: the file breaks the specification so that it has no meaning, or holds a planar or floating joint.
+        InputError: the file breaks the specification so that it has no meaning, or has a planar or floating joint.
     """
     with told_of(str(file.path)):
         return _robot(file)
@@ -84,8 +85,12 @@ def _robot(file: RobotFile) -> Robot:
         raise InputError("file", file.path, "it has no links")
     bodies, sources = {}, {}
     for name, link in links.items():
-        bodies[name], sources[name] = _body(name, link)
-    joints = [_joint(name, element, links) for name, element in elements.items()]
+        with told_of(f"<link {name}>"):
+            bodies[name], sources[name] = _body(name, link)
+    joints = []
+    for name, element in elements.items():
+        with told_of(f"<joint {name}>"):
+            joints.append(_joint(name, element, links))
     mimics = [
         Mimic(name, mimic.get("joint", ""), *(numbers(mimic, key, value, 1)[0] for key, value in _RATIO))
         for name, element in elements.items()
@@ -130,7 +135,7 @@ def _body(name: str, link: Element) -> tuple[RobotBody, dict[str, Any]]:
     mass = inertial.find("mass")
     m = 0.0 if mass is None else numbers(mass, "value", None, 1)[0]
     if m < 0:
-        raise InputError(f"<link {name}> mass", m, "no body has a negative mass; correct it")
+        raise InputError("mass", m, "no body has a negative mass; correct it")
     written = np.zeros((3, 3))
     moments = inertial.find("inertia")
     if moments is not None:
@@ -144,20 +149,20 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
     kind = _KINDS.get(element.get("type", ""))
     if kind is None:
         known = ", ".join(_KINDS)
-        raise InputError(f"<joint {name} type>", element.get("type"), f"the check covers {known}")
+        raise InputError("type", element.get("type"), f"the check covers {known}")
     ends = {}
     for end in ("parent", "child"):
         end_element = element.find(end)
         ends[end] = "" if end_element is None else end_element.get("link", "")
         if ends[end] not in links:
-            raise InputError(f"<joint {name} {end}>", ends[end], "there is no such link")
+            raise InputError(end, ends[end], "there is no such link")
     position, rotation = _origin(element)
     axis = np.array([1.0, 0.0, 0.0])
-    if kind != "fixed" and (end_element := element.find("axis")) is not None:
+    if DOFS[kind] == 1 and (end_element := element.find("axis")) is not None:
         axis = np.array(numbers(end_element, "xyz", "1 0 0", 3))
     length = math.hypot(*axis)
     if not length:
-        raise InputError(f"<joint {name} axis>", axis.tolist(), "an axis needs a direction; give one of length 1")
+        raise InputError("axis", axis.tolist(), "an axis needs a direction; give one of length 1")
     dynamics = element.find("dynamics")
     limit = element.find("limit")
     bounded = limit is not None and element.get("type") in {"revolute", "prismatic"}

@@ -17,10 +17,11 @@ from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
 # Types of links, and their axes.
 _FREE = tuple((kind, axis) for kind in ("prismatic", "revolute") for axis in "XYZ")
+_CHAINS = {"free": _FREE, "spherical": _FREE[3:], "revolute": (("revolute", "Z"),), "prismatic": (("prismatic", "Z"),)}
 
 
 class ExudynRobots:
-    """``ObjectKinematicTree``: joints about z, a free base as three slides and three hinges (about x, y, z)."""
+    """``ObjectKinematicTree``: joints about z, a ball joint as hinges about x, y, z, a free one after slides."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     fed: ClassVar[bool] = True
@@ -71,8 +72,8 @@ class ExudynRobots:
 
 
 def _turn(joint: RobotJoint) -> Array:
-    """Axes of the tree's link in the child's frame: z is the joint's axis; of a free joint the child's own."""
-    if joint.kind == "free":
+    """Axes of the tree's link in the child's frame: z is the joint's axis; of one that turns freely the child's own."""
+    if joint.dofs > 1:
         return np.eye(3)
     return np.asarray(Rotation.align_vectors(joint.axis[None], [[0, 0, 1]])[0].as_matrix())
 
@@ -82,12 +83,10 @@ class _Tree:
 
     def __init__(self, request: Request) -> None:
         self.request, self.robot = request, request.robot
-        if any(joint.kind == "spherical" for joint in self.robot.moving):
-            raise Refused("the tree of Exudyn has no spherical joint")
         self.turn = {joint.name: _turn(joint) for joint in self.robot.moving}
         damping: Array = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
-        loose: Array = np.concatenate([np.full(joint.dofs, joint.kind == "free") for joint in self.robot.moving])
-        # Of a free joint it acts on the velocities of the body, not on the rates of the tree's angles.
+        loose: Array = np.concatenate([np.full(joint.dofs, joint.dofs > 1) for joint in self.robot.moving])
+        # Where a body turns freely it acts on its velocities, not on the rates of the tree's angles.
         self.free_damping: Array = loose * damping
         self.damping: Array = damping - self.free_damping
         self.link: dict[str, int] = {}
@@ -124,20 +123,20 @@ class _Tree:
         home, p, R = robot.welded[joint.parent]
         position, rotation = p + R @ joint.position, R @ joint.rotation @ A
         parent = -1
-        if home != WORLD:
+        if joint.kind == "free":  # its coordinates are of the world, whatever it hangs on
+            position, rotation = np.zeros(3), np.eye(3)
+        elif home != WORLD:
             parent = self.link[home]
             before = next(other for other in robot.moving if other.name == home)
             B = self.turn[home]
             position, rotation = B.T @ (position - before.child_position), B.T @ rotation
         self.link[joint.name] = start + joint.dofs - 1
-        if joint.kind != "free":
-            # the tree's rotation takes coordinates of the parent to those of the joint
-            return [((joint.kind, "Z"), parent, rotation, position, *carried)]
-        empty = (0.0, np.zeros(3), np.zeros((3, 3)))
-        return [
-            (kind, start + index - 1 if index else -1, np.eye(3), np.zeros(3), *(carried if index == 5 else empty))
-            for index, kind in enumerate(_FREE)
-        ]
+        at, empty = (parent, rotation, position), (0.0, np.zeros(3), np.zeros((3, 3)))
+        rows: list[tuple[Any, ...]] = []
+        for index, kind in enumerate(_CHAINS[joint.kind], start=start):
+            rows.append((kind, *at, *(carried if index == self.link[joint.name] else empty)))
+            at = (index, np.eye(3), np.zeros(3))
+        return rows
 
     def state(self, k: int) -> tuple[Array, Array, Array, Array]:
         """Coordinates, velocities, and their relation to the common velocity."""
@@ -146,19 +145,23 @@ class _Tree:
         velocity = np.concatenate([states.velocity[joint.name][k] for joint in self.robot.moving])
         for joint in self.robot.moving:
             columns = self.robot.columns[joint.name]
-            if joint.kind != "free":
+            if joint.dofs == 1:
                 q[columns] = states.angle[joint.name][k]
                 continue
-            angles = Rotation.from_matrix(states.rotation[joint.name][k]).as_euler("XYZ")
-            q[columns] = [*states.position[joint.name][k], *angles]
-            turned = slice(columns.start + 3, columns.stop)
+            R = states.rotation[joint.name][k]
+            turned = slice(columns.stop - 3, columns.stop)
+            q[turned] = angles = Rotation.from_matrix(R).as_euler("XYZ")
+            if joint.kind == "free":
+                q[columns.start : turned.start], R = states.position[joint.name][k], np.eye(3)
             x = np.array([1.0, 0.0, 0.0])
             y = Rotation.from_euler("X", angles[0]).apply([0.0, 1.0, 0.0])
             z = Rotation.from_euler("XY", angles[:2]).apply([0.0, 0.0, 1.0])
             inverse = np.linalg.inv(np.column_stack([x, y, z]))
-            a, b, _ = rates = inverse @ velocity[turned]
+            # the angular velocity of a free joint has the axes of the world, of a spherical one those of the child
+            T[turned, turned] = inverse @ R
+            a, b, _ = rates = T[turned, turned] @ velocity[turned]
             moving = np.column_stack([0 * x, np.cross(a * x, y), np.cross(a * x + b * y, z)]) @ rates
-            T[turned, turned], drift[turned] = inverse, -inverse @ moving
+            drift[turned] = -inverse @ moving
         return q, T @ velocity, T, drift
 
     def put(self, q: Array, v: Array, torque: Array) -> None:
