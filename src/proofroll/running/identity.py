@@ -9,6 +9,7 @@ import inspect
 import platform
 import sys
 from collections.abc import Iterable, Sequence
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from proofroll.core.source_code import OWN, hash_of, package_of, with_imports
 from proofroll.core.truth import load_truths
 from proofroll.files.json_data import plain
 from proofroll.running.case import EngineDescription, EngineFacts
+from proofroll.running.manifest import version_of
 from proofroll.running.program import path_of
 
 # Folders on which every result rests; reports and the command line are not among them.
@@ -61,8 +63,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     if engine == "truth":
         if options:
             raise InputError("truth", ", ".join(options), "the truth has no settings; leave them out")
-        code = digest(sorted({place for truth in load_truths() for place in _of(truth)}))
-        return dataclasses.asdict(EngineFacts("truth", truth_version(), code, {}))
+        return dataclasses.asdict(EngineFacts("truth", truth_version(), _code_of(*load_truths()), {}))
     from proofroll.core.engine import precision_of, scheme_of
     from proofroll.core.engine_abilities import LowersOrder, SharesEquations, TellsCaveats, laws
     from proofroll.core.plugins import resolve_settings
@@ -73,7 +74,7 @@ def resolve(engine: str, options: dict[str, Any], requires: Sequence[str] = ()) 
     facts = EngineFacts(
         name=engine,
         version=kind.version(),
-        code=digest(_of(kind)),
+        code=_code_of(kind),
         settings=used(settings),
         resolution=settings.resolution,
         order=settings.order,
@@ -99,7 +100,7 @@ def truth_version() -> str:
     versions_of = [f"proofroll {proofroll.__version__}"]
     for name in ("numpy", "scipy", "heyoka"):
         with contextlib.suppress(metadata.PackageNotFoundError):
-            versions_of.append(f"{name} {metadata.version(name)}")
+            versions_of.append(f"{name} {version_of(name)}")
     return ", ".join(versions_of)
 
 
@@ -113,7 +114,7 @@ def libraries(engine: str) -> dict[str, str]:
         return {"program": hashlib.sha256(program.read_bytes()).hexdigest()[:12]}
     versions = {"python": platform.python_version()}
     for name in ("numpy", "scipy"):
-        versions[name] = metadata.version(name)
+        versions[name] = version_of(name)
     if place_of(engine):
         packages = sorted({f"{item.name}=={item.version}" for item in metadata.distributions()})
         versions["packages"] = hashlib.sha256("\n".join(packages).encode()).hexdigest()[:12]
@@ -126,6 +127,19 @@ def digest(sources: Iterable[Path]) -> str:
     What only shows results (:data:`ASIDE`), as the bug reports of an adapter do, is left out.
     """
     return hash_of([*(OWN / name for name in FOUNDATION), *sources], ASIDE)
+
+
+def _code_of(*kinds: Any) -> str:
+    """Digest of engines or truths."""
+    return _code_of_ours(*kinds) if {package_of(kind) for kind in kinds} == {OWN} else _digest_of(*kinds)
+
+
+def _digest_of(*kinds: Any) -> str:
+    return digest(sorted({place for kind in kinds for place in _of(kind)}))
+
+
+# To read it all takes as long as a short run; a process has this package's own code as it was when it loaded it.
+_code_of_ours = cache(_digest_of)
 
 
 def _of(kind: Any) -> list[Path]:

@@ -18,11 +18,11 @@ from proofroll.core.scene import Scene
 def versions(engine: str, version: str) -> dict[str, str]:
     """Versions of the engine, of proofroll, Python, numpy and scipy."""
     own = {"proofroll": proofroll.__version__, "python": platform.python_version()}
-    return {engine: version} | own | {name: _version(name) for name in ("numpy", "scipy")}
+    return {engine: version} | own | {name: version_of(name) for name in ("numpy", "scipy")}
 
 
 # Of a package that is installed; to read it takes a millisecond, and every run tells it.
-_version = cache(metadata.version)
+version_of = cache(metadata.version)
 
 
 def manifest(

@@ -145,6 +145,13 @@ def test_what_a_plug_in_of_one_file_imports_decides_its_key(tmp_path: Path, monk
     assert identity.resolve("theirs", {})["code"] == codes[-1]
 
 
+def test_own_code_is_read_once_in_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Engines and truths of this package are resolved hundreds of times by one reading of its code."""
+    first = [identity.resolve(name, {})["code"] for name in ("projection", "truth")]
+    monkeypatch.setattr(identity, "digest", lambda _: pytest.fail("read again"))
+    assert [identity.resolve(name, {})["code"] for name in ("projection", "truth")] == first
+
+
 def test_a_program_for_a_bug_report_outdates_no_result(tmp_path: Path) -> None:
     """An adapter's digest changes with its code, but not with that which only writes reproducers."""
     package = tmp_path / "adapter"
