@@ -46,8 +46,8 @@ def commands(text: str) -> list[tuple[list[str], int]]:
     return found
 
 
-# Makes what a command does take less long.
-SHORTER = {"recommend": ["--until", "0.05"], "ladder": ["--rounds", "2"]}
+# Makes what a command does take less long; programs of findings are run by tests/unit/studies/test_findings.py.
+SHORTER = {"recommend": ["--until", "0.05"], "ladder": ["--rounds", "2"], "findings": ["--list"]}
 
 
 # What these commands do on a cluster is run by tests/unit/running/test_cluster.py and tests/test_versions.py.
