@@ -19,7 +19,6 @@ def cite(
     as_json: options.Json = False,
 ) -> None:
     """Print the references behind a result: engines with their versions, the scene, the truth, and proofroll itself."""
-    from proofroll.report.terminal.screen import printable
     from proofroll.studies.citing import cited, content, sentence
 
     told = cited(subject or [])
@@ -37,4 +36,7 @@ def cite(
         lines += [item.heading, *([f"  {item.source}"] if item.source else [])]
         lines += [f"  {sentence(entry)}" for entry in item.references]
         lines += [] if item.references or item.source else ["  no reference is known; see its own documentation"]
-    sys.stdout.write("".join(f"{printable(line) if not bibtex else line}\n" for line in lines))
+    if bibtex:
+        sys.stdout.write("".join(f"{line}\n" for line in lines))
+    else:
+        options.show_lines(lines)

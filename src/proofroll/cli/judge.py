@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
@@ -49,7 +48,7 @@ def judge(
     if as_json:
         options.write_json(judged.content())
     else:
-        sys.stdout.write(f"{judged}\n")
+        options.show_lines(str(judged).splitlines())
     raise typer.Exit(options.OK if judged.agrees else options.CONTRADICTED)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,13 +33,15 @@ def scenes(
     options.show(content, as_json, lambda: _titles(files) if name is None else _tables(files))
 
 
-def _titles(files: Mapping[str, SceneFile]) -> Iterator[Table | str]:
-    from rich.table import Table
+_LINE = 80  # characters
 
-    table = Table.grid(padding=(0, 2))
+
+def _titles(files: Mapping[str, SceneFile]) -> Iterator[str]:
+    """A line for each scene; of a title that is longer its beginning."""
+    wide = max(map(len, files))
     for name, file in files.items():
-        table.add_row(name, file.title)
-    yield table
+        line = f"{name:{wide}}  {file.title}"
+        yield line if len(line) <= _LINE else re.split("[,:]", line)[0]
     yield "proofroll scenes NAME lists the parameters of one."
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -218,6 +219,17 @@ def show(
     out.width = min(out.width, widest or out.width)
     for part in parts():
         out.print(part)
+
+
+def show_lines(lines: Iterable[str]) -> None:
+    """Lines on the terminal, within its width: the rest of a line that is longer is indented by two more."""
+    from proofroll.report.terminal.tables import console
+
+    out = console()
+    for line in lines:
+        indent = " " * (len(line) - len(line.lstrip()) + 2)
+        parts = textwrap.wrap(line, out.width, subsequent_indent=indent, break_on_hyphens=False, break_long_words=False)
+        out.print("\n".join(parts))
 
 
 def require_pages() -> None:

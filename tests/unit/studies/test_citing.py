@@ -62,6 +62,15 @@ def test_a_file_that_is_no_result(text: str, tmp_path: Path) -> None:
         cited([str(path)])
 
 
+def test_a_narrow_terminal(proofroll: Proofroll, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Citations keep to the width of the terminal; the rest of one stands under it, indented."""
+    monkeypatch.setenv("COLUMNS", "80")
+    code, out, _ = proofroll("cite", "pinocchio")
+    assert code == 0
+    assert max(map(len, out.splitlines())) <= 80
+    assert "\n    " in out
+
+
 def test_nothing_of_the_name(proofroll: Proofroll) -> None:
     """A word that is neither a scene, a comparison, an engine nor a file is wrong usage, in one line."""
     code, out, err = proofroll("cite", "no_such_thing")
