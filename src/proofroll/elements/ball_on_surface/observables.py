@@ -302,8 +302,8 @@ def _off_grid(dataset: xr.Dataset) -> tuple[dict[str, FloatArray], FloatArray]:
         return {}, np.zeros(0)
     t, between = dataset["time"].to_numpy(), dataset[BETWEEN].to_numpy()
     inside = (between > t[ENDS]) & (between < t[-1 - ENDS])
-    values = {name: item.to_numpy()[inside] for name, item in dataset.items() if item.dims[:1] == (BETWEEN,)}
-    return {str(name).removeprefix(f"{BETWEEN}."): item for name, item in values.items()}, between[inside]
+    few = {str(name): item for name, item in dataset.variables.items() if item.dims[:1] == (BETWEEN,)}
+    return {name.removeprefix(f"{BETWEEN}."): item.values[inside] for name, item in few.items()}, between[inside]
 
 
 def _turning_apart(t: FloatArray, q_WB: FloatArray, w_WB: FloatArray) -> FloatArray:

@@ -53,15 +53,15 @@ def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[Float
     own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
     if own not in dataset or own not in reference.dataset:
         return None
-    times, known = dataset[BETWEEN].to_numpy(), reference.dataset[BETWEEN].to_numpy()
-    grid = reference.dataset["time"].to_numpy()
-    happened = [event.time for run in (dataset, reference.dataset) for event in reference.events_of(run)]
+    run, truth = dataset.variables, reference.dataset.variables  # of items xarray makes new arrays
+    times, known, grid = run[BETWEEN].values, truth[BETWEEN].values, truth["time"].values
+    happened = [event.time for one in (dataset, reference.dataset) for event in reference.events_of(one)]
     alone = ~np.isin(np.searchsorted(grid, times), np.searchsorted(grid, happened))
     both = np.isin(times, known) & alone & (times < grid[-1])
-    values, true = dataset[own].to_numpy()[both], reference.dataset[own].to_numpy()[np.isin(known, times[both])]
+    values, true = run[own].values[both], truth[own].values[np.isin(known, times[both])]
     if item is not None and item.role is Role.RESIDUAL:
         return values, np.zeros_like(values)
-    if dataset[own].dims[-1:] == ("wxyz",):
+    if run[own].dims[-1:] == ("wxyz",):
         values = turned_alike(values, true)
     turned = on_turns_of(true, values, name, (dataset, reference.dataset))
     said = np.isfinite(true)
