@@ -9,7 +9,7 @@ import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 from proofroll.ball_studies import regimes as regimes_study
 from proofroll.core import comparison
@@ -18,6 +18,8 @@ from proofroll.elements.ball_on_surface import model as balls
 from proofroll.elements.ball_on_surface.surfaces import surface_kinds
 from proofroll.elements.mechanism import model as mechanisms
 from proofroll.elements.mechanism.contacts import geometry as contacts
+from proofroll.elements.mechanism.drives import ActuatorKind
+from proofroll.elements.mechanism.joint import Kind
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.scene_parameters import Parameter
 from proofroll.studies.stability import axes
@@ -61,7 +63,7 @@ CHAPTERS: dict[str, tuple[Table, ...]] = {
         Table("[[couplings]]", mechanisms.Coupling),
     ),
     "A comparison: `comparisons/*.toml` without `study`": (
-        Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget")),
+        Table("", comparison.Comparison, ("name", "vary", "brief", "bands", "rows", "left_out", "budget", "spent")),
         Table("[[rows]]", comparison.Row, ("except_at",)),
         Table("[[rows.except_at]]", comparison.ExceptAt),
     ),
@@ -160,10 +162,11 @@ def _type(annotation: Any) -> str:
         "Vector | None": "[x, y, z]",
         "Inertia": "3×3 or [Ixx, Iyy, Izz]",
         "Numbers": "number or list",
-        "Kind": "kind of joint",
+        "Kind": " or ".join(get_args(Kind)),
         "Tolerance": '"1e-3 m" or "1 %"',
         "float | Formula | Table": "number, formula of t, or table",
-        "ActuatorKind": "torque or velocity or position",
+        "GeometryKind": " or ".join(get_args(contacts.GeometryKind)),
+        "ActuatorKind": " or ".join(get_args(ActuatorKind)),
     }
     text = re.sub(r"Literal\[([^]]*)\]", lambda found: found[1].replace(", ", " or "), text)
     text = re.sub(r"\b(?:tuple|list)\[", "[", re.sub(r"\bstr\b", "text", text)).replace("FloatOrInf", "float")

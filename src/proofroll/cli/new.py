@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 new = typer.Typer(help="Write a working start: a scene, a comparison, or an engine.", no_args_is_help=True)
 Name = Annotated[str, typer.Argument(help="Its name: letters, digits and _; the folder or file is named so.")]
 _TEMPLATES = Path(__file__).parent / "templates"
-_UNTIL, _EVERY = 1.0, 0.02
 _ANOTHER = "choose another name"
 # For --for: the example that the engine begins as, the name of its class, a scene that it runs, what it does.
 _EXAMPLES = {
@@ -130,18 +129,20 @@ def _say(path: Path, *commands: str) -> None:
 
 def _comparison(name: str, where: str, loaded: Scene) -> str:
     """Text of a comparison file: each engine that can run the scene, held to one percent of what moves."""
-    from proofroll.studies.comparison.default_comparison import able, bounds
+    from proofroll.files.scene_file import read_scene_file
+    from proofroll.studies.comparison.default_comparison import able, bounds, times_of
 
+    until, every = times_of(read_scene_file(where))
     lines = (
         f'{_quoted(key)} = "{100 * item.value:g} %"\n'
         if item.relative
         else f'{_quoted(key)} = "{item.value:g} {item.unit}"\n'
-        for key, item in bounds(loaded, _EVERY).items()
+        for key, item in bounds(loaded, every).items()
     )
     rows = "".join(f'\n[[rows]]\nengine = "{text}"\ntolerance = "close"\n' for text in able(loaded, first=True))
     return (
         f'title = "{name}"\nquestion = "Which engines agree with the truth?"\nscene = {_quoted(where)}\n'
-        f"until = {_UNTIL}\nevery = {_EVERY}\n\n"
+        f"until = {until:g}\nevery = {every:g}\n\n"
         "# Every combination of these values is run: [vary], then parameter = [value, value].\n\n"
         "# How far an observable may be from the truth, and why. Every key is described in docs/vocabulary.md.\n"
         f'[tolerances.close]\nbecause = "a first look; say here why this is close enough"\n'

@@ -32,6 +32,8 @@ _WORDS = {
     "dataclass": "give a table of names and values",
 }
 
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
 
 def strict(*types: type, finite: bool = False) -> None:
     """Makes unknown keys of these dataclasses an error, with ``finite`` also inf and NaN, for pydantic."""
@@ -108,10 +110,11 @@ def _first_problem(
     error: ValidationError, where: str, kind: type, content: Mapping[str, Any], own: Iterable[str]
 ) -> InputError:
     """One line about the first thing that pydantic found wrong in ``where``."""
-    problem = error.errors()[0]
+    # A misspelt key is told rather than the one that lacks then.
+    problem = min(error.errors(), key=lambda one: one["type"] not in _UNKNOWN)
     absent = problem["type"] in {"missing", "missing_argument"} and not isinstance(problem["loc"][-1], int)
     location = ".".join(_place(problem["loc"], content) + [str(part) for part in problem["loc"][-1:]] * absent)
-    if problem["type"] in {"unexpected_keyword_argument", "extra_forbidden"}:
+    if problem["type"] in _UNKNOWN:
         return no_such_key(f"{where}: {location}", problem["input"], _keys(kind, problem["loc"][:-1], own))
     if absent:
         return InputError(f"{where}: {location}", "nothing", "this key is required; add it")

@@ -177,10 +177,6 @@ def load_scene(name: str, /, *, asks: Any = (), **parameters: float) -> Scene:
 def _elements(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> tuple[Element, ...]:
     """Elements of the tables of a file, each read by its kind of element."""
     kinds = load_element_kinds()
-    known = [name for kind in kinds for name in kind.tables]
-    for name in tables:
-        if name not in known:
-            raise no_such_key(f"{where}: {name}", tables[name], [*sorted(_OWN), *known])
     elements: list[Element] = []
     for kind, own in zip(kinds, _of_each([kind.tables for kind in kinds], tables, where), strict=True):
         if own:
@@ -229,6 +225,10 @@ def _checked(content: Mapping[str, Any], path: Path) -> SceneFile:
     """The content of a file with all that can be said without the values of parameters."""
     own = {key: value for key, value in content.items() if key in _OWN}
     tables = {key: value for key, value in content.items() if key not in _OWN}
+    known = [name for kind in load_element_kinds() for name in kind.tables]
+    for name, table in tables.items():
+        if name not in known:
+            raise no_such_key(f"{path}: {name}", table, [*sorted(_OWN), *known])
     file = validated(SceneFile, own, str(path), tables=tables)
     for name in ("duration", "dt"):
         value = getattr(file, name)

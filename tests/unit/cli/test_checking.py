@@ -61,6 +61,7 @@ def test_what_is_sound_fits_the_terminal(proofroll: Proofroll, monkeypatch: pyte
         ),
         ("bricard", ("", ""), ["degrees of freedom: 1", "of which 1 follow from the others"]),
         ("double_pendulum", ("", ""), ["degrees of freedom: 2\n"]),
+        ("cradle", ("", ""), ["gaps of pairs: hit 0.1 m, "]),
     ],
 )
 def test_how_a_scene_starts(

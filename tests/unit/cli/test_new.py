@@ -41,11 +41,15 @@ def test_a_comparison(
     """A new comparison is sound, of balls and of mechanisms, and has a row for each engine that can."""
     install_engines({"absent": "no_such_module_anywhere:Engine"})
     assert command_line("new", "scene", "rod")[0] == 0
+    text = Path("rod/scene.toml").read_text(encoding="utf-8")
+    Path("rod/scene.toml").write_text(f"duration = 0.8\n{text}", encoding="utf-8")
     assert command_line("new", "comparison", "claim", "--scene", scene)[0] == 0
     code, out, err = command_line("check", "claim.toml")
     assert (code, err) == (0, "")
     assert out.startswith("claim is sound: comparison, ")
-    names = {row.engine.partition("[")[0] for row in load_comparison("claim.toml").rows}
+    comparison = load_comparison("claim.toml")
+    assert comparison.until == (0.8 if scene == "./rod" else 1.0)  # as long as the scene says
+    names = {row.engine.partition("[")[0] for row in comparison.rows}
     assert {"projection", "mujoco", "exudyn", "pinocchio"} <= names
     assert "absent" not in names
     assert ("reduced" in names) == (scene == "inclined_plane")  # it has no equations of a rod

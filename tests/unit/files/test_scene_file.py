@@ -165,7 +165,8 @@ def test_a_scene_outside_models(edited: Callable[[str, str], str]) -> None:
     [
         ("[gravity]", "[gravity", ["broken", "line"]),
         ("[gravity]", "[gravity]\nmagnitud = 3", ["magnitud", "no such key"]),
-        ("[gravity]", "[gravitation]", ["gravity", "required"]),
+        ("title =", "titel =", ["titel", "no such key"]),
+        ("[gravity]", "[gravitation]", ["gravitation", "no such key", "gravity"]),
         ('kind = "cylinder"', 'kind = "nowhere"', ["surfaces", "cylinder", "plane"]),
         ('kind = "cylinder"', "", ["surfaces.0.kind", "'nothing'"]),
         ('radius = "$radius"', 'radius = "wide"', ["balls.0.radius", "'wide'", "number"]),

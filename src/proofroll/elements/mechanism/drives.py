@@ -28,13 +28,13 @@ MODES = ("least", "linear", "greatest")  # of an effort with a limit
 class Actuator:
     """A motor at a joint with one coordinate, through a gear: the motor's coordinate is n q.
 
-    Its effort at the joint, with the target r of the motor, is n r (``torque``), n kd (r - n dq/dt) (``velocity``) or
-    n (kp (r - n q) - kd n dq/dt) (``position``); then ``limit`` clamps all of it.
+    ``limit`` clamps its whole effort at the joint.
 
     Attributes:
         name: unique among actuators.
         joint: a revolute or prismatic joint.
-        kind: what its target is.
+        kind: what its target r is. Effort at the joint: n r (torque), n kd (r - n dq/dt) (velocity), n (kp (r - n q) -
+            kd n dq/dt) (position), with n the gear.
         target: of the motor; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
         kp: gain of a position [N m/rad, N/m, at the motor].
         kd: gain of a velocity [N m s/rad, N s/m, at the motor].

@@ -122,7 +122,8 @@ class Joint:
       child's axes.
 
     Attributes:
-        name, kind: a unique name; one of :data:`FACTS`.
+        name: unique among joints and loops.
+        kind: what its two bodies can do against each other.
         parent, child: names of bodies; the parent may be ``world``.
         position: of the joint in the parent's frame [m].
         orientation: roll, pitch, yaw (fixed axes x, y, z) of the child's frame against the parent's at q = 0 [rad].

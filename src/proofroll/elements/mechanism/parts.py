@@ -48,7 +48,8 @@ class Loop:
     Its wrench is that on ``body_b``, as a joint's is that on its child.
 
     Attributes:
-        name, kind: as for joints; any kind but free.
+        name: unique among joints and loops.
+        kind: what the loop holds, as a joint of that kind does; any but free.
         body_a, body_b: names of bodies, or ``world``.
         position_a, position_b: the point of each body that the loop holds together, in its frame [m].
         axis_a, axis_b: axis in the frame of each body; revolute, planar: parallel; universal: perpendicular;

@@ -142,6 +142,10 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
                     raise no_such_key(key, given[key], ("times", "values"))
             filled = {key: numbers.filled(given.get(key, []), key, {}) for key in ("times", "values")}
             return Table(**filled)
+        if isinstance(given, str) and not given.startswith(("=", "$")):
+            raise InputError(
+                field, given, "give a number, a formula that begins with =, or a table of times and values"
+            )
     except InputError as error:
         inside = "" if error.field in {"formula", field} else f".{error.field}"
         raise InputError(f"{field}{inside}", error.value, error.advice) from None

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from proofroll.core.number_format import place
+from proofroll.elements.mechanism.contacts.start import touches
+from proofroll.elements.mechanism.kinematics import Tree
 
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
@@ -17,7 +19,7 @@ _MOST = 8
 
 
 def start_facts(element: MechanismElement) -> Sequence[str]:
-    """Degrees of freedom, what the loops repeat, a singular pose, and where the bodies are."""
+    """Degrees of freedom, what the loops repeat, a singular pose, where the bodies are, and how far what may touch."""
     found, mechanism = element.analysis, element.mechanism
     said = [f"degrees of freedom: {found.mobility}"]
     if found.rows:
@@ -32,4 +34,7 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
         said.append(f"{body.name}: centre of mass at {place(centre)} m, speed {speed:.4g} m/s")
     if more := len(mechanism.bodies) - _MOST:
         said += [f"and {more} more bodies"] if more > 0 else []
+    touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))
+    gaps = [f"{pair.name} {each.gap:.4g} m" for pair, each in zip(mechanism.contacts, touching, strict=True)]
+    said += [f"gaps of pairs: {', '.join(gaps)}"] if gaps else []
     return said

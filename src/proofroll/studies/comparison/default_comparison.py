@@ -14,7 +14,7 @@ from proofroll.core.observable import Role
 from proofroll.core.plugins import engine_names, parse_engine
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Verdict
-from proofroll.files.scene_file import load_scene, read_scene_file
+from proofroll.files.scene_file import SceneFile, load_scene, read_scene_file
 from proofroll.running.asking import described, resolve
 from proofroll.running.case import EngineDescription, EngineFacts
 from proofroll.running.process import processor_seconds
@@ -43,8 +43,7 @@ def compared(
     """
     before = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
-    duration = file.duration or _UNTIL
-    every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
+    until, every = times_of(file)
     engines = _stepped(able(scene, workers), file.dt, workers)
     rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in engines]
     if not rows:
@@ -54,7 +53,7 @@ def compared(
         title=file.title,
         question=f"Which engines agree with the truth? {file.reason}".strip(),
         scene=name,
-        until=every * max(1, int(duration / every + 1e-9)),
+        until=until,
         every=every,
         vary={key: [scene.parameters[key]] for key in parameters},
         bands={_CLOSE: Band("one per cent is what an eye sees of a motion: a first look", bounds(scene, every))},
@@ -62,6 +61,13 @@ def compared(
         budget=budget,
         spent=processor_seconds() - before,
     )
+
+
+def times_of(file: SceneFile) -> tuple[float, float]:
+    """Last time and interval between samples of a first comparison of a scene [s]."""
+    duration = file.duration or _UNTIL
+    every = _STEP * max(1, round(duration / _SAMPLES / _STEP))
+    return every * max(1, int(duration / every + 1e-9)), every
 
 
 def _stepped(engines: Sequence[str], dt: float | None, workers: Workers | None) -> list[str]:

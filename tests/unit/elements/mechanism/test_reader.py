@@ -265,6 +265,10 @@ BAD = {
         SLIDER_CRANK.replace("mass = 0.6", 'mass = "heavy"'),
         "bodies.2.mass = 'heavy': this is not a number; give one in kg",
     ),
+    "formula of time without =": (
+        SLIDER_CRANK.replace("q0 = 0.5", 'q0 = 0.5\ntorque = "0.3*sin(t)"', 1),
+        "joints.0.torque = .*: give a number, a formula that begins with =, or a table",
+    ),
     "ragged list": (SLIDER_CRANK.replace("q0 = 0.5", "q0 = [1, [2], 3]"), r"joints.0.q0.1 = \[2\]: give a number"),
     "number beyond all bounds": (SLIDER_CRANK.replace("[1e-3,", f"[{10**400},"), "bodies.2.inertia.0.*give a number"),
     "nan": (SLIDER_CRANK.replace("mass = 0.6", "mass = nan"), "bodies.slider.mass.*finite"),

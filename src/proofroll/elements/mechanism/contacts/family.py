@@ -12,7 +12,7 @@ class Family(StrEnum):
     """Law of contact that a model has, which steps that get shorter do not change."""
 
     HARD = "hard contact by Coulomb's law"
-    CONVEX = "contact by a convex cone, whose sliding parts"
+    CONVEX = "contact by a convex cone, where sliding contacts open"
     PYRAMID = "contact by a pyramid of friction"
     ANISOTROPIC = "contact by an anisotropic cone of friction"
     SOFTENED = "softened contact"

@@ -42,7 +42,7 @@ class Geometry:
     Attributes:
         name: unique among geometries.
         body: that it is fixed to, or ``world``.
-        kind: a box touches with its eight vertices.
+        kind: a box touches with its eight vertices; a plane goes with any other kind, a sphere with a sphere.
         position: of its centre, or of any point of a plane, in the body's frame [m].
         orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
         radius: of a sphere or circle; a sphere of radius 0 is a vertex [m].
