@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -145,16 +146,18 @@ class StoredTrajectory:
 
     file: Path
     _held: ClassVar[deque[tuple[weakref.ref[StoredTrajectory], int]]] = deque()
+    _one_at_a_time: ClassVar[Lock] = Lock()
 
     @cached_property
     def dataset(self) -> xr.Dataset:
         """The trajectory; raises as :func:`read` does. What was read longest ago makes room for it."""
         made = read(self.file)
-        self._held.append((weakref.ref(self), made.nbytes))
-        while sum(size for _, size in self._held) > MOST_HELD and len(self._held) > 1:
-            oldest = self._held.popleft()[0]()
-            if oldest is not None:
-                vars(oldest).pop("dataset", None)
+        with self._one_at_a_time:
+            self._held.append((weakref.ref(self), made.nbytes))
+            while sum(size for _, size in self._held) > MOST_HELD and len(self._held) > 1:
+                oldest = self._held.popleft()[0]()
+                if oldest is not None:
+                    vars(oldest).pop("dataset", None)
         return made
 
     @property

@@ -165,3 +165,12 @@ def test_feet_that_hold_together_share_their_friction() -> None:
     run.advance(0.01)
     assert run.events() == ()
     assert np.abs(run.sample().v_WB).max() < 1e-9
+
+
+def test_a_ball_that_hardly_falls_comes_to_rest() -> None:
+    """Rebounds from a tenth of a nanometre are few: the last ones are summed, as those of any fall are."""
+    scene = load_scene("spinning_bounce", height=0.05 + 1e-10, restitution=0.5)
+    run = PROJECTION.build(scene, replace(DEFAULT, dt=2e-3))
+    run.advance(0.01)
+    impacts = [event.kind for event in run.events()].count("impact")
+    assert 1 < impacts < 10

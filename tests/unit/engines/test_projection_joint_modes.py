@@ -80,6 +80,13 @@ def test_a_mass_falls_on_a_stop(restitution):
     assert run.events()[0].time == pytest.approx(fall, abs=1e-11)
 
 
+def test_a_mass_that_hardly_falls_comes_to_rest():
+    """Rebounds from the height of a file's last digits are summed, as are the last ones of any fall."""
+    run = runs.build("dependent", slider(q0=(1e-12,), limits=(0.0, 2.0), restitution=0.5))
+    run.advance(0.1)
+    assert [event.kind for event in run.events()] == ["impact", "impact"]
+
+
 def test_a_joint_that_is_held_feels_the_others():
     """The first of two rods is held while the second swings, until what that asks of its friction is too much."""
     rod = {"mass": 1.0, "com": (0.0, -0.5, 0.0), "inertia": (1 / 12, 0.001, 1 / 12)}

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import sys
 import zipfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -156,3 +158,18 @@ def test_what_was_read_longest_ago_makes_room(tmp_path: Path, monkeypatch: pytes
     assert [("dataset" in vars(run)) for run in runs] == [False, False, True, True]
     assert runs[0].dataset.identical(first)
     assert runs[0].dataset is runs[0].dataset
+
+
+def test_several_threads_may_hold_trajectories(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each gets what it asks for, while others make room."""
+    made = ALL_KINDS.copy()
+    monkeypatch.setattr("proofroll.files.trajectory_file.read", lambda _: made)
+    monkeypatch.setattr("proofroll.files.trajectory_file.MOST_HELD", 50 * made.nbytes)
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-6)
+    try:
+        with ThreadPoolExecutor(4) as pool:
+            runs = [StoredTrajectory(tmp_path / str(number)) for number in range(300)]
+            assert all(found is made for found in pool.map(lambda run: run.dataset, runs))
+    finally:
+        sys.setswitchinterval(interval)

@@ -165,6 +165,7 @@ def test_a_stop_that_is_never_reached_changes_nothing() -> None:
     ("more", "said"),
     [
         ({"limits": (1.0, 2.0)}, "joints.j.q0 = 0.0: the joint starts beyond a stop; its limits are 1 and 2"),
+        ({"limits": (0.0, 1e-6), "q0": (-5e-10,)}, "joints.j.q0 = -5e-10: the joint starts beyond a stop"),
         ({"limits": (1.0, -1.0)}, "joints.j.limits"),
         ({"limits": (-1.0, 1.0), "restitution": 1.5}, "joints.j.restitution = 1.5: no impact returns more"),
         ({"restitution": 0.5}, "joints.j.restitution = 0.5: there is no stop without limits"),

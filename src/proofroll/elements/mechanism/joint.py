@@ -79,7 +79,7 @@ LAWS: dict[str, tuple[str, ...]] = {
     "torque": ("revolute", "prismatic"),
     "armature": ("revolute", "prismatic"),
 }
-AT_STOP = 1e-9  # rad or m: digits of a file, by which a joint may start beyond its stop
+AT_STOP = 1e-9  # of the way between stops: digits of a file, by which a joint may start beyond one
 _LENGTHS, _SPEEDS = ("m", "m", "m"), ("m/s", "m/s", "m/s")
 _ABOUT: dict[str, dict[str, Unit]] = {
     "q": {"spherical": "1", "planar": ("m", "m", "rad"), "free": (*_LENGTHS, "1", "1", "1", "1")},
@@ -197,7 +197,8 @@ class Joint:
                     f"{place}.limits", self.limits, "give [least, greatest] of a joint with one coordinate"
                 )
             checks.assign(self, limits=(low, high))
-            if not low - AT_STOP <= self.q0[0] <= high + AT_STOP:
+            digits = AT_STOP * (high - low)
+            if not low - digits <= self.q0[0] <= high + digits:
                 advice = f"the joint starts beyond a stop; its limits are {low:g} and {high:g}"
                 raise InputError(f"{place}.q0", self.q0[0], advice)
         self._check_restitution(place)

@@ -66,6 +66,21 @@ class SwitchedJoint:
         return {"forward": -self.friction, "backward": self.friction}.get(mode, 0.0)
 
 
+class Settling:
+    """Impacts on each stop or contact so far."""
+
+    def __init__(self) -> None:
+        self._fastest: dict[int, float] = {}
+
+    def __call__(self, which: int, speed: float, restitution: float) -> bool:
+        """True if of the rebounds after an impact only the time is summed.
+
+        Speeds are in natural units: the first, too, may come from a fall that is hardly more than round-off.
+        """
+        fastest = self._fastest[which] = max(speed, self._fastest.get(which, 1.0))
+        return 0.0 < restitution < 1.0 and speed < SETTLED * fastest
+
+
 def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
     """The joints of a mechanism that have dry friction or limits.
 

@@ -77,7 +77,8 @@ class JointRows:
         """
         along = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
-        closed = {item.joint.number for item in self.stops if item.gap(q) <= AT_STOP}
+        ways = ((item, item.joint.high - item.joint.low) for item in self.stops)
+        closed = {item.joint.number for item, way in ways if item.gap(q) <= AT_STOP * way}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
             if item.limit is None or item.joint.number in closed:
                 total[item.joint.number] += item.sign * float(size)

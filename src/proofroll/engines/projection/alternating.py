@@ -17,6 +17,7 @@ from proofroll.core.events import Event
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.elements.mechanism.switches import Settling
 from proofroll.engines.projection.dependent import DependentCoordinates
 
 ModeT = TypeVar("ModeT")
@@ -76,7 +77,7 @@ class AlternatingMotion(ABC, Generic[ModeT]):
     ) -> None:
         """Takes what puts x back on its constraints after a step, and times at which rates jump [s]."""
         self._equations, self._stepper, self._accept, self._breaks = equations, stepper, accept, breaks
-        self._fastest: dict[int, float] = {}  # impact of each joint or contact, m/s or rad/s
+        self._settles = Settling()
         self._idle, self.events = 0, list[Event]()
 
     @property

@@ -8,6 +8,7 @@ alike is no news, that both move alike in between is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -20,11 +21,10 @@ from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
-from proofroll.elements.mechanism.contacts.start import closed_and_still, scale_of
+from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale, scale_of
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import SETTLED
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
@@ -68,6 +68,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
         scale = scale_of(mechanism)
+        self._unit = math.prod(natural_scale(mechanism))  # a natural speed
         self._still = scale.speed
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
@@ -272,7 +273,7 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         speed, e = -c[3 * which.index(hit)], self.contacts[hit].restitution
-        if speed < SETTLED * self._fastest.setdefault(hit, speed):
+        if self._settles(hit, speed / self._unit, e):
             e = 0.0
         c[3 * which.index(hit)] *= 1 + e
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))

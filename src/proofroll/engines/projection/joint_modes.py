@@ -12,13 +12,14 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from proofroll.core.errors import Refused
+from proofroll.core.errors import NotUnique, Refused
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
+from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import HOLDING, SETTLED, STOPPED, Mode, changes, held_by, switched_joints
+from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, switched_joints
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 
@@ -44,6 +45,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         super().__init__(equations, stepper, lambda t, x: accept(t, x, self._held), breaks(mechanism.signals))
         self._joints = switched_joints(mechanism)
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
+        scale = natural_scale(mechanism)
+        slides = [mechanism.joints[joint.number].kind == "prismatic" for joint in self._joints]
+        self._units = [scale.rate * (scale.length if slide else 1.0) for slide in slides]  # natural speeds
         self.mode: Mode = ("free",) * len(self._joints)
         start = np.append(equations.start, 0.0)
         q, v = self._joint_state(start)
@@ -134,7 +138,9 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         low, high = np.where(below, 0.0, -np.inf), np.where(below, np.inf, 0.0)
         impulse, side = _bounded((1 + elastic) * v[at_stop], response[at], low, high)
         if np.count_nonzero(impulse) > 1 and elastic.any():
-            raise Refused("an impact presses several stops at once: with restitution its outcome hangs on their order")
+            raise NotUnique(
+                "an impact presses several stops at once: with restitution its outcome hangs on their order"
+            )
         change = np.asarray(response @ impulse)
         v += change[[joint.velocity for joint in self._joints]]
         for k, free, e in zip(at_stop, side, elastic, strict=True):
@@ -190,7 +196,7 @@ class SwitchedMotion(AlternatingMotion[Mode]):
         else:
             q[k] = joint.low if kind == "low" else joint.high
             change = self._struck(y, q, v, k)
-            if abs(speed) < SETTLED * self._fastest.setdefault(k, abs(speed)):
+            if self._settles(k, abs(speed) / self._units[k], joint.restitution):
                 v[k], change[at] = 0.0, -speed
         y = np.append(self._equations.pushed(self._at(y), change), y[-1])
         return y, self._decided(y, q, v)

@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from proofroll.core.errors import Diverged, Refused
-from proofroll.elements.mechanism.contacts.start import extent
+from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.joint import Joint
-from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.record import Record
@@ -166,20 +164,10 @@ class Units(NamedTuple):
 
 
 def natural_units(mechanism: Mechanism) -> Units:
-    """Units near the mechanism's own size, mass and time: that of gravity or of its first motion, the faster one."""
-    found = JointCoordinates(mechanism).solve(*mechanism.start())
-    motion, rates = found.motion, found.motion.J @ found.acceleration + found.motion.bias
-    ways = [abs(way) for joint in mechanism.joints if joint.kind == "prismatic" for way in (*joint.q0, joint.rest)]
-    radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
-    length = max([extent(mechanism, motion), *ways, *radii]) or 1.0
-    pulls = _largest(mechanism.gravity) / length, _largest(rates[:, :3]) / length, _largest(rates[:, 3:])
-    rate = max(np.sqrt(max(pulls)), _largest(motion.v_WB) / length, _largest(motion.w_WB)) or 1.0
+    """Units near the mechanism's own size, mass and time, see :func:`.natural_scale`."""
+    length, rate = natural_scale(mechanism)
     mass = sum(body.mass for body in mechanism.bodies)
-    return Units(*(2.0 ** round(np.log2(size)) for size in (length, mass, 1 / rate)))
-
-
-def _largest(values: ArrayLike) -> float:
-    return float(np.max(np.abs(values), initial=0.0))
+    return Units(length, 2.0 ** round(np.log2(mass)), 1 / rate)
 
 
 def _times(value: Any, factor: float) -> Any:

@@ -12,7 +12,7 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.record import integrated
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import SETTLED
+from proofroll.elements.mechanism.switches import Settling
 from proofroll.truth.hybrid import Stretch, walked
 
 ModeT = TypeVar("ModeT")
@@ -40,20 +40,12 @@ class Stretches(ABC, Generic[ModeT]):
     def __init__(self, size: int, tolerance: float) -> None:
         """Takes the length of a state, and the tolerance of each step."""
         self._tolerance = np.full(size, tolerance)
-        self._fastest: dict[int, float] = {}  # impact on each stop or contact, m/s or rad/s
+        self._settles = Settling()
         self._span: float | None = None
 
     @abstractmethod
     def _law(self, state: Array, mode: ModeT) -> StretchLaw:
         """Equations of a stretch that begins at a state."""
-
-    def _settles(self, which: int, speed: float, restitution: float) -> bool:
-        """True if of the rebounds after an impact only the time is summed.
-
-        Speeds are in natural units: the first, too, may come from a fall that is hardly more than round-off.
-        """
-        fastest = self._fastest[which] = max(speed, self._fastest.get(which, 1.0))
-        return 0.0 < restitution < 1.0 and speed < SETTLED * fastest
 
     @staticmethod
     def _bouncing(rebound: float, pull: float, restitution: float) -> float:

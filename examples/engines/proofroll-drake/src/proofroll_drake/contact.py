@@ -68,7 +68,7 @@ class DrakeContacts:
         sunk = dict.fromkeys(self._shapes, 0.0)
         for pair, force, each in zip(mechanism.pairs, start.force, start.state.touching, strict=False):
             round_ = next(name for name in pair.geometries if self._shapes[name].kind != "plane")
-            sunk[round_] = max(0.0, float(force @ each.normal)) / STIFFNESS
+            sunk[round_] = max(sunk[round_], float(force @ each.normal) / STIFFNESS)
         friction = mechanism.pairs[0].friction
         self._ids = {
             name: plant.RegisterCollisionGeometry(

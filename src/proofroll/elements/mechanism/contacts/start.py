@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import InputError
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 
@@ -58,6 +60,25 @@ class Scale(NamedTuple):
     def speed(self) -> float:
         """Largest speed of what stands [m/s]."""
         return STILL * self.length * self.rate
+
+
+def natural_scale(mechanism: Mechanism) -> Scale:
+    """Length of a mechanism with its ways, and its rate: that of gravity or of its first motion, the faster one.
+
+    They are powers of two, so that a change of units rounds nothing.
+    """
+    found = JointCoordinates(mechanism).solve(*mechanism.start())
+    motion, rates = found.motion, found.motion.J @ found.acceleration + found.motion.bias
+    ways = [abs(way) for joint in mechanism.joints if joint.kind == "prismatic" for way in (*joint.q0, joint.rest)]
+    radii = [np.sqrt(np.trace(body.inertia) / body.mass) for body in mechanism.bodies if body.mass]
+    length = max([extent(mechanism, motion), *ways, *radii]) or 1.0
+    pulls = _largest(mechanism.gravity) / length, _largest(rates[:, :3]) / length, _largest(rates[:, 3:])
+    rate = max(np.sqrt(max(pulls)), _largest(motion.v_WB) / length, _largest(motion.w_WB)) or 1.0
+    return Scale(*(2.0 ** round(np.log2(size)) for size in (length, rate)))
+
+
+def _largest(values: ArrayLike) -> float:
+    return float(np.max(np.abs(values), initial=0.0))
 
 
 def scale_of(mechanism: Mechanism, motion: BodyMotion | None = None) -> Scale:

@@ -78,8 +78,9 @@ def _on_plane(shape: ConvexShape, own: Moving, plane: HalfSpace, other: Moving) 
 def _two_spheres(one: SphereShape, a: Moving, two: SphereShape, b: Moving) -> _Lying:
     centre_a, centre_b = a.p + a.R @ one.centre, b.p + b.R @ two.centre
     d, d_rate = centre_a - centre_b, a.velocity(centre_a) - b.velocity(centre_b)
-    length = float(np.linalg.norm(d))
+    distance = float(np.linalg.norm(d))
+    length = distance or 1.0  # a trial step may lay one centre on the other, where the normal is zero
     n = d / length
     n_rate = (d_rate - n * (n @ d_rate)) / length
     place, rate = centre_a - one.radius * n, a.velocity(centre_a) - one.radius * n_rate
-    return length - one.radius - two.radius, n, n_rate, place, rate
+    return distance - one.radius - two.radius, n, n_rate, place, rate

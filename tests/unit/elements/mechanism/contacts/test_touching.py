@@ -39,6 +39,15 @@ def some_shape(kind: str, rng: np.random.Generator) -> Any:
     }[kind]()
 
 
+def test_balls_with_one_centre_have_numbers() -> None:
+    """A trial step may lay a ball on the other: the gap is known there, and nothing is NaN, for all that they move."""
+    ball, origin = SphereShape(np.zeros(3), 0.2), np.zeros(3)
+    a, b = (Moving(origin, np.eye(3), speed, origin) for speed in (origin, np.array([1.0, 0.0, 0.0])))
+    found = touch(BodyContact("c", "a", "b", ball, ball, 0.0, 0.0), a, b)
+    assert found.gap == -0.4
+    assert all(np.isfinite(part).all() for part in found)
+
+
 @pytest.mark.parametrize(
     "pair", ["ball plane", "plane ball", "vertex plane", "ellipsoid plane", "disc plane", "plane disc", "ball ball"]
 )
