@@ -7,17 +7,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
-from proofroll.core.dataset import part
+from proofroll.core.arrays import FloatArray, largest_difference
+from proofroll.core.dataset import BETWEEN, part
 from proofroll.core.element_abilities import ExplainsErrors
 from proofroll.core.events import events_of
 from proofroll.core.scene import Scene
 from proofroll.running.case import Result, Status
 from proofroll.running.recording import noticed
+from proofroll.studies.judging import held_against
+from proofroll.studies.judging.reference import Reference
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,6 +103,17 @@ class Yardstick:
         true = truth[name].to_numpy()
         return cls(scene, truth, name, true, float(np.max(np.ptp(true, axis=0))) or 1.0)
 
+    @cached_property
+    def _reference(self) -> Reference:
+        assert self.truth is not None  # else nothing asks
+        return Reference.of(self.scene, self.truth)
+
+    def off_grid(self, dataset: xr.Dataset) -> float:
+        """Largest error between the samples, where run and truth say anything there, in parts of the range."""
+        known = self.truth is not None and BETWEEN in dataset and BETWEEN in self.truth
+        both = held_against.between(self._reference, self.name, dataset) if known else None
+        return 0.0 if both is None else largest_difference(*both) / self.scale
+
 
 def run_outcome(result: Result, dataset: xr.Dataset | None, yardstick: Yardstick) -> RunOutcome:
     """Outcome of a run from its end and its trajectory, held against the yardstick of its place."""
@@ -148,14 +162,19 @@ def _failed(
 
 
 def _errors(dataset: xr.Dataset, yardstick: Yardstick) -> FloatArray | None:
-    """Error of the deciding observable at each sample, the largest component in parts of its range."""
+    """Error of the deciding observable at each sample, the largest component in parts of its range.
+
+    An error off the grid counts at the last of them.
+    """
     if yardstick.true is None:
         return None
     values = dataset[yardstick.name].to_numpy()
     with np.errstate(over="ignore", invalid="ignore"):
         errors = np.abs(values - yardstick.true[: len(values)]) / yardstick.scale
-    finite = np.where(np.isfinite(errors), errors, np.inf)
-    return np.asarray(finite.reshape(len(finite), -1).max(axis=1))
+        off_grid = yardstick.off_grid(dataset)
+    finite = np.where(np.isfinite(errors), errors, np.inf).reshape(len(errors), -1).max(axis=1)
+    finite[-1:] = np.maximum(finite[-1:], off_grid)
+    return np.asarray(finite)
 
 
 def _first(dataset: xr.Dataset, yardstick: Yardstick, errors: FloatArray | None) -> tuple[str, float] | None:

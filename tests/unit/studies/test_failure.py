@@ -84,6 +84,16 @@ def test_a_bad_run_that_says_it_is_done(dataset: Callable[[], Any], failure: str
     assert (outcome.failure, outcome.stable, outcome.accurate, outcome.silent) == (failure, stable, False, True)
 
 
+def test_what_is_wrong_between_the_samples_is_seen() -> None:
+    """A run that is right on the grid alone holds nothing."""
+    known = truth(SCENE, TIMES, between=TIMES[:-1] + 0.4 * np.diff(TIMES))
+    liar, yardstick = known.copy(deep=True), Yardstick.of(SCENE, known)
+    assert run_outcome(DONE, known, yardstick).accurate
+    liar[f"between.{SCENE.deciding}"] += 0.05 * yardstick.scale
+    outcome = run_outcome(DONE, liar, yardstick)
+    assert (outcome.stable, outcome.accurate, outcome.error) == (True, False, pytest.approx(0.05))
+
+
 def test_what_came_first() -> None:
     """Of two failures the earlier one counts, for the later may be its consequence."""
     later = (np.arange(len(TIMES)) >= 18)[:, None]

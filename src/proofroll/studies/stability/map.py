@@ -20,14 +20,11 @@ from proofroll.running.runner import Runner
 from proofroll.studies.failure import TOO_SLOW, RunOutcome, run_outcome
 from proofroll.studies.stability.axes import Axis, Effort
 from proofroll.studies.stability.bisection import SearchResult, search
-from proofroll.studies.stability.places import PER_PERIOD, Place, case_at, measure, places_of
+from proofroll.studies.stability.places import Place, case_at, measure, places_of
 from proofroll.studies.stability.records import MappedPlace
 from proofroll.studies.tradeoff.curve import Curve
 from proofroll.studies.tradeoff.sweep import curves_of
 
-# Parts into which a sampling interval is divided, about two per octave.
-_FINEST = 17
-_PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << power))]
 _TOLERANCES = [10.0**-power for power in range(1, 14)]
 # Rungs skipped on the way down: a factor of four in the step, three decades of tolerance.
 _STRIDE = {"dt": 4, "rtol": 3}
@@ -158,9 +155,7 @@ def _matched(curves: Sequence[Curve]) -> list[Curve]:
 
 
 def _ladder(curve: Curve, place: Place) -> list[float]:
-    if not curve.fixed_step:
-        return list(_TOLERANCES)
-    return [place.scene.natural_time / PER_PERIOD / part for part in _PARTS]
+    return place.steps if curve.fixed_step else list(_TOLERANCES)
 
 
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:

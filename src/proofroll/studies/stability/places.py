@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from proofroll.core.errors import ProofrollError
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
+from proofroll.core.time_grid import off_grids, time_grid
 from proofroll.files.scene_file import load_scene
 from proofroll.files.trajectory_file import read
 from proofroll.running.asking import resolve_with_truth
@@ -20,6 +21,9 @@ from proofroll.studies.tradeoff.curve import Question
 
 # Sampling intervals per natural time; the coarsest step is one of them, the finer ones divide it.
 PER_PERIOD = 8
+# Parts into which that interval is divided, about two per octave.
+_FINEST = 17
+_PARTS = [1, *(part for power in range(_FINEST) for part in (2 << power, 3 << power))]
 # More samples than these are not kept of a long run: the interval becomes an odd number of the above, so that the
 # samples still visit all phases of an oscillation.
 _MOST_SAMPLES = 400
@@ -47,6 +51,11 @@ class Place:
     yardstick: Yardstick = field(init=False)
     problem: str | None = None
 
+    @property
+    def steps(self) -> list[float]:
+        """Fixed steps that are tried, coarse first [s]."""
+        return [self.scene.natural_time / PER_PERIOD / part for part in _PARTS]
+
 
 def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | MappedPlace]:
     """Every value of every axis, without the truth yet; mapped is one that has no scene, with the reason."""
@@ -73,7 +82,13 @@ def places_of(name: str, axes: Sequence[Axis], effort: Effort) -> list[Place | M
 def measure(name: str, places: Sequence[Place], runner: Runner, tell: Callable[[], None]) -> None:
     """The truth of every place, or why there is none."""
     _, facts = resolve_with_truth([], runner.workers)
-    cases = [case_at(name, place, facts, STUDY_TIME_LIMIT) for place in places]
+    cases = [
+        replace(
+            case_at(name, place, facts, STUDY_TIME_LIMIT),
+            between=off_grids(time_grid(place.until, place.every), [None, *place.steps]),
+        )
+        for place in places
+    ]
     results = runner.run(cases, lambda *_: tell())
     for place, case in zip(places, cases, strict=True):
         result = results[case.key]
