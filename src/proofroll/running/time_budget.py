@@ -14,16 +14,19 @@ from proofroll.running.process import processor_seconds
 _OF_CASES = 0.9
 # A case with less time than it takes to start a process is not begun [s].
 _LEAST = 0.5
+# Share of a group, as far as there is so much [s]: a truth and the first runs. Fifty shares of less end no truth, and
+# the same command would begin the same ones again; so the first groups get it, and the others when it goes on.
+_SHARE = 10.0
 
 
 class TimeBudget:
     """Processor time of the cases of one study; what it does not suffice for is left out.
 
-    Cases belong to groups, as the comparisons of a report. A group that begins may take an equal share of what is left
-    among the groups that wait; what it does not take is for those after it. A case may take what is left of its group's
-    share, divided by the cases of the group that run side by side, and no more than is left in all divided by all that
-    do: so all together never take more, however long each of them does. A case that was ended begins again with more
-    time alone.
+    Cases belong to groups, as the comparisons of a report. A group that begins may take an equal share of what is
+    left among the groups that wait, but at least what a truth needs; what it does not take is for those after it. A
+    case may take what is left of its group's share, divided by the cases of the group that run side by side, and no
+    more than is left in all divided by all that do: so all together never take more, however long each of them does.
+    A case that was ended begins again with more time alone.
 
     Args:
         seconds: of processor time, that of this process included [s].
@@ -73,7 +76,7 @@ class TimeBudget:
         group = self._group.get(case, 0)
         with self._lock:
             left = self._left()
-            share = self._shares.setdefault(group, left / len(self._unfinished))
+            share = self._shares.setdefault(group, max(left / len(self._unfinished), min(_SHARE, left)))
             others = [key for key in self._begun if self._group.get(key, 0) == group]
             share -= self._used[group] + sum(self._begun[key][1] for key in others)
             together = min(abreast, self._unfinished[group]) - len(others)

@@ -73,6 +73,22 @@ def test_each_group_has_an_equal_share(monkeypatch: pytest.MonkeyPatch) -> None:
         budget.end(f"b{number}")
 
 
+def test_what_is_too_little_for_all_groups_is_for_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fifty groups with a second each would end no truth; the first have what one needs, and others are left out."""
+    used = 0.0
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: used)
+    names = [f"a{number}" for number in range(50)]
+    budget = TimeBudget(50.0, group={name: number for number, name in enumerate(names)})
+    for name in names:
+        budget.wait(name)
+    given = []
+    for name in names:
+        given.append(budget.begin(name, 1))
+        used += given[-1]
+        budget.end(name, given[-1])
+    assert given == pytest.approx([10.0] * 4 + [5.0] + [0.0] * 45)
+
+
 @pytest.mark.parametrize("abreast", [2, 8])
 def test_cases_that_run_side_by_side_have_no_more_than_their_group(
     abreast: int, monkeypatch: pytest.MonkeyPatch
