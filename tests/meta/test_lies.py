@@ -25,7 +25,6 @@ from proofroll.core.multi_element import build
 from proofroll.core.observable import Role
 from proofroll.core.plugins import resolve_settings
 from proofroll.core.scene import Scene
-from proofroll.core.truth import truth
 from proofroll.core.verdict import Judgement, LimitResult, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.running.case import Result, Status
@@ -34,6 +33,7 @@ from proofroll.running.simulation import simulate
 from proofroll.running.time_case import clean_runs
 from proofroll.studies.comparison.default_comparison import bounds
 from proofroll.studies.judging import held_against
+from proofroll.studies.judging import judge as judging
 from proofroll.studies.judging.judge import judge as judge_run
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import CurvePoint, measured
@@ -103,16 +103,10 @@ def _causes(
     return tuple(item.sentence for item in diagnosed(scene, lines, run, _true(scene, run), step, judgements))
 
 
-_TRUTHS: dict[tuple[str, bytes], Any] = {}
-
-
 def _true(scene: Scene, run: Any) -> Any:
-    """The truth at the times of a run."""
+    """The truth at the times of a run, as its judge has computed it."""
     times, between = run["time"].to_numpy(), run[BETWEEN].to_numpy() if BETWEEN in run else np.zeros(0)
-    key = scene.digest, times.tobytes() + between.tobytes()
-    if key not in _TRUTHS:
-        _TRUTHS[key] = truth(scene, times, between=between)
-    return _TRUTHS[key]
+    return judging._truth(scene.fully_asked if "q_WB" in run else scene, times, between)
 
 
 @cache
