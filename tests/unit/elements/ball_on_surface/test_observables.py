@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from functools import reduce
+from functools import cache, reduce
 from itertools import accumulate
 
 import numpy as np
@@ -104,8 +104,7 @@ def test_rate_audit_sees_a_velocity_of_its_own(case: tuple[Scene, xr.Dataset]) -
 
 def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
     """What is zero at every sample of the grid, and nowhere else, shows at the samples off it."""
-    scene = load_scene("sphere_in_cylinder")
-    dataset = off_the_grid(scene)
+    scene, dataset = off_the_grid()
 
     def with_beat(size: float) -> xr.Dataset:
         beat = xr.zeros_like(dataset["between.p_WB"])
@@ -116,8 +115,10 @@ def test_rate_audit_sees_an_error_with_the_period_of_the_grid() -> None:
     assert largest(rate_audit(rolling_ball(scene), with_beat(1e-5))) > 1e-5 / 0.005 / 2
 
 
-def off_the_grid(scene: Scene) -> xr.Dataset:
-    """A right run with its orientation, sampled on the grid and at a few times off it."""
+@cache
+def off_the_grid() -> tuple[Scene, xr.Dataset]:
+    """A scene and a right run with its orientation, sampled on the grid and at a few times off it."""
+    scene = load_scene("sphere_in_cylinder")
     body, between = rolling_ball(scene), off_grid(TIMES, None)
     times = np.union1d(TIMES, between)
     motion = reduced(body, times)
@@ -128,7 +129,7 @@ def off_the_grid(scene: Scene) -> xr.Dataset:
 
     q = orientation(spin, times, (), QUATERNIONS)
     made = columns(body, times, motion.p_WB, motion.v_WB, motion.w_WB, force=motion.force, q_WB=q)
-    return off_grid_apart(scene, made, TIMES, between).dataset()
+    return scene, off_grid_apart(scene, made, TIMES, between).dataset()
 
 
 LIES: dict[str, tuple[str, Callable[[xr.DataArray], xr.DataArray]]] = {
@@ -142,8 +143,7 @@ LIES: dict[str, tuple[str, Callable[[xr.DataArray], xr.DataArray]]] = {
 @pytest.mark.parametrize("name", LIES)
 def test_audits_see_what_is_wrong_off_the_grid_alone(name: str) -> None:
     """Spin, orientation, force and speed that are right at every sample of the grid are looked at off it, too."""
-    scene = load_scene("sphere_in_cylinder")
-    right, (audit, lie) = off_the_grid(scene), LIES[name]
+    (scene, right), (audit, lie) = off_the_grid(), LIES[name]
     assert right.sizes["between"] == 8
     wrong = right.assign({f"between.{name}": lie(right[f"between.{name}"])})
     before, after = (largest(observe(scene, run)[audit]) for run in (right, wrong))
