@@ -20,7 +20,7 @@ from proofroll.report.comparison.plots import point_curves
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.comparison.sentences import conclusions
 from proofroll.report.comparison.summary import outcome_content
-from proofroll.report.comparison.verdict_matrix import counted, overview
+from proofroll.report.comparison.verdict_matrix import Cell, counted, overview
 from proofroll.report.labels import SYMBOLS, detail, verdict_text
 from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, choice_matrix
 from proofroll.report.page.first_sentences import three_sentences
@@ -43,6 +43,14 @@ def answered(run: Run, error: float = 0.0, limit: Limit | None = None, **changes
     item = judge_curve("z", "m", TRUE + error, TRUE, truth_error_bar=1e-12, tolerance=1e-3, scale=1.0, limit=limit)
     done = Result(Status.DONE, "done", trajectory=run.result.trajectory)
     return dataclasses.replace(run, result=done, judgements=[item], contradictions=[], **{"missing": []} | changes)
+
+
+def test_another_number_of_events_has_no_bar() -> None:
+    """A run with an event too many has an error without end, and a limit that no bar is said of."""
+    times, true = np.array([0.1, 0.2, 0.3]), np.array([0.1, 0.2])
+    limit = Limit(times, 9e-13, 1.0)
+    item = judge_curve("event_times", "s", times, true, truth_error_bar=0.0, tolerance=1e-3, scale=1.0, limit=limit)
+    assert Cell(item, "").title.endswith("error ∞ ± 0 s, tolerance 1e-3; another limit")
 
 
 def with_runs(outcome: Outcome, runs: Mapping[int, list[Run]]) -> Outcome:

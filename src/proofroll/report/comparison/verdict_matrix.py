@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from proofroll.core.number_format import counted as told
@@ -32,8 +33,11 @@ class Cell:
             said += f" at {self.point}"
         if judgement.limit_error_bar is None:
             return said
+        said += f"; {judgement.limit}"
+        if judgement.limit_error == math.inf:  # it has another number of events
+            return said
         off = f"{error(judgement.limit_error)} ± {error(judgement.limit_error_bar, 1)}"
-        return f"{said}; {judgement.limit}: off by {off}, order {number(judgement.order)}"
+        return f"{said}: off by {off}, order {number(judgement.order)}"
 
 
 @dataclass(frozen=True)
