@@ -15,6 +15,7 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.dop853 import controlled_step, corrected_by, go_on_from, integrated_to, located, solver_from
 from proofroll.core.errors import Diverged, Refused
+from proofroll.core.number_format import number
 
 State = FloatArray
 ModeT = TypeVar("ModeT")
@@ -25,6 +26,8 @@ _STUCK = 50
 # Stretches shorter than this part of the time that has passed, after which it makes none either unless they have shrunk
 # to this part of what they were: rebounds shrink by e each, 400 by a tenth for every e up to 0.9997.
 _SHORT, _MANY, _SHRUNK = 1e-6, 400, 0.9
+# Stretches after which those to come are counted if they do not shrink; and the most of a path: a minute of work.
+_LOOK, _MOST = 100, 1000
 
 
 @dataclass(frozen=True)
@@ -179,11 +182,30 @@ def follow(
         try:
             if still > _STUCK or short > _MANY:
                 raise Diverged(f"the truth makes no progress at t = {leg.end:g} s, where its modes alternate at once")
+            if short == 1:
+                _refuse_many(legs, until)
             time, change = leg.end, route.change(leg)
         except (Diverged, Refused):
             if min(margin for _, margin in margins) < close:
                 return HybridPath(tuple(legs), tuple(happenings), tuple(margins), known=False)
             raise
+
+
+def _refuse_many(legs: Sequence[Span], until: float) -> None:
+    """Refuses a motion whose modes change thousands of times, as soon as it can be seen.
+
+    Raises:
+        Diverged: they do, by what the last stretches lasted.
+    """
+    if len(legs) % _LOOK:
+        return
+    start, middle, end = legs[-_LOOK].start, legs[-_LOOK // 2].start, legs[-1].end
+    ahead = (until - end) * _LOOK / (end - start) if end > start else np.inf
+    if len(legs) + ahead > _MOST and end - middle > _SHRUNK * (middle - start):
+        raise Diverged(
+            f"by t = {end:g} s there have been {len(legs)} changes, some {number(ahead, 1)} are to come, "
+            f"and the truth follows {_MOST}"
+        )
 
 
 def walked(

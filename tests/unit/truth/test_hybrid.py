@@ -64,6 +64,30 @@ def test_a_route_that_alternates_without_progress_is_told(length: float) -> None
         follow(Alternating(), 1.0)
 
 
+def test_thousands_of_rebounds_are_refused_as_soon_as_they_are_seen() -> None:
+    """Without any loss a fall from hardly anything would be followed for minutes: it is told after a hundred."""
+
+    class Lossless:
+        count, length = 0, 1e-4
+
+        def begin(self) -> Transition[str]:
+            return Transition(np.zeros(1), "flight", (), np.inf)
+
+        def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+            self.count += 1
+            return Stretch(time, min(time + self.length, until), mode, state, state, 0)
+
+        def change(self, leg: Stretch[str]) -> Transition[str]:
+            return Transition(leg.last, "flight", (), np.inf)
+
+    route = Lossless()
+    with pytest.raises(
+        Diverged, match=r"there have been 100 changes, some 1e4 are to come, and the truth follows 1000"
+    ):
+        follow(route, 1.0)
+    assert route.count == 100
+
+
 def test_rebounds_that_shrink_by_a_hundredth_make_progress() -> None:
     """Stretches that shrink are followed however many there are."""
 
