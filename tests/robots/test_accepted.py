@@ -30,6 +30,7 @@ def test_accepted_causes(proofroll: Proofroll, damped: Path) -> None:
     asked = ("check", str(damped), "--engine", "pinocchio", "--states", "2")
     assert proofroll(*asked)[0] == 1
     assert proofroll(*asked, "--accept", "damping_left_out")[0] == 1
+    assert proofroll(*asked, "--accept", "damping_left_out", "--accept", "friction_left_out")[0] == 0
     code, out, _ = proofroll(*asked, "--accept", "damping_left_out, friction_left_out", "--json")
     (row,) = json.loads(out)["engines"]
     assert code == 0

@@ -33,8 +33,8 @@ def check(
         typer.Option("--map", help="With --against: joint=joint where names differ, or a TOML file of pairs; repeat."),
     ] = None,
     accept: Annotated[
-        str | None,
-        typer.Option(help="Causes of differences that are no news, with commas: damping_left_out,friction_left_out."),
+        list[str] | None,
+        typer.Option(help="Causes of differences that are no news: damping_left_out,friction_left_out; or repeat."),
     ] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw a scene at its start to this page (.html).")] = None,
     as_json: options.Json = False,
@@ -59,7 +59,7 @@ def check(
         if names:
             raise InputError("--map", ", ".join(names), "this is for two files; name the other by --against FILE")
         with options.progress_bar("engines") as advance:
-            accepted = [name.strip() for name in (accept or "").split(",") if name.strip()]
+            accepted = [name.strip() for name in ",".join(accept or ()).split(",") if name.strip()]
             content = checked(file, engine or (), accept=accepted, progress=advance, **how)
     else:
         from proofroll.robots.against import against as held_against
