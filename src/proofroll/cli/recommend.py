@@ -166,7 +166,7 @@ def _stored_study(
     from proofroll.studies.tradeoff.tradeoff import restricted, stored
 
     reasons: list[str] = []
-    for path in (stored(out, question), *restricted(out, question)):
+    for path in (stored(out, question), *restricted(out, question), stored(out, question, brief=True)):
         study, changes = kept(path, TradeoffStudy)
         if study is not None and not covers(study.engines, engines):
             changes = [f"what is stored is of {', '.join(study.engines)}; choose among these with --engine"]

@@ -37,6 +37,7 @@ def tradeoff(
     ] = None,
     over: Over = None,
     until: Until = None,
+    budget: options.Budget = None,
     every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
     out: options.Out = Path("out"),
     fresh: options.Fresh = False,
@@ -44,7 +45,10 @@ def tradeoff(
     scheduler: options.Scheduler = None,
     as_json: options.Json = False,
 ) -> None:
-    """Measure error against cost for every engine, formulation and setting, from coarse to fine."""
+    """Measure error against cost for every engine, formulation and setting, from coarse to fine.
+
+    With all engines on a scene that no file asks about it is brief, and drops what --budget does not suffice for.
+    """
     from proofroll.report.tradeoff.tables import default_quantities, tradeoff_parts
     from proofroll.report.tradeoff.work_precision import svg
     from proofroll.running.store import write_text
@@ -54,7 +58,8 @@ def tradeoff(
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
     if not as_json:
         options.require_pages()
-    study, path = measure(question, engine or [], ranges, claims, options.new_runner(out, fresh, jobs, scheduler), out)
+    runner = options.new_runner(out, fresh, jobs, scheduler)
+    study, path = measure(question, engine or [], ranges, claims, runner, out, budget)
     shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
     if not as_json:
         write_text(path.with_suffix(".svg"), svg(study, shown))
@@ -119,9 +124,15 @@ def measure(
     claims: TradeoffClaims | None,
     runner: Runner,
     out: Path,
+    budget: float | None = None,
 ) -> tuple[TradeoffStudy, Path]:
     """Measures and keeps the curves that a recommendation can be made from, with a progress bar."""
+    from proofroll.studies.comparison.default_comparison import BUDGET
     from proofroll.studies.tradeoff.study import make_tradeoff
 
+    seconds = budget or (None if claims or engines or runner.cluster else BUDGET)
+
     with options.progress_bar("runs and timings") as advance:
-        return make_tradeoff(question, runner, out, engines=engines, over=over, claims=claims, progress=advance)
+        return make_tradeoff(
+            question, runner, out, engines=engines, over=over, claims=claims, budget=seconds, progress=advance
+        )

@@ -75,14 +75,16 @@ def interleaved(
     rounds: int = ROUNDS,
     progress: Callable[[str], None] | None = None,
     once_above: float = np.inf,
+    enough: Callable[[], bool] = lambda: False,
 ) -> dict[str, Timing]:
-    """Every task once per round, each round in another order; the first round only warms up.
+    """Every task once per round, each round in another order; the first of several only warms up.
 
     Args:
         tasks: measure something once and give seconds, or None where it cannot be measured: it is then left out.
         rounds: how many rounds count.
         progress: called with a task's name after each of its measurements.
         once_above: what takes longer than this in the first round [s] is measured no more, and that value counts.
+        enough: asked after each round; true ends the measurement.
     """
     order = random.Random(0)
     seconds_of: dict[str, list[float]] = {name: [] for name in tasks}
@@ -100,7 +102,12 @@ def interleaved(
                 seconds_of[name].append(seconds)
                 if len(seconds_of[name]) == 1 and seconds > once_above:
                     once[name] = Timing((seconds,))
-    return {name: once.get(name) or Timing(tuple(values[1:]), tuple(values[:1])) for name, values in seconds_of.items()}
+        if enough():
+            break
+    return {
+        name: once.get(name) or (Timing(tuple(values[1:]), tuple(values[:1])) if values[1:] else Timing(tuple(values)))
+        for name, values in seconds_of.items()
+    }
 
 
 def ratio(numerator: Timing, denominator: Timing) -> Interval:

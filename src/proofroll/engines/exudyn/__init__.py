@@ -57,6 +57,9 @@ _ROLLS_AT_REST: Mapping[str, str] = {
 _WITH_FRAMES = {"carrier", *OF_MECHANISMS}
 
 
+_SWITCHES = (MechanismCapability.JOINT_FRICTION, MechanismCapability.STOPS, MechanismCapability.SATURATION)
+
+
 class Exudyn:
     """Exudyn's implicit integration of multibody systems with constraints, or with its penalty contact."""
 
@@ -127,6 +130,11 @@ class Exudyn:
         return "Exudyn's adaptive step, which it has on by default, is off, so that the step is the one given"
 
     family = staticmethod(spheres.family)
+
+    @staticmethod
+    def lowered(_: ExudynSettings) -> Mapping[str, int]:
+        """See :class:`proofroll.core.engine_abilities.LowersOrder`; a joint may begin to slip anywhere in a step."""
+        return dict.fromkeys(_SWITCHES, 1)
 
     @staticmethod
     def version() -> str:

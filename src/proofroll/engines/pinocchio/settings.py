@@ -12,6 +12,7 @@ from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.engine import Scheme
 from proofroll.core.errors import refuse_first
 from proofroll.elements.ball_on_surface.model import BallCapability
+from proofroll.elements.mechanism.capabilities import MechanismCapability
 
 _ORDERS = {"semi_implicit_euler": 1, "midpoint": 1, "leapfrog": 2, "rk4": 2, "rk4_dexpinv": 4}
 _SCHEMES = {
@@ -141,7 +142,13 @@ class PinocchioSettings:
 
 def lowered(settings: PinocchioSettings) -> Mapping[str, int]:
     """See :class:`proofroll.core.engine_abilities.LowersOrder`."""
-    return {BallCapability.ORIENTATION: _ORDERS["rk4"]} if settings.integrator == "rk4" else {}
+    if settings.integrator != "rk4":
+        return {}
+    return (
+        {MechanismCapability.SATURATION: 1}
+        if settings.formulation in OF_MECHANISMS
+        else {BallCapability.ORIENTATION: _ORDERS["rk4"]}
+    )
 
 
 # Of 1e-12 to 1e-5 any gave accelerations to 1e-13; without it, dependent rows give NaN.

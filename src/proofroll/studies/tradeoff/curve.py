@@ -12,6 +12,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray, largest_difference
 from proofroll.core.convergence import is_floor
+from proofroll.core.dataset import BETWEEN
 from proofroll.core.limits import STUDY_TIME_LIMIT
 from proofroll.core.scene import Scene
 from proofroll.core.time_grid import off_grids, time_grid
@@ -82,13 +83,18 @@ class Question:
         adaptive = facts.resolution not in {None, "dt"}
         return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
 
-    def truths(self, scene: Scene, facts: EngineFacts, runs: Collection[Case]) -> dict[float, Case]:
-        """Cases of the truth by sampling interval, known wherever the runs are sampled."""
-        steps: dict[float, list[float | None]] = {self.every: []}
-        for run in runs:
-            steps.setdefault(run.every, []).append(run.engine.step)
-        off_grid = {every: off_grids(time_grid(self.until, every), those) for every, those in steps.items()}
-        return {every: replace(self.case(scene, facts, every), between=times) for every, times in off_grid.items()}
+    def truth(self, scene: Scene, facts: EngineFacts, runs: Collection[Case]) -> Case:
+        """Case of the truth, known wherever the runs are sampled."""
+        steps = [run.engine.step for run in runs if run.every == self.every]
+        return replace(self.case(scene, facts, self.every), between=off_grids(time_grid(self.until, self.every), steps))
+
+    def reference(self, scene: Scene, truth: xr.Dataset, every: float) -> Reference:
+        """The truth at a sampling interval [s], from that at the shortest one, which has all its times."""
+        if every != self.every:
+            known, times = truth["time"].to_numpy(), time_grid(self.until, every)
+            places = np.abs(known[:, None] - times).argmin(axis=0)
+            truth = truth.drop_dims(BETWEEN, errors="ignore").isel(time=places)
+        return Reference.of(scene, truth)
 
 
 @dataclass

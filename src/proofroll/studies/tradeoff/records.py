@@ -151,7 +151,7 @@ class CurveBudget:
         order_from, order_to: coarsest and finest step of the runs that follow that power law [s]; outside them the
             order is not claimed.
         declared: order that the engine declares.
-        contradicts_declaration: whether that lies outside the interval of the observed one.
+        contradicts_declaration: whether that lies above the interval of the observed one.
         floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
         best_step: step of the most accurate run where finer ones are worse, for they round more often in single
             precision [s]; None: there is none.

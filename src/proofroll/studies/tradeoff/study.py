@@ -15,6 +15,7 @@ from proofroll.core.observable import Role
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Status, hosts, told_hosts
 from proofroll.running.runner import Runner
+from proofroll.running.time_budget import TimeBudget
 from proofroll.running.timing import Timing, write_benchmarks
 from proofroll.studies.claim_judgement import JudgedFile
 from proofroll.studies.study_store import keep, measured
@@ -45,6 +46,7 @@ def make_tradeoff(
     over: Mapping[str, Sequence[float]] | None = None,
     claims: TradeoffClaims | None = None,
     brief: bool = False,
+    budget: float | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> tuple[TradeoffStudy, Path]:
     """Measures a trade-off, see :func:`tradeoff`, and keeps it with all its timings in pyperf's form.
@@ -59,7 +61,9 @@ def make_tradeoff(
         ProofrollError: there is no truth, or the folder cannot be written.
     """
     claimed = [item.engine for kind in (claims.holds, claims.converges) for item in kind] if claims else []
-    outcome = tradeoff(question, runner, engines=engines, over=over, brief=brief, claimed=claimed, progress=progress)
+    outcome = tradeoff(
+        question, runner, engines=engines, over=over, brief=brief, claimed=claimed, budget=budget, progress=progress
+    )
     study = tradeoff_study(outcome)
     judged = claims if not engines else None
     said = JudgedFile(
@@ -68,7 +72,7 @@ def make_tradeoff(
         judged.undecided(study) if judged else [],
     )
     study = dataclasses.replace(study, engines=sorted(engines), claims=said)
-    path = stored(folder, question, engines, brief=brief)
+    path = stored(folder, question, engines, brief=outcome.brief)
     keep(study, path)
     timings = {
         f"{curve.engine} {point.step or ''}".strip(): point.timing
@@ -190,6 +194,11 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
     }
 
 
+def _beyond(outcome: Tradeoff) -> str:
+    """Reason that a budget gives for what it drops."""
+    return TimeBudget(outcome.budget or 0.0).sentence
+
+
 def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     """Conclusions of the study, as sentences."""
     said = told_hosts(hosts(point.result for point in outcome.points))
@@ -212,6 +221,13 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
         said.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
     done = [point for point in outcome.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
+    beyond = [
+        f"{curve.engine} from {max(dropped):g} on"
+        for curve in outcome.curves
+        if (dropped := [step for step, why in curve.dropped.items() if why == _beyond(outcome)])
+    ]
+    if beyond:
+        said.append(f"Left out, for {_beyond(outcome)}: {', '.join(beyond)}.")
     refused = sum(point.result.status == Status.REFUSED for point in outcome.points)
     wrong = sum(point.result.status == Status.WRONG_MODEL for point in outcome.points)
     ended = len(outcome.points) - len(done) - refused - wrong

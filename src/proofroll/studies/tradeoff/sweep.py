@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
@@ -15,6 +16,7 @@ from proofroll.core.verdict import round_off_of
 from proofroll.running.asking import described, resolve, resolve_with_truth
 from proofroll.running.case import Case, EngineDescription, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
+from proofroll.running.time_budget import TimeBudget
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question, judged
@@ -30,6 +32,9 @@ BROKEN = 0.1
 # A curve is refined while that still takes off this part of the error; the finest step is short enough to end that,
 # and how fast the machine is must not.
 GAIN = 0.4
+# Within a budget a run may take an equal share of this part of what is left, for it is timed afterwards; a tighter
+# tolerance takes no more than so many times as long as the one before.
+_OF_RUNS, _TIGHTER = 0.5, 2.0
 
 
 Progress = Callable[[Case, Result], None]
@@ -104,11 +109,13 @@ def sweep(
     progress: Progress | None = None,
     finer: Callable[[Curve], Sequence[float]] = lambda _: FINER,
     gain: float = GAIN,
+    budget: TimeBudget | None = None,
 ) -> dict[float, Reference]:
     """Fills the curves with points, and returns the truth by sampling interval.
 
     Every curve begins with the same steps. It is then extended to coarser ones until it breaks, and to its ``finer``
-    ones, in sampling intervals, while each takes off this part of the error, ``gain``.
+    ones, in sampling intervals, while each takes off this part of the error, ``gain``. Within a ``budget`` the coarsest
+    runs of all curves come first, and what would take more than its share is dropped.
     """
     references: dict[float, Reference] = {}
     for first in (True, False, False, False):
@@ -121,7 +128,7 @@ def sweep(
         ]
         if not wanted:
             break
-        _run(question, wanted, runner, references, progress)
+        _run(question, wanted, runner, references, progress, budget)
         for curve in curves:
             curve.points.sort(key=lambda point: -(point.step or 0.0))
     return references
@@ -177,6 +184,7 @@ def _run(
     runner: Runner,
     references: dict[float, Reference],
     progress: Progress | None,
+    budget: TimeBudget | None,
 ) -> None:
     """Runs curves with steps or tolerances, and the truths that they need besides those that are there."""
     scene = question.loaded
@@ -198,12 +206,47 @@ def _run(
         except ProofrollError as error:
             curve.dropped[value] = str(error)
     runs = [case for _, both in cases for case in both]
-    truths = question.truths(scene, truth_facts, runs)
-    truths = {every: case for every, case in truths.items() if every not in references}
-    results = runner.run([*truths.values(), *runs], progress)
-    for every, case in truths.items():
-        if results[case.key].status != Status.DONE:
-            raise ProofrollError(f"there is no truth here: {results[case.key].message}")
-        references[every] = Reference.of(scene, runner.store.stored(case).dataset)
+    pending = [] if references else [question.truth(scene, truth_facts, runs)]
+    for stage in _stages(cases) if budget else [cases]:
+        kept = [(curve, both) for curve, both in stage if not budget or _affordable(curve, both[0], budget, len(stage))]
+        results = runner.run([*pending, *(case for _, both in kept for case in both)], progress, budget)
+        for case in pending:
+            if results[case.key].status != Status.DONE:
+                raise ProofrollError(f"there is no truth here: {results[case.key].message}")
+            references[question.every] = question.reference(scene, runner.store.stored(case).dataset, question.every)
+        pending = []
+        for every in {case.every for _, both in kept for case in both} - references.keys():
+            references[every] = question.reference(scene, references[question.every].dataset, every)
+        for curve, both in kept:
+            points = [CurvePoint(case, results[case.key]) for case in both]
+            lost = next((point for point in points if point.result.status is Status.LEFT_OUT), None)
+            if lost is None:
+                curve.points.append(judged(points, references, runner))
+            else:
+                curve.dropped[lost.step or 0.0] = lost.result.message
+
+
+def _stages(cases: Sequence[tuple[Curve, tuple[Case, ...]]]) -> list[list[tuple[Curve, tuple[Case, ...]]]]:
+    """Runs in turns: the first of every curve, then the second, and so on."""
+    turns: dict[str, list[tuple[Curve, tuple[Case, ...]]]] = {}
     for curve, both in cases:
-        curve.points.append(judged([CurvePoint(case, results[case.key]) for case in both], references, runner))
+        turns.setdefault(curve.engine, []).append((curve, both))
+    return [[item for item in turn if item] for turn in itertools.zip_longest(*turns.values())]
+
+
+def _affordable(curve: Curve, case: Case, budget: TimeBudget, abreast: int) -> bool:
+    """True if a run takes no more than its share of what is left, by the one before; else it is dropped, with why.
+
+    An engine that refuses the scene refuses it with every step.
+    """
+    if not curve.points:
+        return not curve.dropped
+    last, step = curve.points[-1], CurvePoint(case, curve.points[-1].result).step
+    if last.result.status is Status.REFUSED:
+        return False
+    finer = (last.step or 1.0) / (step or 1.0)
+    longer = finer if curve.fixed_step or finer < 1 else _TIGHTER
+    if last.result.processor.get("advance", 0.0) * longer <= _OF_RUNS * budget.left / abreast:
+        return True
+    curve.dropped[step or 0.0] = budget.sentence
+    return False

@@ -22,6 +22,7 @@ from proofroll.running.asking import resolve_with_truth
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
+from proofroll.running.time_budget import TimeBudget
 from proofroll.running.timing import ROUNDS, Timing, interleaved
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.judging.reference import Reference
@@ -53,7 +54,7 @@ class Tradeoff:
         references: the truth by sampling interval.
         truth_timing: time of the truth itself, measured in turns with the points; None if it could not be.
         over: parameter -> values; the range over which the best points were checked.
-        brief: whether speeds were measured less often, as the option of :func:`tradeoff` says.
+        brief, budget: see :func:`tradeoff`.
     """
 
     question: Question
@@ -63,6 +64,7 @@ class Tradeoff:
     truth_timing: Timing | None = None
     over: dict[str, list[float]] = field(default_factory=dict)
     brief: bool = False
+    budget: float | None = None
 
     @property
     def reference(self) -> Reference:
@@ -92,6 +94,7 @@ def tradeoff(
     rounds: int = ROUNDS,
     brief: bool = False,
     claimed: Sequence[str] = (),
+    budget: float | None = None,
     progress: Progress | None = None,
 ) -> Tradeoff:
     """Runs the study.
@@ -105,12 +108,14 @@ def tradeoff(
         brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
             finest steps, but for those of curves that fall with order 2 or more, and most of these, too.
         claimed: engines, ``name[key=value,…]``, whose curves are followed further in a brief study.
+        budget: processor time of the sweep and the timing [s], which are brief then; what would exceed it is dropped.
         progress: called with a short text after every run and every measurement.
 
     Raises:
         InputError: something that does not exist, or a quantity that the scene does not have.
         Missing: no engine can be asked.
     """
+    limit, brief = TimeBudget(budget) if budget else None, brief or bool(budget)
     scene = question.loaded
     scene.observable(question.quantity)
     curves, absent = curves_of(engines, runner.workers, scene.requires)
@@ -122,11 +127,11 @@ def tradeoff(
         tell(case.engine.name)
 
     finer, gain = (partial(_briefly, claimed), BRIEF_GAIN) if brief else (lambda _: FINER, GAIN)
-    references = sweep(question, curves, runner, told, finer, gain)
+    references = sweep(question, curves, runner, told, finer, gain, limit)
     ranges = {name: [float(value) for value in values] for name, values in (over or {}).items()}
-    study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief)
+    study = Tradeoff(question, curves, absent, references, over=ranges, brief=brief, budget=budget)
     _, truth = resolve_with_truth([], runner.workers)
-    _time(study, question.case(study.reference.scene, truth, question.every), runner.workers, rounds, tell)
+    _time(study, question.case(study.reference.scene, truth, question.every), runner.workers, rounds, tell, limit)
     if ranges:
         _check(study, truth, runner, told)
     return study
@@ -138,7 +143,9 @@ def _briefly(claimed: Sequence[str], curve: Curve) -> list[float]:
     return [part for part in FINER if part >= (BRIEF_CLAIMED if named else BRIEF_FINER)]
 
 
-def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress) -> None:
+def _time(
+    tradeoff: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: Progress, budget: TimeBudget | None
+) -> None:
     """Measures the speed of every point that reached the end, and of the truth."""
     cases = {point.case.key: point.case for point in tradeoff.points if point.result.status == Status.DONE}
     cases[truth.key] = truth
@@ -149,6 +156,7 @@ def _time(tradeoff: Tradeoff, truth: Case, workers: Workers, rounds: int, tell: 
             min(rounds, BRIEF_ROUNDS) if tradeoff.brief else rounds,
             once_above=BRIEF_ONCE if tradeoff.brief else ONCE,
             progress=lambda key: tell(f"timing {cases[key].engine.name}"),
+            enough=lambda: budget is not None and not budget.left,
         )
     tradeoff.truth_timing = timings.get(truth.key)
     for point in tradeoff.points:
@@ -175,25 +183,23 @@ def _check(tradeoff: Tradeoff, truth: EngineFacts, runner: Runner, told: Callabl
         question = dataclasses.replace(tradeoff.question, parameters={**tradeoff.question.parameters, **place})
         scene = question.loaded
         runs = {key: question.cases(scene, point.case.engine, point.case.every) for key, point in chosen.items()}
-        truths = question.truths(scene, truth, [case for both in runs.values() for case in both])
-        asked.append((place, scene, truths, runs))
-    cases = [case for _, _, truths, runs in asked for case in (*truths.values(), *itertools.chain(*runs.values()))]
+        true = question.truth(scene, truth, [case for both in runs.values() for case in both])
+        asked.append((place, question, true, runs))
+    cases = [case for _, _, true, runs in asked for case in (true, *itertools.chain(*runs.values()))]
     results = runner.run(cases, told)
     corners: dict[str, list[Corner]] = {key: [] for key in chosen}
-    for place, scene, truths, runs in asked:
-        references = {
-            every: Reference.of(scene, runner.store.stored(case).dataset)
-            for every, case in truths.items()
-            if results[case.key].status == Status.DONE
-        }
+    for place, question, true, runs in asked:
+        if results[true.key].status != Status.DONE:
+            lost = Corner(place, {}, {}, f"there is no truth: {results[true.key].message}")
+            for found in corners.values():
+                found.append(lost)
+            continue
+        scene, dataset = question.loaded, runner.store.stored(true).dataset
+        intervals = {case.every for both in runs.values() for case in both}
+        references = {every: question.reference(scene, dataset, every) for every in intervals}
         for key, both in runs.items():
-            lost = next((case.every for case in both if case.every not in references), None)
-            if lost is None:
-                point = judged([CurvePoint(case, results[case.key]) for case in both], references, runner)
-                corners[key].append(_corner(place, point, references[both[0].every]))
-            else:
-                said = results[truths[lost].key].message
-                corners[key].append(Corner(place, {}, {}, f"there is no truth: {said}"))
+            point = judged([CurvePoint(case, results[case.key]) for case in both], references, runner)
+            corners[key].append(_corner(place, point, references[both[0].every]))
     for point in tradeoff.points:
         point.corners = corners.get(point.case.key)
 

@@ -46,6 +46,7 @@ def test_order_with_its_interval(order: int) -> None:
     assert found.order_low <= order <= found.order_high
     assert not found.contradicts_declaration
     assert made(order=order, declared=order + 1).contradicts_declaration
+    assert not made(order=order, declared=order - 1).contradicts_declaration
     assert found.coarse == found.fine == TIME_STEP
     assert found.floor is None
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from proofroll.core.dataset import BETWEEN
 from proofroll.core.errors import InputError
 from proofroll.core.time_grid import off_grid, time_grid
+from proofroll.core.truth import truth
 from proofroll.running.case import Case, Result, Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.tradeoff import tradeoff
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint, Question
-from proofroll.studies.tradeoff.sweep import BROKEN, FINER, _first, _further, curves_of, sweep
+from proofroll.studies.tradeoff.sweep import BROKEN, FINER, _affordable, _first, _further, curves_of, sweep
 from proofroll.studies.tradeoff.tradeoff import _briefly
 
 QUESTION = Question("sphere_in_cylinder", {"speed": 3.0}, 0.1, "z")
@@ -138,14 +141,13 @@ def test_a_curve_ends_where_the_truth_or_round_off_shows_no_more(bar: float, err
 
 
 def test_the_truth_is_known_wherever_a_run_is_sampled(swept: tuple[dict[str, Curve], float]) -> None:
-    """Samples that engines have off the grid have their true values, at each sampling interval that there is."""
+    """Samples that engines have off the grid have their true values, and no other sampling interval has any."""
     cases = [point.case for curve in swept[0].values() for point in curve.points]
-    truths = QUESTION.truths(QUESTION.loaded, cases[0].engine, cases)
-    assert truths.keys() == {case.every for case in cases}
+    truth = QUESTION.truth(QUESTION.loaded, cases[0].engine, cases)
+    assert truth.between
     for case in cases:
         off = off_grid(time_grid(case.until, case.every), case.engine.step)
-        assert set(off) <= set(truths[case.every].between)
-    assert truths[QUESTION.every].between
+        assert set(off) <= (set(truth.between) if case.every == QUESTION.every else set())
 
 
 def test_a_curve_has_each_tolerance_once() -> None:
@@ -169,3 +171,33 @@ def test_engines_that_do_not_exist() -> None:
     for text in ("adams", "exudyn[formulation=none]", "exudyn[wheels=4]"):
         with pytest.raises(InputError):
             curves_of([text])
+
+
+@pytest.mark.parametrize(("step", "left", "affordable"), [(1e-3, 8.1, True), (1e-3, 7.9, False), (4e-3, 2.1, True)])
+def test_within_a_budget_a_step_takes_no_more_than_its_share(step: float, left: float, affordable: bool) -> None:
+    """Of two curves each may take a quarter of what is left, as the step before foretells; what may not is dropped."""
+    (curve,), _ = curves_of(["projection[formulation=rotating_frame,preset=default]"])
+
+    def case(step: float) -> Case:
+        facts = replace(curve.facts, settings=curve.facts.settings | {"dt": step})
+        return Case("sphere_in_cylinder", {}, "", facts, QUESTION.until, QUESTION.every)
+
+    curve.points = [CurvePoint(case(2e-3), Result(Status.DONE, "reached", processor={"advance": 1.0}))]
+    budget = SimpleNamespace(left=left, sentence="too dear")
+    assert _affordable(curve, case(step), budget, 2) is affordable  # type: ignore[arg-type]
+    assert curve.dropped == ({} if affordable else {step: "too dear"})
+    refused = Result(Status.REFUSED, "it cannot", processor={})
+    curve.points, curve.dropped = [CurvePoint(case(2e-3), refused)], {}
+    assert not _affordable(curve, case(step), budget, 2)  # type: ignore[arg-type]
+    assert curve.dropped == {}
+
+
+def test_a_coarser_truth_is_that_of_fewer_samples() -> None:
+    """The truth at a coarser interval has the values of the finer one at its times, and none between."""
+    question = Question("pendulum", {}, 0.4, "energy")
+    times = time_grid(question.until, question.every)
+    fine = truth(question.loaded, times, between=times[:1] + 0.3 * question.every)
+    assert BETWEEN in fine.dims
+    coarse = question.reference(question.loaded, fine, 0.1)
+    assert np.array_equal(coarse.dataset["p_WB"], fine["p_WB"][::10])
+    assert BETWEEN not in coarse.dataset.dims
