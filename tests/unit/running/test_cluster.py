@@ -226,7 +226,7 @@ def test_runs_one_after_another(dask: DaskCluster, tmp_path: Path) -> None:
     runner = Runner(Store(tmp_path / "store"), cluster=Cluster(dask.address, idle))
     facts = EngineFacts("idle", "1", "none", {"seconds": 0.0})
     for number in range(4):
-        cases = [Case("", {"speed": 100.0 * number + item}, "none", facts, 1.0, 0.1) for item in range(40)]
+        cases = [Case("", {"speed": 100.0 * number + item}, "none", facts, 1.0, 0.1) for item in range(10)]
         assert runner.run(cases).keys() == {case.key for case in cases}
 
 
