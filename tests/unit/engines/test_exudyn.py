@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from true_runs import true_run
 
 from proofroll import load_scene
 from proofroll.core.certificate import certify
@@ -34,7 +35,7 @@ def plane(**parameters: float) -> Scene:
 def errors(scene: Scene, formulation: str, dt: float, **settings: Any) -> dict[str, float]:
     """Largest difference from the truth over UNTIL seconds."""
     run = simulate(scene, "exudyn", until=UNTIL, every=0.05, formulation=formulation, dt=dt, **settings)
-    truth = simulate(scene, "truth", until=UNTIL, every=0.05)
+    truth = true_run(scene, UNTIL, 0.05)
     assert run.attrs["status"] == "done"
     common = [name for name in ("gamma", "z", "down", "across", "N", "F2", "F3", "energy", "gap") if name in run]
     return {name: float(np.abs(run[name].values - truth[name].values).max()) for name in common}

@@ -8,6 +8,7 @@ import functools
 import mujoco
 import numpy as np
 import pytest
+from true_runs import true_run
 
 from proofroll.conformance.motion import order_is_as_declared
 from proofroll.conformance.subject import Subject, scenes
@@ -39,16 +40,16 @@ ON_BOTH = [(formulation, preset) for formulation, preset in MODELS if formulatio
 
 
 @functools.cache
-def truth(scene: str, until: float, **parameters: float):
-    """The true trajectory, computed once for all tests."""
-    return simulate(load_scene(scene, **parameters), "truth", until=until, every=0.05)
+def moved(scene: str, engine: str, until: float, **parameters: float):
+    """The trajectory, computed once for all tests."""
+    return simulate(load_scene(scene, **parameters), engine, until=until, every=0.05)
 
 
 def error(scene: str, engine: str, variable: str, *, until: float = 1.0, signed: bool = False, **parameters: float):
     """Largest difference from the truth, or the difference at each sample."""
-    run = simulate(load_scene(scene, **parameters), f"mujoco[{engine}]", until=until, every=0.05)
+    run, true = (moved(scene, name, until, **parameters) for name in (f"mujoco[{engine}]", "truth"))
     assert run.status == "done", run.message
-    difference = (run[variable] - truth(scene, until, **parameters)[variable]).to_numpy()
+    difference = (run[variable] - true[variable]).to_numpy()
     return difference if signed else float(np.max(np.abs(difference)))
 
 
@@ -277,7 +278,7 @@ def test_tilted_cylinder_through_the_same_code(engine: str) -> None:
     assert isinstance(leaning, Scene)
     built = build(leaning, f"mujoco[{engine}]")
     assert first_difference(certify(built, leaning)) is None
-    true = simulate(leaning, "truth", until=0.5, every=0.05)
+    true = true_run(leaning, 0.5, 0.05)
     run = record(built, leaning, time_grid(0.5, 0.05)).dataset
     assert float(np.max(np.abs(run.z - true.z))) < 1e-4
 

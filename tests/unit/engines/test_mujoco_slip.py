@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from slip_cases import CASES, PAPER, run
+from true_runs import true_run
 
 from proofroll.core.errors import Refused
 from proofroll.core.events import events_of
@@ -83,7 +84,7 @@ def test_flight_is_one_lift_off(engine: str) -> None:
     """A ball that falls off a leaning wall has one lift-off, no stick or slip in the air, and events after it lands."""
     scene = load_scene(CYLINDER, mu_static=0.8, speed=2.0)
     leaning = changed(scene, surface=Cylinder("wall", scene.elements[0].surface.radius, tilt=1.2))
-    true = events_of(simulate(leaning, "truth", until=0.3, every=0.05))
+    true = events_of(true_run(leaning, 0.3, 0.05))
     assert [event.kind for event in true] == ["slip", "lift_off"]
     ds = record(build(leaning, f"mujoco[{engine}]"), leaning, time_grid(0.6, 0.01)).dataset
     events = events_of(ds)

@@ -6,7 +6,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-import xarray as xr
+from true_runs import true_run
 
 from proofroll.core.certificate import Standing, certify
 from proofroll.core.errors import Diverged, InputError, Refused
@@ -56,20 +56,9 @@ SCENES = {
 }
 
 
-_truths: dict[tuple[str, float, float], xr.Dataset] = {}
-
-
-def truth(scene: Scene, until: float, every: float) -> xr.Dataset:
-    """The truth, found once per scene: it costs more than most runs."""
-    key = (scene.digest, until, every)
-    if key not in _truths:
-        _truths[key] = simulate(scene, "truth", until=until, every=every)
-    return _truths[key]
-
-
 def largest_errors(scene: Scene, engine: str, until: float, every: float) -> dict[str, float]:
     """Largest absolute difference from the truth, per variable."""
-    true, run = truth(scene, until, every), simulate(scene, engine, until=until, every=every)
+    true, run = true_run(scene, until, every), simulate(scene, engine, until=until, every=every)
     assert run.status == "done", run.message
     return {str(name): float(np.abs(run[name] - true[name]).max()) for name in true.data_vars}
 
@@ -126,7 +115,7 @@ def test_declared_order(formulation: str, integrator: str, orientation: bool, dt
     # short for the free ball: its order shows only while the drift off the wall is small
     until = 0.02 if formulation == "free_flyer" else 0.2
     scene = cylinder()
-    true = truth(scene, until, until / 2)
+    true = true_run(scene, until, until / 2)
     errors = []
     for step in (dt, dt / 2):
         run = simulate(scene, "pinocchio", until=until, every=until / 2, dt=step, **options)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+from functools import cache
 
 import numpy as np
 import pytest
+import xarray as xr
 from slip_cases import run
 
 from proofroll.core.certificate import certify
@@ -28,10 +30,15 @@ def leaning_cylinder(tilt: float, **parameters: float) -> Scene:
     return changed(scene, surface=dataclasses.replace(scene.elements[0].surface, tilt=tilt))
 
 
+@cache
+def _moved(engine: str, until: float, **parameters: float) -> xr.Dataset:
+    """A run, made once for all tests."""
+    return simulate(load_scene("sphere_in_cylinder", **parameters), engine, until=until, every=0.1)
+
+
 def errors(engine: str, until: float = 0.5, **parameters: float) -> dict[str, float]:
     """Largest difference from the truth with unbounded friction, after time 0."""
-    scene = load_scene("sphere_in_cylinder", **parameters)
-    true, run = (simulate(scene, name, until=until, every=0.1) for name in ("truth", engine))
+    true, run = (_moved(name, until, **parameters) for name in ("truth", engine))
     assert run.status == "done", run.message
     return {str(name): float(np.abs(run[name] - true[name])[1:].max()) for name in true.data_vars}
 

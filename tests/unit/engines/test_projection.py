@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from true_runs import true_run
 
 import proofroll
 from proofroll.core.errors import Diverged, InputError
@@ -26,22 +27,11 @@ def load(name, **parameters):
     return proofroll.load_scene(name, **parameters)
 
 
-_TRUTHS = {}
-
-
-def truth(scene, until, every):
-    """The truth, computed once for all tests that ask for it."""
-    key = (scene.digest, until, every)
-    if key not in _TRUTHS:
-        _TRUTHS[key] = simulate(scene, "truth", until=until, every=every)
-    return _TRUTHS[key]
-
-
 def errors(scene, engine, until=2.0, every=0.1, **settings):
     """Largest difference from the truth in each variable."""
     found = simulate(scene, engine, until=until, every=every, **settings)
     assert found.status == "done", found.message
-    true = truth(scene, until, every)
+    true = true_run(scene, until, every)
     return {name: float(np.max(np.abs(found[name] - true[name]))) for name in true.data_vars}
 
 
