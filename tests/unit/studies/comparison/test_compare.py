@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,14 @@ def claim(rows: list[Row], speeds: list[float], bounds: Mapping[str, Tolerance] 
     return dataclasses.replace(comparison, bands={"tight": band}, rows=rows)
 
 
+@cache
+def true_motion(
+    name: str, point: tuple[tuple[str, float], ...], until: float, every: float, between: tuple[float, ...]
+) -> xr.Dataset:
+    """The truth of a scene with all that can be asked, found once for all tests."""
+    return truth(load_scene(name, **dict(point)).fully_asked, time_grid(until, every), between=np.array(between))
+
+
 def judged(
     folder: Path,
     comparison: Comparison,
@@ -78,7 +87,8 @@ def judged(
     for row in comparison.rows:
         for point in comparison.variations(row):
             scene = scenes[point_name(point)] = load_scene(comparison.scene, **point)
-            dataset = truth(scene.fully_asked, time_grid(comparison.until, comparison.every), between=np.array(between))
+            sampled = comparison.until, comparison.every, tuple(between)
+            dataset = true_motion(comparison.scene, tuple(point.items()), *sampled).copy()
             if BallCapability.BOUNDED_FRICTION in scene.requires:
                 dataset.attrs["onset"] = json.dumps(dataclasses.asdict(onset(scene, comparison.until)))
             facts = dataclasses.replace(FACTS, name=row.engine)
