@@ -62,6 +62,10 @@ def evaluate(planned: Plan, results: dict[str, Result], runner: Runner) -> Outco
             if results[case.key].status == Status.DONE
         }
         band = comparison.bands[run.row.tolerance]
+        if reference.ill_posed and not reference.curves.keys() & {*band.bounds, *run.row.bound}:
+            said = f"no motion is unique here, and no law has a tolerance: {reference.dataset.attrs['ill_posed']}"
+            judged.append(_run(run, replace(result, status=Status.NO_TRUTH, message=said)))
+            continue
         judgements, errors = _judgements(run, band, reference, trajectories, _lost(run, results))
         missing = sorted({*band.bounds, *run.row.bound} - {judgement.observable for judgement in judgements})
         judged_run = _run(

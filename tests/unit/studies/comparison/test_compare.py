@@ -63,7 +63,7 @@ def judged(
     folder: Path,
     comparison: Comparison,
     answer: Answer,
-    true: Mapping[float, Result] | None = None,
+    true: Mapping[float, Result | xr.Dataset] | None = None,
     rungs: Mapping[float, Answer] | None = None,
     certificate: Sequence[Line] = (),
     between: Sequence[float] = (),
@@ -94,7 +94,8 @@ def judged(
             facts = dataclasses.replace(FACTS, name=row.engine)
             given = (comparison.scene, point, scene.digest)
             truths[point_name(point)] = put(
-                Case(*given, TRUTH, comparison.until, comparison.every), (true or {}).get(point["speed"], dataset)
+                Case(*given, TRUTH, comparison.until, comparison.every),
+                (true or {}).get(point.get("speed", 0.0), dataset),
             )
             ladder = {}
             for factor, how in {1.0: answer, **(rungs or {})}.items():
@@ -444,6 +445,20 @@ def test_a_point_where_the_truth_refuses(tmp_path: Path) -> None:
     assert [row.verdict for row in content.rows] == ["agrees", "agrees"]
     assert [row.verdicts["not-judged"] for row in content.rows] == [1, 1]
     assert content.runs[1].reason.startswith("no truth at speed=4: there is no truth here: the ball")
+
+
+def test_where_no_motion_is_unique_tolerances_of_motion_judge_nobody(tmp_path: Path) -> None:
+    """Where the truth knows laws alone, a row whose tolerances name no law is not judged, for that reason."""
+    bounds = {"positions": Tolerance(1e-3, False, "m")}
+    comparison = dataclasses.replace(claim([ROW], [], bounds), scene="painleve_rod", vary={})
+
+    def moved(_: Scene, laws: xr.Dataset) -> xr.Dataset:
+        return laws.assign({name: item.fillna(0.0) for name, item in laws.items() if item.dtype.kind == "f"})
+
+    outcome = judged(tmp_path, comparison, moved)
+    assert outcome.contradictions == []
+    assert [(run.verdict, run.judgements) for run in outcome.runs] == [(Verdict.NOT_JUDGED, [])]
+    assert "no motion is unique here, and no law has a tolerance: " in outcome.runs[0].result.message
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
