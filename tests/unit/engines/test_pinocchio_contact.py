@@ -124,7 +124,7 @@ def test_number_for_unbounded_friction() -> None:
 
 def test_solvers_agree() -> None:
     """PGS and ADMM find the same impulses: their paths differ by what the tolerance leaves."""
-    pgs, admm = (run("paper", f"pinocchio[formulation=contact,solver={name}]", 4.0, 0.05) for name in SOLVERS)
+    pgs, admm = (run("paper", f"pinocchio[formulation=contact,solver={name}]", 2.1, 1e-2) for name in SOLVERS)
     np.testing.assert_allclose(admm.p_WB, pgs.p_WB, rtol=0, atol=1e-6)
 
 
