@@ -31,13 +31,10 @@ from proofroll.studies.comparison.outcome import Outcome
 from proofroll.studies.comparison.planning import point_name
 from proofroll.studies.tradeoff.claims import claims_for
 from proofroll.studies.tradeoff.records import TradeoffStudy
-from proofroll.studies.tradeoff.study import tradeoff_study
-from proofroll.studies.tradeoff.tradeoff import tradeoff
+from proofroll.studies.tradeoff.study import make_tradeoff
 
 ROOT = Path(__file__).resolve().parents[1]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-6)
-# A table of four lines needs no narrow interval: half of the usual rounds.
-ROUNDS = 3
 POINT = {"speed": 4.0, "rolling_resistance": 0.0}
 SHOWN = (
     "mujoco[formulation=facets,preset=default]",
@@ -82,11 +79,11 @@ def draw(outcome: Outcome, path: Path) -> None:
     figure.savefig(path, metadata={"Date": None})
 
 
-def measured(runner: Runner) -> TradeoffStudy:
-    """The trade-off that the comparison file asks for."""
+def measured(runner: Runner, folder: Path) -> TradeoffStudy:
+    """The trade-off that the comparison file asks for, without the finest steps: four lines need none of them."""
     claims = claims_for("sphere_in_cylinder")
     assert claims is not None  # the file is part of this repository
-    study = tradeoff_study(tradeoff(claims.swept, runner, over=claims.over, rounds=ROUNDS))
+    study, _ = make_tradeoff(claims.swept, runner, folder, over=claims.over, claims=claims, brief=True)
     for sentence in (*claims.contradictions(study), *claims.undecided(study)):
         sys.stderr.write(f"{sentence}\n")
     return study
@@ -109,9 +106,9 @@ def verdicts(runner: Runner, folder: Path) -> dict[str, str]:
     return {"verdicts": verdict_table(content), "caveats": caveat_list(content), "remarks": remark_list(content)}
 
 
-def costs(runner: Runner, _: Path) -> dict[str, str]:
+def costs(runner: Runner, folder: Path) -> dict[str, str]:
     """Table of what is cheapest, and the picture of error against cost."""
-    study = measured(runner)
+    study = measured(runner, folder)
     write_text(ROOT / "docs" / "work_precision.svg", svg(study, [study.quantity]))
     return {"cheapest": cheapest_table(study, TOLERANCES)}
 
