@@ -237,11 +237,12 @@ def test_scenes(proofroll: Proofroll) -> None:
     [
         ("proofroll sce", 1, "scenes"),
         ("proofroll run bric", 2, "bricard"),
+        ("proofroll compare pap", 2, "paper"),
         ("proofroll compare x --engine exu", 4, "exudyn"),
     ],
 )
 def test_completion(words: str, index: int, found: str) -> None:
-    """A shell completes commands, scenes and engines."""
+    """A shell completes commands, scenes, comparisons and engines."""
     asked = {"_PROOFROLL_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(index)}
     command = [str(Path(sys.executable).with_name("proofroll"))]
     done = subprocess.run(command, env=os.environ | asked, capture_output=True, text=True, check=True, timeout=60)

@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 def compare(
     comparison: Annotated[
         str,
-        typer.Argument(help="A comparison file, e.g. comparisons/paper.toml, or its name; or a scene, a robot file."),
+        typer.Argument(
+            help="A comparison file, e.g. comparisons/paper.toml, or its name; or a scene, a robot file.",
+            autocompletion=options.compared_like,
+        ),
     ],
     engine: options.Engines = None,
     settings: options.Set = None,

@@ -35,6 +35,14 @@ def scenes_like(incomplete: str) -> list[str]:
     return [name for name in scene_names() if name.startswith(incomplete)]
 
 
+def compared_like(incomplete: str) -> list[str]:
+    """Names of comparisons and scenes that begin so, for the completion of a shell."""
+    from proofroll.files.comparison_file import comparison_names, further_comparison_names
+
+    named = {*comparison_names(), *further_comparison_names(), *scenes_like(incomplete)}
+    return sorted(name for name in named if name.startswith(incomplete))
+
+
 def engines_like(incomplete: str) -> list[str]:
     """Names of engines that begin so, for the completion of a shell."""
     from proofroll.core.plugins import engine_names
