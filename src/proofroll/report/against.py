@@ -181,7 +181,7 @@ def _changes(
         if (size := _beyond(old, new)) > 0:
             digits = next(count for count in _DIGITS if error(old.error, count) != error(new.error, count))
             change = f"{error(old.error, digits)} → {error(new.error, digits)}"
-            values.append((size, f"error of {name} {change} {new.unit}"))
+            values.append((size, f"error of {name} {change} {new.unit}".removesuffix(" 1")))
     if values:
         more = f", and of {len(values) - 1} more" if len(values) > 1 else ""
         yield "value", f"{max(values)[1]}{more}"
