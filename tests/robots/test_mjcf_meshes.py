@@ -86,8 +86,11 @@ def test_root(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="--root"):
         open_robot(path)
     assert _meant(path, tmp_path).bodies["a"].mass == pytest.approx(MASS)
-    with pytest.raises(InputError, match="is not in this folder"):
+    with pytest.raises(InputError, match="not in this folder; name one that holds it"):
         open_robot(path, root=tmp_path / "shared")
+    (link := tmp_path / "shared" / "link.xml").symlink_to(path)
+    with pytest.raises(InputError, match=f"--root = '{link.parent}': link.xml is in {path.parent}, not in"):
+        open_robot(link)
 
 
 def test_what_is_missing(tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ _ABOUT = "about.json"
 # Whether xarray was imported without dask, so that it may go on without: it asks for a scheduler when it writes.
 _without_dask = False
 # What numpy raises where a file is another, or damaged.
-_NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, TypeError, ValueError)
+_NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, RecursionError, TypeError, ValueError)
 
 
 def import_xarray() -> None:
@@ -175,8 +175,8 @@ def read_columns(path: Path) -> Columns:
     content = ordinary_content(path)
     try:
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
-            said, attrs = json.loads(file[_ABOUT])
-            variables = {name: Variable(tuple(dims), file[name], own) for name, (dims, own) in said.items()}
+            said, attrs = map(dict, json.loads(file[_ABOUT]))
+            variables = {name: Variable(tuple(dims), file[name], dict(own)) for name, (dims, own) in said.items()}
     except _NO_SUCH_FILE as error:
         raise ValueError(f"{path} is no stored trajectory") from error
     return Columns(variables, attrs)

@@ -31,7 +31,10 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
     with told_of(str(path)):
         inside = (path.parent if root is None else root).resolve()
         if not path.resolve().is_relative_to(inside):
-            raise InputError("--root", root, f"{path} is not in this folder")
+            advice = (
+                f"{path.name} is in {path.resolve().parent}, not in this folder; name one that holds it with --root"
+            )
+            raise InputError("--root", inside, advice)
         return _opened(path, base, inside, expand)
 
 

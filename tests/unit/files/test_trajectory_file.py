@@ -87,15 +87,23 @@ def array_alone() -> bytes:
     return buffer.getvalue()
 
 
-def another_archive() -> bytes:
-    """A file of numpy's that is no run."""
+def another_archive(about: str = "") -> bytes:
+    """A file of numpy's that is no run; ``about`` stands where a run describes its variables."""
     buffer = io.BytesIO()
     np.savez(buffer, time=np.zeros(2))
+    if about:
+        with zipfile.ZipFile(buffer, "a") as archive:
+            archive.writestr("about.json", about)
     return buffer.getvalue()
 
 
+OTHERS = [
+    another_archive(about) for about in ("", "[1, 2]", '[{"time": [["time"], 5]}, {}]', "[{}, [1]]", "[" * 100_000)
+]
+
+
 @BOTH
-@pytest.mark.parametrize("content", [b"", b"something else", array_alone(), another_archive()])
+@pytest.mark.parametrize("content", [b"", b"something else", array_alone(), *OTHERS])
 def test_another_file_is_no_trajectory(tmp_path: Path, content: bytes, ending: str) -> None:
     """Bytes of another kind are no trajectory."""
     file = tmp_path / f"run{ending}"
