@@ -94,6 +94,16 @@ def test_unreadable(tmp_path: Path) -> None:
     path.write_bytes(b'<?xml version="1.0" encoding="klingon"?><robot/>')
     with pytest.raises(InputError, match="no XML"):
         open_robot(path)
+    (loop := tmp_path / "loop.urdf").symlink_to("loop.urdf")
+    with pytest.raises(InputError, match=r"loop\.urdf"):
+        open_robot(loop)
+    (tmp_path / "loop.stl").symlink_to("loop.stl")
+    mesh = '<asset><mesh name="m" file="loop.stl"/></asset>'
+    (file := tmp_path / "robot.xml").write_text(
+        mjcf(base='<geom type="mesh" mesh="m"/>').replace("<worldbody>", f"{mesh}<worldbody>", 1)
+    )
+    with pytest.raises(InputError, match=r"loop\.stl"):
+        open_robot(file)
 
 
 def test_meshes_are_not_opened(tmp_path: Path) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import warnings
 from importlib.metadata import EntryPoint, EntryPoints, distributions
 from typing import Any
 
+_LONGEST = 200  # characters of what a package says why it cannot be loaded
 # Entry points that could not be loaded -> a sentence that names the package; the command line tells them.
 broken: dict[EntryPoint, str] = {}
 
@@ -16,23 +18,38 @@ def announced(group: str) -> tuple[EntryPoint, ...]:
     return tuple(sorted(_everything().select(group=group), key=lambda point: point.name))
 
 
-def loaded(group: str, of: type = type) -> list[tuple[EntryPoint, Any]]:
+def loaded(group: str, of: type = type, like: Any = None) -> list[tuple[EntryPoint, Any]]:
     """The entry points of a group with what they name.
 
-    One that cannot be loaded, or names no instance of ``of`` (by default a class), is left out, with a warning.
+    One that cannot be loaded, names no instance of ``of`` (by default a class), or lacks what a class that follows the
+    protocol ``like`` has, is left out, with a warning.
     """
     loaded_points = []
     for point in announced(group):
         try:
-            named = point.load()
-        except (Exception, SystemExit) as error:  # whatever a package does when it is imported
-            leave_out(point, f"cannot be loaded ({type(error).__name__}: {error})")
+            with contextlib.redirect_stdout(sys.stderr):  # standard output is for data
+                named = point.load()
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # whatever a package does when it is imported
+            leave_out(point, f"cannot be loaded ({type(error).__name__}: {str(error)[:_LONGEST]})")
         else:
-            if isinstance(named, of):
-                loaded_points.append((point, named))
-            else:
+            lacking = [name for name in _members(like) if not hasattr(named, name)]
+            if not isinstance(named, of):
                 leave_out(point, f"is no {'class' if of is type else of.__name__}")
+            elif lacking:
+                leave_out(point, f"is no {like.__name__}, for it lacks {', '.join(lacking)}")
+            else:
+                loaded_points.append((point, named))
     return loaded_points
+
+
+def _members(protocol: Any) -> list[str]:
+    """Names that every class has which follows a protocol."""
+    if protocol is None:
+        return []
+    declared = [name for name, kind in protocol.__annotations__.items() if kind.startswith("ClassVar")]
+    return [*declared, *(name for name in vars(protocol) if name not in declared and not name.startswith("_"))]
 
 
 def leave_out(point: EntryPoint, why: str) -> None:

@@ -114,7 +114,7 @@ def _installed(requirement: str) -> bool:
 @cache
 def load_element_kinds() -> tuple[type[ElementKind], ...]:
     """Every kind of element that some installed package announces, by name."""
-    return tuple(kind for _, kind in loaded(ELEMENTS))
+    return tuple(kind for _, kind in loaded(ELEMENTS, like=ElementKind))
 
 
 def require_engine(name: str) -> None:

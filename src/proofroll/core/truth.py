@@ -70,7 +70,7 @@ class FindsEdges(Protocol):
 @cache
 def load_truths() -> tuple[type[ElementTruth], ...]:
     """All truths that installed packages announce, by name."""
-    return tuple(kind for _, kind in loaded(TRUTHS))
+    return tuple(kind for _, kind in loaded(TRUTHS, like=ElementTruth))
 
 
 _NONE = np.zeros(0)

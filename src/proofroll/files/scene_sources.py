@@ -56,5 +56,5 @@ def source_of(name: str) -> tuple[type[SceneSource], Path] | None:
 
 @cache
 def _sources() -> dict[str, type[SceneSource]]:
-    sources = (source for _, source in loaded(GROUP))
+    sources = (source for _, source in loaded(GROUP, like=SceneSource))
     return {ending: source for source in sources for ending in source.endings}

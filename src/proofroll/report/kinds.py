@@ -88,7 +88,7 @@ class ReportKind(Protocol):
 @cache
 def report_kinds() -> Mapping[str, type[ReportKind]]:
     """All report kinds that installed packages announce, by name."""
-    return {point.name: kind for point, kind in loaded(GROUP)}
+    return {point.name: kind for point, kind in loaded(GROUP, like=ReportKind)}
 
 
 def kind_name(scene: Scene) -> str:

@@ -118,7 +118,7 @@ class Part(Protocol):
 @cache
 def part_kinds() -> tuple[type[Part], ...]:
     """All kinds of parts that installed packages announce, in the order of a report."""
-    return tuple(sorted((kind for _, kind in loaded(GROUP)), key=lambda kind: kind.order))
+    return tuple(sorted((kind for _, kind in loaded(GROUP, like=Part)), key=lambda kind: kind.order))
 
 
 def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:

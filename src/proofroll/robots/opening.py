@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -29,11 +30,10 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
     """
     require_known("base", base, BASES)
     with told_of(str(path)):
-        inside = (path.parent if root is None else root).resolve()
-        if not path.resolve().is_relative_to(inside):
-            advice = (
-                f"{path.name} is in {path.resolve().parent}, not in this folder; name one that holds it with --root"
-            )
+        # not resolve(), which no loop of links may meet
+        inside, place = (Path(os.path.realpath(each)) for each in (path.parent if root is None else root, path))
+        if not place.is_relative_to(inside):
+            advice = f"{path.name} is in {place.parent}, not in this folder; name one that holds it with --root"
             raise InputError("--root", inside, advice)
         return _opened(path, base, inside, expand)
 

@@ -128,7 +128,7 @@ def file_inside(folder: Path, name: str, inside: Path) -> Path | None:
     """A file by its name in a folder if it lies in ``inside`` or below, links followed."""
     try:
         target = (folder / name).resolve()
-    except (OSError, ValueError):  # a loop of links; a name with a null character
+    except (OSError, RuntimeError, ValueError):  # a loop of links; a name with a null character
         return None
     return target if target.is_relative_to(inside) and target != inside else None
 
