@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from proofroll.core.errors import InputError
 from proofroll_drill import published
 
 NUMBERS = """
@@ -30,6 +31,7 @@ def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     assert [row.misses for row in rows] == [False, False, True, True, True]
     assert "chart" in rows[-1].what
     assert rows[-1].why
-    assert list(published.held(["sled"])) == []
+    with pytest.raises(InputError, match="no number of it was published; choose from"):
+        list(published.held(["sled"]))
     (tmp_path / "numbers.toml").write_text(NUMBERS.replace("4518,", "4528,").replace("1e-30", "1"), encoding="utf-8")
     assert [row.misses for row in published.held([])] == [True, False, True, False, True]

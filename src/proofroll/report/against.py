@@ -13,6 +13,7 @@ from typing import Any, TypeGuard
 
 from proofroll.core.errors import InputError
 from proofroll.core.number_format import counted, error, number
+from proofroll.files.atomic import ordinary_content
 from proofroll.report.long_table import COLUMNS, TableLine
 
 # Round-off of another build may change an error by this part of the quantity's size, and by this part of itself.
@@ -113,14 +114,14 @@ class EarlierReport:
             InputError: it cannot be read, or has no long table.
         """
         try:
-            said: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+            said: dict[str, Any] = json.loads(ordinary_content(path))
             table, made = said["table"], said["environment"]
             rows = [zip(table["columns"], row, strict=True) for row in table["data"]]
             lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
             return cls(path, said["date"], made["machine"], made["versions"], lines)
         except OSError as problem:
-            raise InputError(option, path, f"cannot be read: {problem.strerror}") from None
-        except (KeyError, TypeError, ValueError):
+            raise InputError(option, path, f"cannot be read: {problem.strerror or problem}") from None
+        except (KeyError, RecursionError, TypeError, ValueError):
             raise InputError(option, path, "is no report.json with a long table; proofroll report writes one") from None
 
 

@@ -19,6 +19,7 @@ from proofroll.core.announced import announced
 from proofroll.core.errors import InputError
 from proofroll.core.plugins import GROUP, engine_names, parse_engine, plain_name
 from proofroll.core.truth import TRUTHS, load_truths
+from proofroll.files.atomic import ordinary_content
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.scene_file import is_scene, load_scene, means_scene, read_scene_file, scene_folder
 from proofroll.files.toml import named_file
@@ -117,10 +118,10 @@ def _document(path: Path) -> object:
     """Content of a file of results that names engines and scenes."""
     try:
         if path.suffix == ".json":
-            return json.loads(path.read_text(encoding="utf-8"))
+            return json.loads(ordinary_content(path))
         said = dict(read(path).attrs)
         return said | {"versions": json.loads(said.get("versions", "{}"))}
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, RecursionError, TypeError, ValueError) as error:
         raise InputError("result", path.name, f"this cannot be read ({error})") from None
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -128,3 +129,9 @@ def test_a_report_is_read_from_its_file(tmp_path: Path) -> None:
         EarlierReport.read(file)
     with pytest.raises(InputError, match="cannot be read"):
         EarlierReport.read(tmp_path / "absent.json")
+    os.mkfifo(pipe := tmp_path / "pipe.json")
+    with pytest.raises(InputError, match="no ordinary file"):
+        EarlierReport.read(pipe)
+    file.write_text("[" * 100_000)
+    with pytest.raises(InputError, match="with a long table"):
+        EarlierReport.read(file)

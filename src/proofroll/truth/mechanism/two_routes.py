@@ -200,7 +200,12 @@ def _check_limits(mechanism: Mechanism, record: Record) -> None:
 
 def _from_form(equations: JointCoordinates, form: ClosedForm, times: Array) -> Record:
     assert form.motion is not None
-    return gathered(times, [equations.sample(q, v) for q, v in zip(*form.motion(times), strict=True)])
+    moves = form.motion(times)
+    if not all(np.all(np.isfinite(each)) for each in moves):
+        raise Refused(
+            "its closed form has no finite numbers here: masses, lengths or gravity are too large or too small"
+        )
+    return gathered(times, [equations.sample(q, v) for q, v in zip(*moves, strict=True)])
 
 
 def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[Record, Record, str]:

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.errors import ProofrollError
+from proofroll.core.errors import ProofrollError, require_known
 from proofroll.core.events import events_of
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
@@ -48,6 +48,9 @@ class Held:
 def held(scenes: list[str], advance: Callable[[str], None] = lambda _: None) -> Iterator[Held]:
     """Every published number of some scenes, all if none is named."""
     file = tomllib.loads(FILE.read_text(encoding="utf-8"))
+    known = dict.fromkeys(entry["scene"] for kind in ("truths", "errors") for entry in file[kind])
+    for name in scenes:
+        require_known("scene", name, known, "no number of it was published; choose from")
     for kind, hold in (("truths", _truths), ("errors", _errors)):
         for entry in file[kind]:
             if not scenes or entry["scene"] in scenes:

@@ -216,3 +216,10 @@ def test_an_effort_that_starts_at_its_limit_passes_it() -> None:
     law = tree._law(begun.state, begun.mode)
     assert law.guards(begun.state)[-1] <= 0.0
     assert law.guards(begun.state + np.append(np.zeros(len(begun.state) - 1), 0.1))[-1] > 0.0
+
+
+def test_a_closed_form_without_finite_numbers_is_no_truth() -> None:
+    """A mass whose products are not finite is refused in words, not by an eigenvalue that does not converge."""
+    heavy = load_scene("pendulum", mass=1e308).elements[0].mechanism  # type: ignore[attr-defined]
+    with np.errstate(all="ignore"), pytest.raises(Refused, match="too large or too small"):
+        truth_of(heavy, np.array([0.0, 0.01]))
