@@ -30,6 +30,7 @@ def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     rows = list(published.held([]))
     assert [row.misses for row in rows] == [False, False, True, True, True]
     assert "chart" in rows[-1].what
+    assert rows[0].text == "✓ servo: q.slide at 0.5 s: 1.0055444518 published, 1.005544451824 ours"
     assert rows[-1].why
     with pytest.raises(InputError, match="no number of it was published; choose from"):
         list(published.held(["sled"]))

@@ -127,13 +127,18 @@ def published(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Hold truths and errors of engines against numbers that were found elsewhere; exit 1 if a true value misses."""
-    from proofroll_drill.published import held
-    from proofroll_drill.table import published_table
+    """Hold truths and errors of engines against numbers that were found elsewhere; exit 1 if a true value misses.
 
-    with progress_bar("scenes") as advance:
-        rows = list(held(scenes or [], advance))
+    Each number has its line as soon as it is held.
+    """
+    from proofroll_drill.published import held
+
+    rows = []
+    for row in held(scenes or []):
+        rows.append(row)
+        if not as_json:
+            typer.echo(row.text)
     missed = sum(row.misses for row in rows)
     said = f"{len(rows)} numbers held, {missed} missed."
-    show({"held": len(rows), "missed": missed, "numbers": rows}, as_json, lambda: [published_table(rows), said])
+    show({"held": len(rows), "missed": missed, "numbers": rows}, as_json, lambda: [said])
     raise typer.Exit(CONTRADICTED if any(row.misses and row.kind == "value" for row in rows) else OK)

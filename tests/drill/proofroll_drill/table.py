@@ -9,7 +9,6 @@ from rich.text import Text
 
 from proofroll_drill.arithmetic.matrix import Tried
 from proofroll_drill.mutants.drilling import Mutated
-from proofroll_drill.published import Held
 from proofroll_drill.row import Drilled
 
 
@@ -45,22 +44,6 @@ def mutant_table(rows: Sequence[Mutated]) -> Table:
             Text("yes", style="green") if yes else Text("NO", style="bold red") for yes in (row.detected, row.named)
         ]
         table.add_row(row.fault, *marks, Text(row.said or f"nothing proven; {row.by}", overflow="fold"))
-    return table
-
-
-def published_table(rows: Sequence[Held]) -> Table:
-    """One line per published number: ours beside it, and whether it misses."""
-    table = Table(box=None, padding=(0, 1, 0, 0))
-    table.add_column("scene", no_wrap=True)
-    table.add_column("number", overflow="fold")
-    for name in ("published", "ours"):
-        table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("")
-    for row in rows:
-        digits = ".2g" if row.kind == "error" else ".13g"
-        marks = Text(row.why or "MISSES", style="bold red") if row.misses else Text(row.why or "holds", style="green")
-        what = f"error of {row.what}" if row.kind == "error" else row.what
-        table.add_row(row.scene, what, f"{row.published:{digits}}", f"{row.ours:{digits}}", marks)
     return table
 
 

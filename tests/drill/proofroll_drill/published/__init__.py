@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import tomllib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -44,8 +44,15 @@ class Held:
     misses: bool
     why: str = ""
 
+    @property
+    def text(self) -> str:
+        """Line for a person: the published number, ours, and whether it misses."""
+        digits, of = (".2g", "error of ") if self.kind == "error" else (".13g", "")
+        found = f"{self.published:{digits}} published, {self.ours:{digits}} ours"
+        return f"{'✗' if self.misses else '✓'} {self.scene}: {of}{self.what}: {found} {self.why}".rstrip()
 
-def held(scenes: list[str], advance: Callable[[str], None] = lambda _: None) -> Iterator[Held]:
+
+def held(scenes: list[str]) -> Iterator[Held]:
     """Every published number of some scenes, all if none is named."""
     file = tomllib.loads(FILE.read_text(encoding="utf-8"))
     known = dict.fromkeys(entry["scene"] for kind in ("truths", "errors") for entry in file[kind])
@@ -55,7 +62,6 @@ def held(scenes: list[str], advance: Callable[[str], None] = lambda _: None) -> 
         for entry in file[kind]:
             if not scenes or entry["scene"] in scenes:
                 yield from hold(entry)
-                advance(f"{kind} of {entry['scene']}")
 
 
 def _truths(entry: Mapping[str, Any]) -> Iterator[Held]:
