@@ -185,7 +185,7 @@ def _check(where: str, file: StabilityFile) -> None:
             raise InputError(f"{where}: axes.{index}.values", "nothing", "an axis needs its values; add them")
         for value in axis.values:
             # a parameter may be infinite, the length of a run not
-            if math.isnan(value) or (axis.horizon and not (math.isfinite(value) and value > 0)):
+            if not value > -math.inf or (axis.horizon and not (math.isfinite(value) and value > 0)):
                 what = "a length in natural times that is positive and finite" if axis.horizon else "a number"
                 raise InputError(f"{where}: axes.{index}.values", value, f"give {what}")
         axis.at(scene, axis.values[0])

@@ -405,6 +405,7 @@ BROKEN = [
     ('study = "stability"', 'study = "tradeoff"', "can be used here"),
     ("parameters.speed = {}", "parameters.spee = {}", "no such parameter"),
     ("values = [1, 2]", "values = [1, nan]", "give a number"),
+    ("values = [1, 2]", "values = [1, -inf]", "give a number"),
     ("values = [1, 2]", "values = [1, inf]\nhorizon = true", "positive and finite"),
     ("speed = {}", "speed = { times = inf }", "give a finite number"),
     ("between = [0, 1]", "between = [nan, 1]", r"\[low, high\]"),
