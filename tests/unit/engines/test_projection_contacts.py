@@ -167,6 +167,15 @@ def test_feet_that_hold_together_share_their_friction() -> None:
     assert np.abs(run.sample().v_WB).max() < 1e-9
 
 
+@pytest.mark.drill
+def test_a_foot_that_turns_within_a_step_goes_on() -> None:
+    """At the end of a slide a foot may slip backwards after one coarse step: it has not stopped, and all rest soon."""
+    run = PROJECTION.build(load_scene("sled_on_slope"), replace(DEFAULT, dt=4e-3))
+    run.advance(1.0)
+    assert np.hypot(*(run.sample().p_WB[0, :2] - (0.3727448404, 0.308618949299))) < 2e-4
+    assert [event.kind for event in run.events()] == ["stick"] * 3
+
+
 def test_a_ball_that_hardly_falls_comes_to_rest() -> None:
     """Rebounds from a tenth of a nanometre are few: the last ones are summed, as those of any fall are."""
     scene = load_scene("spinning_bounce", height=0.05 + 1e-10, restitution=0.5)

@@ -254,6 +254,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
             slips = [float(np.linalg.norm(across(each))) for each in now.touching]
             still = [stuck or own == k or slips[own] <= self._faint for own, stuck in enumerate(still)]
         mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
+        if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, and not stopped
+            mode = self._decided(now, closed, [stands and own != k for own, stands in enumerate(still)])
         for own, before, contact in zip(mode, was, self.contacts, strict=True):
             if own.kind != before.kind and (contact.name not in {name for _, name in happened} or own.kind == "stick"):
                 happened.append(("lift_off" if own.kind == "open" else own.kind, contact.name))
