@@ -1,17 +1,46 @@
-"""A table of results as a notebook shows it."""
+"""A table of results as a notebook shows it, with a small drawing in each row."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from html import escape
 
+_DECADES, _WIDTH, _HEIGHT = 6, 120, 14  # to each side of the tolerance; of a gauge, in pixels
 
-def html_table(head: str, columns: Sequence[str], rows: Iterable[Sequence[str]], notes: Iterable[str] = ()) -> str:
-    """HTML of a heading, a table whose first column names the rows, and a paragraph for each note; all are texts."""
-    header = "".join(f"<th>{escape(name)}</th>" for name in columns)
+
+def gauge(error: float, tolerance: float) -> str:
+    """SVG of an error on a logarithmic axis whose middle is the tolerance; what is off the axis stands at its end."""
+    ratio = error / tolerance
+    decades = _DECADES if not ratio < math.inf else math.log10(max(ratio, 1e-300))
+    x = _WIDTH * (0.5 + 0.45 * min(max(decades / _DECADES, -1), 1))
+    color, middle, words = "#2e7d32" if ratio <= 1 else "#c62828", _WIDTH / 2, f"{ratio:.2g} of the tolerance"
+    return (
+        f'<svg role="img" width="{_WIDTH}" height="{_HEIGHT}"><title>{words}</title>'
+        f'<line x1="0" x2="{_WIDTH}" y1="7" y2="7" stroke="#999"/>'
+        f'<line x1="{middle:g}" x2="{middle:g}" y1="0" y2="{_HEIGHT}" stroke="#999"/>'
+        f'<circle cx="{x:.4g}" cy="7" r="4" fill="{color}"/></svg>'
+    )
+
+
+def html_table(
+    head: str,
+    columns: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    notes: Iterable[str] = (),
+    *,
+    gauges: Iterable[str] = (),
+) -> str:
+    """HTML of a heading, a table whose first column names the rows, and a paragraph for each note; all are texts.
+
+    In a last column stands the gauge of each row, empty where it has none.
+    """
+    drawn = list(gauges)
+    header = "".join(f"<th>{escape(name)}</th>" for name in [*columns, *(["error by tolerance"] if drawn else [])])
     body = "".join(
-        f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>"
-        for name, *cells in rows
+        f"<tr><th>{escape(name)}</th>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}"
+        f"{f'<td>{drawn[number]}</td>' if drawn else ''}</tr>"
+        for number, (name, *cells) in enumerate(rows)
     )
     rest = "".join(f"<p>{escape(note)}</p>" for note in notes)
     return f"<p><b>{escape(head)}</b></p><table><tr>{header}</tr>{body}</table>{rest}"

@@ -15,7 +15,7 @@ from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.scene_file import SceneFile
 from proofroll.files.trajectory_file import StoredTrajectory
 from proofroll.running.case import Case, EngineFacts, Result, Status
-from proofroll.studies.html_table import html_table
+from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging.reference import Reference
 
 SEVERITY = list(Verdict)
@@ -164,7 +164,7 @@ class Outcome:
 
     def _repr_html_(self) -> str:
         """A row for each run, with what is furthest beyond its tolerance, for a notebook."""
-        rows = []
+        rows, gauges = [], []
         for run in self.runs:
             worst_of = max(run.judgements, key=lambda item: item.error / item.tolerance, default=None)
             said = ["", "", "", run.result.message]
@@ -172,10 +172,11 @@ class Outcome:
                 unit = "" if worst_of.unit == "1" else f" {worst_of.unit}"
                 off = [number(value) + unit for value in (worst_of.error, worst_of.tolerance)]
                 said = [worst_of.observable, *off, worst_of.reason]
+            gauges.append("" if worst_of is None else gauge(worst_of.error, worst_of.tolerance))
             name = " ".join([run.row.engine, *(f"{key}={value:g}" for key, value in run.parameters.items())])
             cost = run.result.seconds_per_second
             rows.append((name, str(run.verdict), *said[:3], "" if cost is None else number(cost), said[3]))
         columns = ("", "verdict", "furthest", "off by", "allowed", "s/s", "why")
         left = f"Left out for lack of time: {', '.join(self.beyond_budget)}"
         notes = [*self.contradictions, *([left] if self.beyond_budget else [])]
-        return html_table(self.comparison.title, columns, rows, notes)
+        return html_table(self.comparison.title, columns, rows, notes, gauges=gauges)

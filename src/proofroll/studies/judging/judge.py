@@ -20,7 +20,7 @@ from proofroll.core.truth import truth
 from proofroll.core.turns import samples_between
 from proofroll.core.verdict import Doubt, Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
-from proofroll.studies.html_table import html_table
+from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import held_against
 from proofroll.studies.judging.given_run import GivenRun, Run, read_run
 from proofroll.studies.judging.held_against import turned_alike
@@ -100,7 +100,7 @@ class Judged:
         return "\n".join([head, *lines])
 
     def _repr_html_(self) -> str:
-        """The same as a table, for a notebook."""
+        """The same as a table with gauges, for a notebook."""
         head, *lines = str(self).splitlines()
         rows = []
         for item in self.compared:
@@ -112,7 +112,8 @@ class Judged:
             when = "" if item.at is None else f"{item.at:.4g} s"
             rows.append((judgement.observable, f"{sign} {judgement.verdict.value}", *numbers, when))
         columns = ("", "verdict", "off by", "allowed", "truth known to", "at")
-        return html_table(head, columns, rows, map(str.strip, lines[len(rows) :]))
+        gauges = [gauge(item.judgement.error, item.judgement.tolerance) for item in self.compared]
+        return html_table(head, columns, rows, map(str.strip, lines[len(rows) :]), gauges=gauges)
 
     def content(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -17,6 +17,7 @@ def test_a_notebook_shows_a_comparison(tmp_path: Path, monkeypatch: pytest.Monke
     assert [run.parameters for run in found.runs] == [{"length": 2.0}] * len(found.runs)
     shown = found._repr_html_()
     assert shown.count("<tr>") == 1 + len(found.runs)
+    assert shown.count("</svg>") == len(found.runs)
     assert "<th>projection[formulation=dependent] length=2</th><td>agrees</td>" in shown
 
 
