@@ -15,7 +15,7 @@ def ladder(
     settings: options.Set = None,
     quantity: Annotated[str | None, typer.Option(help="Observable; by default what decides the scene.")] = None,
     tolerance: Annotated[float | None, typer.Option(help="Error of it that is allowed, in its unit.")] = None,
-    until: Annotated[float, typer.Option(help="Last time [s].")] = 2.0,
+    until: options.Until = None,
     engine: options.Engines = None,
     rounds: Annotated[
         int | None,

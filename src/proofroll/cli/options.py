@@ -77,6 +77,10 @@ Budget = Annotated[
         "--budget", min=1, help="Processor-seconds for a scene or robot file, with what engines compile; by default 60."
     ),
 ]
+Until = Annotated[
+    float | None,
+    typer.Option("--until", help="Last time [s]; by default 2, or the scene's duration where that is shorter."),
+]
 Set = Annotated[list[str] | None, typer.Option("--set", help="parameter=value in SI units; repeat.")]
 
 

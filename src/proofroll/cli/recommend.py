@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from proofroll.cli import options
-from proofroll.cli.tradeoff import Over, Until, measure, question_of, ranges_of, require_observables
+from proofroll.cli.tradeoff import Over, measure, question_of, ranges_of, require_observables
 from proofroll.core.errors import InputError, require_known
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ def recommend(
         list[str] | None, typer.Option(help="Choose among these engines, name[key=value,…]; repeat.")
     ] = None,
     over: Over = None,
-    until: Until = None,
+    until: options.Until = None,
     measure_first: Annotated[bool, typer.Option("--measure", help="Measure first if no curves are stored.")] = False,
     forces: Annotated[bool, typer.Option("--forces", help="Forces count as the motion does; from a report.")] = False,
     report: Annotated[

@@ -25,9 +25,7 @@ def run(
         ),
     ],
     settings: options.Set = None,
-    until: Annotated[
-        float | None, typer.Option(help="Last time [s]; by default 2, or the scene's duration where that is shorter.")
-    ] = None,
+    until: options.Until = None,
     every: Annotated[
         float | None, typer.Option(help="Interval between samples [s]; by default 0.01, or near it in whole steps.")
     ] = None,

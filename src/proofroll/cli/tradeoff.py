@@ -19,11 +19,9 @@ if TYPE_CHECKING:
 SceneOrFile = Annotated[
     str, typer.Argument(help="A scene, or a comparison file for it, e.g. comparisons/tradeoff.toml.")
 ]
-Until = Annotated[float | None, typer.Option("--until", help="Length of every run [s].")]
 Over = Annotated[
     list[str] | None, typer.Option(help="parameter=low:high over which the best points are checked; repeat.")
 ]
-_DEFAULT_UNTIL = 2.0
 
 
 def tradeoff(
@@ -36,7 +34,7 @@ def tradeoff(
         list[str] | None, typer.Option(help="Engine, or name[key=value,…]; repeat. All by default.")
     ] = None,
     over: Over = None,
-    until: Until = None,
+    until: options.Until = None,
     budget: options.Budget = None,
     every_point: Annotated[bool, typer.Option("--all", help="List every point, not only the best.")] = False,
     out: options.Out = Path("out"),
@@ -73,6 +71,7 @@ def question_of(
     """Claims and question of the file; another question about its scene has no claims."""
     from proofroll.core.time_grid import time_grid
     from proofroll.files.scene_file import is_scene, load_scene
+    from proofroll.studies.cases import usual_length
     from proofroll.studies.tradeoff.claims import claims_for, load_claims
     from proofroll.studies.tradeoff.curve import Question
 
@@ -84,7 +83,7 @@ def question_of(
         quantity = quantities[0] if quantities else claims.quantity
         return claims, Question(name, claims.parameters, claims.until, quantity)
     loaded = load_scene(name, **given)  # type: ignore[arg-type]  # text is checked and converted there
-    length = _DEFAULT_UNTIL if until is None else until
+    length = usual_length(name) if until is None else until
     time_grid(length, length or 1.0)
     if length <= 0:
         raise InputError("until", length, "give a positive time in s")

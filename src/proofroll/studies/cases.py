@@ -15,8 +15,12 @@ from proofroll.running.asking import resolve
 from proofroll.running.case import Case, EngineFacts
 from proofroll.running.worker_pool import Workers
 
-# Length of a run that nobody gives [s].
-USUAL = 2.0
+_USUAL = 2.0  # s
+
+
+def usual_length(scene: str) -> float:
+    """Length of a run where none is given: 2 s, or the ``duration`` of the scene's file where that is shorter [s]."""
+    return min(_USUAL, read_scene_file(scene).duration or _USUAL)
 
 
 def case_of(
@@ -43,7 +47,7 @@ def single_case(
 ) -> Case:
     """The case of one run.
 
-    Without ``until`` it ends after 2 s, or sooner where the scene's file has a shorter ``duration``.
+    Without ``until`` its length is the :func:`usual_length`.
     Without an interval ``every`` between samples it is that of :func:`proofroll.core.time_grid.sampling_interval`.
     The engine is asked in one of ``workers``, if they are given: the run can then go on in the same process.
 
@@ -63,7 +67,7 @@ def single_case(
     if isinstance(facts, ProofrollError):
         raise facts
     if until is None:
-        until = min(USUAL, read_scene_file(scene).duration or USUAL)
+        until = usual_length(scene)
     if every is None:
         every = sampling_interval(facts.step)
     return case_of(scene, loaded, parameters, facts, until, every, time_limit=time_limit, turns=True)

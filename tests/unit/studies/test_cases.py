@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from proofroll.cli.tradeoff import question_of
+from proofroll.running.runner import Runner
+from proofroll.running.store import Store
 from proofroll.studies.cases import single_case
+from proofroll.studies.ladder.ladder import Ladder
 
 
 @pytest.mark.parametrize(
@@ -13,3 +19,9 @@ from proofroll.studies.cases import single_case
 def test_a_run_lasts_two_seconds_or_as_long_as_its_scene(scene: str, until: float) -> None:
     """Without a last time a scene of 0.03 s is not computed for minutes, nor one of 10 s whole."""
     assert single_case(scene, {}, "truth", until=None, every=None, time_limit=60.0).until == until
+
+
+def test_studies_last_as_long_as_a_run(tmp_path: Path) -> None:
+    """A trade-off and a ladder of a scene of 0.7 s end there, where nobody gives another time."""
+    assert question_of("sled", None, None, None)[1].until == 0.7
+    assert Ladder("sled", {}, Runner(Store(tmp_path)), engines=("projection",)).until == 0.7

@@ -25,7 +25,7 @@ from proofroll.running.process import WorkerDied
 from proofroll.running.runner import Runner
 from proofroll.running.stopwatch import Stopwatch
 from proofroll.running.timing import ROUNDS, Timing, interleaved
-from proofroll.studies.cases import case_of
+from proofroll.studies.cases import case_of, usual_length
 from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
 from proofroll.studies.ladder.models import LadderModel, Rung, Switch, rungs, switches
@@ -64,7 +64,8 @@ class Ladder:
         truths: by the parameters that a switch puts over the given ones, as text.
         engines: what every engine tells of itself, or why it cannot.
 
-    Without a ``quantity`` it is what decides the scene, until the time ``until`` [s], of all engines if none are named.
+    Without a ``quantity`` it is what decides the scene, until the time ``until`` [s], by default the usual length, of
+    all engines if none are named.
     Without a ``tolerance`` of it, in its unit, a term counts if it moves the quantity by more than the smaller of the
     errors with and without it. So many ``rounds`` of the timing count.
 
@@ -80,11 +81,12 @@ class Ladder:
         runner: Runner,
         *,
         quantity: str | None = None,
-        until: float = 2.0,
+        until: float | None = None,
         tolerance: float | None = None,
         engines: Sequence[str] = (),
         rounds: int | None = None,
     ) -> None:
+        until = usual_length(scene) if until is None else until
         time_grid(until, _EVERY)  # what makes no sense is refused there
         if until <= 0:
             raise InputError("until", until, "give a time in s that is positive")
