@@ -16,7 +16,7 @@ import pytest
 from honest import Rolling
 from liars import of_mechanism
 from lies import gravity, heavier
-from nonconforming import FAILS, Damped, Forgetful, Heavy
+from nonconforming import FAILS, Damped, Forgetful, Heavy, OneBuffer, OneForAll, Views
 from single_precision import Single
 from tiny import Tiny, TinySettings
 
@@ -80,6 +80,13 @@ def test_each_broken_promise_is_noticed(engine: type[Tiny], family: str) -> None
     assert text, f"{family} did not notice: {engine.__doc__}"
     assert f"from nonconforming import {engine.__name__}" in text
     assert f"run_check({engine.__name__}, '{family}" in text
+
+
+@pytest.mark.parametrize("engine", [Views, OneBuffer, OneForAll])
+def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
+    """Whoever fills the arrays of a sample again, by a step or the next sample, reads that copies are missing."""
+    text = failure(engine, "reading_back_changes_nothing")
+    assert text.startswith("the arrays of a sample change with later steps: return copies")
 
 
 def test_every_check_is_known_to_be_able_to_fail() -> None:

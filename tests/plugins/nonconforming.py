@@ -312,6 +312,28 @@ class Views(Breaking, breaks="reading_back_changes_nothing"):
         self.sample()
 
 
+class OneBuffer(Breaking, breaks="reading_back_changes_nothing"):
+    """Gives the same arrays each time, which the next sample fills anew."""
+
+    buffer: BallSample | None = None
+
+    def _told(self, right: BallSample) -> BallSample:
+        if self.buffer is None:
+            self.buffer = right
+        for name in ("p_WB", "v_WB", "w_WB", "force"):
+            getattr(self.buffer, name)[:] = getattr(right, name)
+        return self.buffer
+
+
+class OneForAll(OneBuffer, breaks="reading_back_changes_nothing"):
+    """The same for all that are built."""
+
+    def _told(self, right: BallSample) -> BallSample:
+        if OneForAll.buffer is None:
+            OneForAll.buffer = right
+        return super()._told(right)
+
+
 class Moody(Breaking, breaks="advance_is_repeatable"):
     """Moves a little differently each time it is built."""
 
@@ -357,6 +379,21 @@ class Lazy(Breaking, breaks="samples_cost_the_same"):
             time.sleep(2e-3)
             super().advance(min(self.t + self.dt, self.due))
         return super().sample()
+
+
+class HandedOver(Lazy, breaks="samples_cost_the_same"):
+    """Hands its cheap steps over, which costs more than a hundred of them."""
+
+    def advance(self, t: float) -> None:
+        """Later."""
+        time.sleep(5e-3)
+        super().advance(t)
+
+    def sample(self) -> BallSample:
+        """State after the steps that were put off, and a moment for the look at it."""
+        time.sleep(2e-3 + 2e-5 * (self.due - self.t) / self.dt)
+        self.t = self.due
+        return Tiny.sample(self)
 
 
 class Shared(Breaking, breaks="engines_do_not_disturb_each_other"):
