@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from proofroll.core.dataset import part
 from proofroll.core.engine_abilities import Level, offered
 from proofroll.core.errors import ProofrollError
+from proofroll.core.multi_element import represents
 from proofroll.core.number_format import number
 from proofroll.core.scene import Scene
 from proofroll.running.case import EngineDescription
@@ -114,9 +115,16 @@ def _with(model: LadderModel, options: Mapping[str, Any]) -> LadderModel:
 def switches(
     ladder: Sequence[Rung], engines: Mapping[str, EngineDescription | ProofrollError], scene: Scene, truth: xr.Dataset
 ) -> list[Switch]:
-    """Every optional term: the scene's in one model of each engine and level, the engine's in each that has it."""
+    """Every optional term: the scene's in one model of each engine and level, the engine's in each that has it.
+
+    A model that refuses the scene has no terms to be switched.
+    """
     switches_of_terms: list[Switch] = []
-    models = [(rung.level, rung.model) for rung in ladder if rung.model is not None and not rung.variant]
+    models = [
+        (rung.level, rung.model)
+        for rung in ladder
+        if rung.model is not None and not rung.variant and _represents(engines[rung.model.engine], rung.model, scene)
+    ]
     seen: set[tuple[str, Level]] = set()
     for level, model in models:
         told = engines[model.engine]
@@ -133,6 +141,10 @@ def switches(
             if model.formulation in term.formulations
         ]
     return switches_of_terms
+
+
+def _represents(told: EngineDescription | ProofrollError, model: LadderModel, scene: Scene) -> bool:
+    return isinstance(told, EngineDescription) and represents(scene, model.formulation, told.provides)
 
 
 def _of_the_scene(model: LadderModel, scene: Scene, truth: xr.Dataset, inherent: Mapping[str, str]) -> list[Switch]:

@@ -23,7 +23,7 @@ from proofroll.running.runner import Runner
 from proofroll.running.simulation import simulate
 from proofroll.running.store import Store
 from proofroll.studies.ladder.ladder import Ladder, ModelAnswer, key_of
-from proofroll.studies.ladder.models import LadderModel
+from proofroll.studies.ladder.models import LadderModel, switches
 
 UNTIL = 0.2
 
@@ -57,6 +57,14 @@ def test_a_model_that_is_right_on_the_grid_alone_is_wrong(
         values = observe(study.scene, run)["z"]
         study.answers[key_of(model)] = ModelAnswer(None, Result(Status.DONE, ""), values, run)
         assert study.error(model, {}) == pytest.approx(wrong, abs=1e-12)
+
+
+def test_a_model_that_refuses_the_scene_has_no_terms(tmp_path: Path) -> None:
+    """It stands on the ladder with its reason; what it would be without a term it cannot have is no question."""
+    study = Ladder("sled", {}, Runner(Store(tmp_path)), engines=("exudyn",))
+    assert {rung.model.formulation for rung in study.ladder if rung.model} > {"spheres"}
+    truth = simulate(study.scene, "truth", until=0.01)
+    assert {one.model.formulation for one in switches(study.ladder, study.engines, study.scene, truth)} == {"spheres"}
 
 
 def error_of(f: float, options: str) -> float:
