@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import re
 import subprocess
 import sys
 from collections.abc import Callable, Mapping
@@ -16,11 +18,11 @@ import pytest
 from honest import Rolling
 from liars import of_mechanism
 from lies import gravity, heavier
-from nonconforming import FAILS, Damped, Forgetful, Heavy, OneBuffer, OneForAll, Views
+from nonconforming import FAILS, Damped, Drifting, Forgetful, Heavy, OneBuffer, OneForAll, Secretly, Views
 from single_precision import Single
 from tiny import Tiny, TinySettings
 
-from proofroll.conformance import Check, checks, run_check
+from proofroll.conformance import Check, checks, motion, run_check
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.plugins import load_engine
 from proofroll.core.scene import Scene
@@ -87,6 +89,33 @@ def test_a_buffer_that_is_filled_anew_is_named(engine: type[Tiny]) -> None:
     """Whoever fills the arrays of a sample again, by a step or the next sample, reads that copies are missing."""
     text = failure(engine, "reading_back_changes_nothing")
     assert text.startswith("the arrays of a sample change with later steps: return copies")
+
+
+def test_a_precision_that_is_not_told_is_the_first_failure() -> None:
+    """The first check that fails of an engine in single precision that does not say so names the setting it lacks."""
+    families = dict.fromkeys(check.name.partition("[")[0] for check in checks(Secretly))
+    families.pop("name_is_the_entry_point")
+    first, text = next((family, text) for family in families if (text := failure(Secretly, family)))
+    assert first == "samples_are_well_formed"
+    assert 'settings of the engine must say precision = "single"' in text
+
+
+def test_no_order_is_told_in_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Steps that differ by round-off alone are called that, where others show no order either."""
+    orders = iter([(math.nan, math.nan), (2.71, 2.87), (math.nan, math.nan)])
+    monkeypatch.setattr(motion, "_orders", lambda *_: next(orders))
+    said = failure(Tiny, "order_is_as_declared")
+    assert "none is observed: no more than round-off at dt = 0.004; 2.71, 2.87 at dt = 0.008" in said
+    assert "nan" not in said
+
+
+def test_a_scale_is_named() -> None:
+    """An error that is told relative to a scale names the number of the scale, and the error itself, with units."""
+    text = failure(Drifting, "moves_as_the_truth")
+    found = re.match(r"p_WB is off by (\S+) m, (\S+) of its scale in a run of 0.1 s, (\S+) m; allowed \S+", text)
+    assert found
+    error, part, scale = map(float, found.groups())
+    assert error == pytest.approx(part * scale, rel=0.1)
 
 
 def test_every_check_is_known_to_be_able_to_fail() -> None:

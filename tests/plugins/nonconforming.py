@@ -295,6 +295,22 @@ class Hushed(Breaking, breaks="samples_are_well_formed"):
         return right if self.t == 0 else dataclasses.replace(right, force=None)
 
 
+class Secretly(Breaking, breaks="samples_are_well_formed"):
+    """Computes in single precision, and does not say so; its velocity is put together in doubles."""
+
+    @property
+    def x(self) -> Any:
+        """The state."""
+        return np.array(self.own, dtype=np.float64)
+
+    @x.setter
+    def x(self, value: Any) -> None:
+        self.own = np.array(value, dtype=np.float32)
+
+    def _told(self, right: BallSample) -> BallSample:
+        return dataclasses.replace(right, p_WB=right.p_WB.astype(np.float32).astype(np.float64))
+
+
 class Views(Breaking, breaks="reading_back_changes_nothing"):
     """Gives the array that it goes on working with."""
 

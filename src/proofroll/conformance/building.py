@@ -10,10 +10,11 @@ from unittest import SkipTest
 import numpy as np
 
 from proofroll.conformance.subject import Subject, UnlikeSceneError, bits, lacking, require, scenes
-from proofroll.core.certificate import EXACT, ROUNDINGS, certify, first_difference
+from proofroll.core.arrays import in_single_precision
+from proofroll.core.certificate import EXACT, ROUNDINGS, SAY_SINGLE, certify, first_difference
 from proofroll.core.element import Element
 from proofroll.core.element_abilities import HasOptionalCapabilities
-from proofroll.core.engine import Sample
+from proofroll.core.engine import Sample, precision_of
 from proofroll.core.engine_abilities import require_provided
 from proofroll.core.errors import Missing, Refused
 from proofroll.core.multi_element import REQUIRED
@@ -102,7 +103,7 @@ def _listed(capabilities: Iterable[str]) -> str:
 
 
 def samples_are_well_formed(subject: Subject) -> None:
-    """Samples hold finite arrays of doubles of the right shapes; the orientation starts as the identity."""
+    """Samples hold finite arrays of the right shapes, in the declared precision; orientations start as identity."""
     start = subject.build()
     (element,) = subject.scene.elements
     first = start.sample()
@@ -116,6 +117,13 @@ def samples_are_well_formed(subject: Subject) -> None:
         )
     moved = subject.at(subject.span(1)).sample()
     _well_formed(moved, element, "after a step")
+    for name in REQUIRED if precision_of(subject.settings) == "double" else ():
+        before, after = (getattr(sample, name) for sample in (first, moved))
+        require(
+            not in_single_precision(after[after != before]),
+            f"after a step every number of {name} is one of single precision (float32), though settings say double, or "
+            f"nothing: {SAY_SINGLE}",
+        )
     for name in element.sample_type.widths:
         lost = getattr(first, name) is not None and getattr(moved, name) is None
         require(not lost, f"{name} is there at time 0, and not later; only time 0 may lack one")

@@ -17,6 +17,7 @@ from proofroll.core.dataset import columns_of, part, scales
 from proofroll.core.engine import precision_of
 from proofroll.core.events import events_of
 from proofroll.core.first_steps import MOST, first_steps, softness
+from proofroll.core.number_format import number
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import round_off_of
@@ -29,7 +30,7 @@ _LENGTH = 0.1
 _PARTS = (2**0.5 - 1, (5**0.5 - 1) / 2, np.pi / 4, 1.0)
 # On the grid of this step [s] they are whole numbers of most steps that engines make, so that one truth serves these.
 _STEP = 2e-3
-# Largest difference, relative to what gravity does in that time: more, and the ball goes somewhere else.
+# Largest difference, relative to what accelerations as at the start make of it: more, and it goes somewhere else.
 _MOST = 0.1
 # An error is at most twice the change from a step to its half; as much again is spared for the terms beyond the first.
 _MARGIN = 4.0
@@ -68,8 +69,12 @@ def moves_as_the_truth(subject: Subject) -> None:
         rough = max(_ROUND_OFF, 10 * subject.closeness, round_off_of(precision_of(subject.settings), size))
         allowed = min(_MOST, _MARGIN * change + soft + rough + beside.get(name, 0.0) / sizes[name])
         if error > allowed or math.isnan(error):
-            made = f"of what gravity makes of it in {times[-1]:.2g} s"
-            raise UnlikeSceneError(subject, f"{name} is off by {error:.2g} {made}, allowed {allowed:.2g}")
+            unit, scale = true[name].attrs["units"], sizes[name]
+            raise UnlikeSceneError(
+                subject,
+                f"{name} is off by {number(error * scale)} {unit}, {error:.2g} of its scale in a run of "
+                f"{times[-1]:.2g} s, {number(scale)} {unit}; allowed {allowed:.2g}",
+            )
 
 
 def _times(step: float | None) -> FloatArray:

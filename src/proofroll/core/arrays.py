@@ -37,6 +37,11 @@ def read_only(item: T) -> T:
     return item
 
 
+def in_single_precision(values: FloatArray) -> bool:
+    """True if each number is exactly one of 24 bits (float32), and some are not whole; few doubles are by chance."""
+    return bool(np.any(values % 1) and np.array_equal(values, values.astype(np.float32)))
+
+
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross products of two vectors or lists of vectors, (3,) or (n, 3); several times faster than numpy's."""
     product: FloatArray = a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1)

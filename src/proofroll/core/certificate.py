@@ -22,6 +22,9 @@ EXACT = 1e-12
 ROUNDINGS = 64.0
 # How the reason of a line ends that allows the roundings of such an engine.
 ROUNDED = "single precision"
+# So many times the largest expected number, the scale of a difference is named.
+_OTHER = 1.2
+SAY_SINGLE = 'settings of the engine must say precision = "single"'
 # Numbers of one quantity that fit into a sentence: an inertia has nine.
 _SHOWN = 9
 
@@ -155,7 +158,7 @@ def first_difference(lines: list[Line]) -> str | None:
         refused = f"; {line.quantity} {line.because}" if line.tolerance == EXACT and line.because else ""
         return (
             f"the engine's model differs from the scene: {line.quantity} is {built} instead of "
-            f"{expected} {line.unit}{where} (relative difference {number(line.difference)}, "
+            f"{expected} {line.unit}{where} (relative difference {number(line.difference)}{_scale(line)}, "
             f"allowed {number(line.tolerance)}){refused}{_single(line)}"
         )
     return None
@@ -184,6 +187,15 @@ def told_apart(found: tuple[float, ...], expected: tuple[float, ...]) -> tuple[s
     return one, other
 
 
+def _scale(line: Line) -> str:
+    """Clause with the scale of a difference that is not relative to the numbers beside it; empty: it is."""
+    if len(line.found) != len(line.expected) or not line.difference:
+        return ""
+    expected = np.array(line.expected)
+    scale = float(np.nanmax(np.abs(np.array(line.found) - expected))) / line.difference
+    return f" of {number(scale)} {line.unit}" if scale > _OTHER * np.nanmax(np.abs(expected)) else ""
+
+
 def _single(line: Line) -> str:
     """Note that built numbers are the scene's rounded to single precision; empty: they are not."""
     if len(line.found) != len(line.expected) or line.found == line.expected:
@@ -191,4 +203,4 @@ def _single(line: Line) -> str:
     one, other = np.array(line.found), np.array(line.expected, dtype=np.float32).astype(float)
     if not np.array_equal(one, other):
         return ""
-    return '; it is the same number in single precision (float32): settings of the engine must say precision = "single"'
+    return f"; it is the same number in single precision (float32): {SAY_SINGLE}"

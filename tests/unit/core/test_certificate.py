@@ -13,3 +13,13 @@ def test_of_many_numbers_the_one_furthest_off_is_shown() -> None:
     assert said is not None
     assert "is 100.5 instead of 100 m/s^2 (the one of 240 numbers that is furthest off)" in said
     assert len(said) < 240
+
+
+def test_a_difference_names_its_scale() -> None:
+    """Where a difference is not relative to the numbers beside it, what it is relative to is told."""
+    for scale, told in (
+        (67.0, "(relative difference 0.1, allowed"),
+        (2800.0, "(relative difference 2.4e-3 of 2.8e3 rad"),
+    ):
+        said = first_difference([Line("spin", "rad/s^2", (67.0,), (60.3,), 6.7 / scale, 1e-9)])
+        assert told in str(said)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from proofroll.core.arrays import FloatArray
+from proofroll.core.arrays import FloatArray, in_single_precision
 from proofroll.core.certificate import ROUNDED
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, apart, hypothesis
 from proofroll.core.diagnosis.clocks import late, said_delay, stretched
@@ -52,7 +52,7 @@ def single_precision_run(evidence: Evidence) -> Iterator[Cause]:
     if run is None or truth is None or said_so:
         return
     told = [run[name].to_numpy() for name in REQUIRED]
-    if all(np.any(said % 1) and np.array_equal(said, said.astype(np.float32)) for said in told):
+    if all(in_single_precision(said) for said in told):
         true, says = truth[REQUIRED[0]].to_numpy(), "every number of the run is a single-precision one (float32)"
         before = apart(told[0], true) if told[0].shape == true.shape else np.inf
         yield Cause("float32", says, REQUIRED[0], "m", before, 0.0, "compute and report in double precision")

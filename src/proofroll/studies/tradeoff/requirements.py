@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 # How many times smaller than the tolerance an error must be, at the scene's own parameters, to pass with margin.
 MARGIN = 2.0
+_COARSE = "the step is too coarse"
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,8 @@ def _why_not_here(study: TradeoffStudy, point: MeasuredPoint, name: str, absolut
     if error is None or held is None:
         return f"{name} has no finite error: {point.message}"
     if error > absolute:
-        return f"{name} is off by {number(error)} {unit}; {_blame(study, point, name, absolute)}"
+        blame = _COARSE if _finer_holds(study, point, name, absolute) else _blame(study, point, name, absolute)
+        return f"{name} is off by {number(error)} {unit}; {blame}"
     if held > absolute:
         finer = f"finer steps of the same model are off by {number(held)} {unit}"
         return f"its error of {number(error)} {unit} is luck: {finer}"
@@ -106,6 +108,12 @@ def _why_not_there(study: TradeoffStudy, point: MeasuredPoint, required: Require
     return None
 
 
+def _finer_holds(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> bool:
+    """True if a finer step of the same curve was measured that holds the tolerance with margin."""
+    finer = (p for p in study.points if p.curve == point.curve and (p.step or 0.0) < (point.step or 0.0))
+    return any(p.held(quantity) * MARGIN <= absolute for p in finer)
+
+
 def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: float) -> str:
     """Clause on the help to expect of a finer step."""
     budget = next((b for b in study.budgets if b.curve == point.curve and b.quantity == quantity), None)
@@ -121,4 +129,4 @@ def _blame(study: TradeoffStudy, point: MeasuredPoint, quantity: str, absolute: 
     if budget.model_form + (budget.model_form_bar or 0.0) > absolute:
         known = f"{number(budget.model_form)} off, known to {number(budget.model_form_bar or 0.0)}"
         return f"whether a finer step would do is not known: the limit of small steps is {known}"
-    return "the step is too coarse"
+    return _COARSE

@@ -225,6 +225,16 @@ def test_why_a_finer_step_would_not_do() -> None:
     assert "whether a finer step would do is not known: the limit of small steps is 5e-3 off, known to 4.9e-3" in said
 
 
+def test_a_finer_step_that_is_recommended_would_do() -> None:
+    """Whatever is known of the limit of small steps, a step that holds the tolerance shows that a finer one does."""
+    fine = point(4, "fast", 2e-3, 1e-5)
+    for bar in (4.9e-3, None):
+        unsure = [invented_budget(curve=FAST.curve, model_form=5e-3 if bar else None, model_form_bar=bar)]
+        answer = recommend(study(FAST, fine, budgets=unsure), required(1e-3))
+        assert answer["choice"]["step"] == fine.step
+        assert answer["first_failure"]["reason"].endswith("; the step is too coarse")
+
+
 def test_ties_are_marked_on_the_front() -> None:
     """A line of the front whose cost cannot be told from that of a more accurate one is marked, and the mark named."""
     near = point(4, "near", 1.15e-2, 1e-5)
