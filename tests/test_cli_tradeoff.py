@@ -207,10 +207,10 @@ def test_curves_of_another_version_are_not_answered_from(
     assert "--measure" in err
 
 
-def test_json_needs_no_library_of_pages(
+def test_an_answer_needs_no_library_of_pages(
     proofroll: Proofroll, measured: TradeoffStudy, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """JSON of a trade-off is there without matplotlib, and nothing is drawn; beside tables there is a diagram."""
+    """A trade-off has its tables and its JSON without matplotlib; in place of the diagram is how to get it."""
     monkeypatch.setattr(
         sys.modules["proofroll.cli.tradeoff"], "measure", lambda *_: (measured, tmp_path / "study.json")
     )
@@ -220,8 +220,11 @@ def test_json_needs_no_library_of_pages(
     code, out, err = proofroll(*given, "--json")
     assert (code, err) == (0, "")
     assert json.loads(out)["points"]
+    code, out, err = proofroll(*given)
+    assert (code, err) == (0, "")
+    assert "The Pareto front of the engines for z" in out
+    assert "no diagram: drawing needs matplotlib: pip install 'proofroll[report]'" in " ".join(out.split())
     assert not list(tmp_path.glob("*.svg"))
-    assert proofroll(*given)[0] == 3
 
 
 def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from proofroll.cli import options
-from proofroll.core.errors import InputError
+from proofroll.core.errors import InputError, Missing
 
 if TYPE_CHECKING:
     from proofroll.running.runner import Runner
@@ -54,14 +54,16 @@ def tradeoff(
     claims, question = question_of(scene, settings, quantity, until)
     require_observables(question, quantity or [])
     ranges = ranges_of(question, over) if over is not None else (claims.over if claims else {})
-    if not as_json:
-        options.require_pages()
     runner = options.new_runner(out, fresh, jobs, scheduler)
     study, path = measure(question, engine or [], ranges, claims, runner, out, budget)
     shown = [name for name in quantity or [] if name in study.quantities] or default_quantities(study)
+    diagram = f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
     if not as_json:
-        write_text(path.with_suffix(".svg"), svg(study, shown))
-    options.show(study, as_json, lambda: tradeoff_parts(study, shown, path, every_point=every_point))
+        try:
+            write_text(path.with_suffix(".svg"), svg(study, shown))
+        except Missing as missing:
+            diagram = f"There is no diagram: {missing}. Everything is in {path}."
+    options.show(study, as_json, lambda: [*tradeoff_parts(study, shown, every_point=every_point), diagram])
     raise typer.Exit(options.CONTRADICTED if study.claims.contradictions else options.OK)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Collection, Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.table import Column, Table
@@ -82,15 +81,12 @@ def _ranges(study: TradeoffStudy) -> str:
     return ", ".join(f"{name} {min(values):g} to {max(values):g}" for name, values in study.over.items())
 
 
-def tradeoff_parts(
-    study: TradeoffStudy, shown: Sequence[str], path: Path, *, every_point: bool
-) -> Iterator[Table | str]:
+def tradeoff_parts(study: TradeoffStudy, shown: Sequence[str], *, every_point: bool) -> Iterator[Table | str]:
     """Parts of a trade-off's text: its fronts or all its points, the makeup of errors, and the findings.
 
     Args:
-        study: stored in ``path``, its diagram beside it.
+        study: what was measured.
         shown: quantities with a column; the last tables are about the first of them.
-        path: see there.
         every_point: all points are listed, and errors described in sentences too.
     """
     if every_point:
@@ -106,7 +102,6 @@ def tradeoff_parts(
     yield from (f"{name}: {reason}" for name, reason in study.absent.items())
     yield from (f"?? {line}" for line in study.claims.undecided)
     yield from (f"!! {line}" for line in study.claims.contradictions)
-    yield f"The diagram is in {path.with_suffix('.svg')}, everything in {path}."
 
 
 def point_table(
