@@ -43,6 +43,8 @@ class Evidence:
         run, truth: the element's variables, at the same times; None: the engine was not run.
         step: of the engine [s], or None.
         settled: observables that were judged and found right: nothing about them is to be explained.
+        by_step: whether the limit of small steps leaves no more of the difference than a cause may: the run moves by
+            the scene's equations.
         found: what hypotheses have found in it, see :func:`proofroll.core.diagnosis.fitting.once`.
     """
 
@@ -52,6 +54,7 @@ class Evidence:
     truth: xr.Dataset | None = None
     step: float | None = None
     settled: frozenset[str] = frozenset()
+    by_step: bool = False
     found: dict[Any, Sequence[Any]] = field(default_factory=dict, init=False, repr=False, compare=False)
 
 

@@ -22,9 +22,8 @@ _STEP = 1e-4
 # A step that is coarse for a motion changes its equations as a factor near one does (Hairer, Lubich and Wanner 2006,
 # chapter IX: modified equations); a factor that nobody makes by mistake says nothing nearer to one than this.
 _METHOD = 1e-2
-# Part of the largest change from which on a number is changed at all.
+# Part of the largest change, or of the difference, from which on a number is changed at all.
 _CHANGED = 1e-6
-_TINY = np.finfo(float).tiny
 # Numbers that mistakes make: a fitted factor this near to one of them is taken to be it.
 _NEAR = 2e-3
 _NOTHING = 1e-5
@@ -80,7 +79,12 @@ def said_factor(factor: float) -> str:
 
 def telling(factor: float) -> bool:
     """True if a factor is that of a known mistake, or farther from 1 than a method's error can be."""
-    return known_factor(factor) is not None or abs(factor - 1) > _METHOD
+    return known_factor(factor) is not None or beyond_method(factor - 1, 1.0)
+
+
+def beyond_method(added: float, own: float) -> bool:
+    """True if what is added to a number of this size is more than a method's error can be."""
+    return abs(added) > _METHOD * own
 
 
 def possible(factor: float, signed: bool) -> bool:
@@ -115,10 +119,15 @@ class Residuals(Generic[M]):
 
     @cached_property
     def _changes(self) -> FloatArray:
-        """Changes that the other models make of the remainder, each by its size, shape (numbers, models)."""
+        """Changes that the other models make of the remainder, each by its size, shape (numbers, models).
+
+        Those of round-off, as of numbers that act on accelerations where there are none, are left out.
+        """
         at = self.left(self.plain)
         changed = np.stack([self.left(model) - at for model in self.others()], axis=-1)
-        return np.asarray(changed / (np.linalg.norm(changed, axis=0) + _TINY))
+        sizes = np.linalg.norm(changed, axis=0)
+        seen = sizes > _CHANGED * self.before
+        return np.asarray(changed[:, seen] / sizes[seen])
 
     @property
     def alone(self) -> bool:
@@ -188,7 +197,9 @@ def any_gravity(
             slopes = [held.left(falling(element, g + axis)) - at for axis in np.eye(3)]
             gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
             gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
-            says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
+            off, size = (float(np.linalg.norm(x)) for x in (gravity - g, g))
+            told = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
+            says = told if beyond_method(off, size) else ""
             yield held.cause("direction of gravity", says, falling(element, gravity), "look at the axes of gravity", 3)
 
     return test

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from proofroll.core.dataset import common_span, part
-from proofroll.core.diagnosis import Cause, Evidence, diagnose, hypotheses_of
+from proofroll.core.diagnosis import CLOSES, Cause, Evidence, diagnose, hypotheses_of
 from proofroll.core.observable import Role
 from proofroll.core.scene import Scene
 from proofroll.core.verdict import Judgement, Verdict
@@ -83,11 +83,18 @@ def diagnosed(
         ran = None if run is None else part(scene, element, run)
         true = None if truth is None else part(scene, element, truth)
         settled = frozenset(name.removesuffix(ending) for name in right if name.endswith(ending))
-        evidence = Evidence(element, own, ran, true, step, settled)
+        off = [item for item in judged if item.verdict in _WRONG and item.observable.endswith(ending)]
+        by_step = bool(off) and all(_closed_by_step(item) for item in off)
+        evidence = Evidence(element, own, ran, true, step, settled, by_step)
         diagnoses += [
             Diagnosis(element.name, cause, seen) for cause in diagnose(evidence, hypotheses_of(element))[:_MOST]
         ]
     return diagnoses
+
+
+def _closed_by_step(item: Judgement) -> bool:
+    """True if the limit of small steps closes an error as a cause has to."""
+    return item.limit_error is not None and item.limit_error <= CLOSES * item.error
 
 
 def what_is_right(scene: Scene, judgements: Iterable[Judgement]) -> str:

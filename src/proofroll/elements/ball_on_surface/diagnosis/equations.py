@@ -154,7 +154,9 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
         return
     if wrong and float(np.linalg.norm(body.v0)) > 0:
         yield held_at_start(evidence, body, wrong)
-    if evidence.run is None or evidence.truth is None or (_leaves(evidence.run) and not _leaves(evidence.truth)):
+    if evidence.run is None or evidence.truth is None or evidence.by_step:
+        return
+    if _leaves(evidence.run) and not _leaves(evidence.truth):
         return  # off the wall another law holds, and an impact has no derivative
     seen, true = states(body, evidence.run), states(body, evidence.truth)
     if seen is None or true is None:

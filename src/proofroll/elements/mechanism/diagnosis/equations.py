@@ -20,6 +20,7 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Evidence
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.drives import Actuator
+from proofroll.elements.mechanism.joint import WITH_QUATERNION
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -112,9 +113,13 @@ class MechanismStates:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """Scale of each balance: the largest term of inertia or loads."""
+        """Scale of each balance: the largest term of inertia or loads, about all axes of a joint that turns freely."""
         sizes = self._own[:, :2].reshape(-1, self.mechanism.nv)
         largest = np.max(np.abs(sizes), axis=0, initial=0.0)
+        for joint, at in zip(self.mechanism.joints, self.mechanism.v_slices, strict=True):
+            if joint.kind in WITH_QUATERNION:  # about an axis of symmetry there may be round-off alone
+                vectors = largest[at].reshape(-1, 3)
+                vectors[:] = np.max(vectors, axis=1, keepdims=True)
         return np.where(largest > 1e-9 * np.max(largest), largest, np.max(largest) or 1.0)
 
     def parts(self, change: Change) -> FloatArray:

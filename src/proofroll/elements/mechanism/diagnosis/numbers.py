@@ -10,9 +10,10 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, possible, said_factor, telling
+from proofroll.core.diagnosis.fitting import Residuals, beyond_method, possible, said_factor, telling
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
+from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 
 
@@ -179,8 +180,15 @@ def _about_origin(
 
 @hypothesis("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
 def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
-    """Damping or armature in one joint or in all, that the scene does not have."""
+    """Damping or armature in one joint or in all, that the scene does not have.
+
+    Coarse steps have them, too: an armature, or a damping times the natural time, within a hundredth of the inertia
+    that the joint moves at the start.
+    """
     mechanism = evidence.element.mechanism
+    equations = JointCoordinates(mechanism)
+    q, v = mechanism.start()
+    inertia = np.diag(equations.inertial(equations.tree.at(q, v))[1])
     for held in residuals_of(evidence):
         joints = zip(mechanism.joints, mechanism.v_slices, strict=True)
         each = [(f"the joint {joint.name}", np.eye(mechanism.nv)[at].sum(axis=0)) for joint, at in joints]
@@ -198,7 +206,9 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 value = -float(slope @ at) / square
                 if np.any(own[has] + value * which < 0):
                     continue
-                says = f"{where} has {what} of {value:.4g} more than the scene gives it"
+                told = f"{where} has {what} of {value:.4g} more than the scene gives it"
+                size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
+                says = told if beyond_method(size, float(np.min(inertia[which > 0]))) else ""
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
                 yield held.cause(f"{what} in {where}", says, change, remedy, 1)

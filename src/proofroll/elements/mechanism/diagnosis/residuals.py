@@ -47,7 +47,7 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     start = of_start(evidence)
     if start is not None and _FOLLOWS & wrong and not _STATE & wrong:
         yield balanced_at_start(start)
-    if evidence.run is None or evidence.truth is None:
+    if evidence.run is None or evidence.truth is None or evidence.by_step:
         return
     part = stretch(mechanism, evidence.run, evidence.truth)
     if part is None:

@@ -8,11 +8,14 @@ from functools import cache
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.spatial.transform import Rotation
 
 from proofroll.core.certificate import Line
 from proofroll.core.diagnosis import Evidence, diagnose, hypotheses_of
+from proofroll.core.diagnosis.of_scene import diagnosed
 from proofroll.core.scene import Scene
 from proofroll.core.truth import truth
+from proofroll.core.verdict import Judgement, Verdict
 from proofroll.elements.mechanism.diagnosis.equations import placed_of
 from proofroll.elements.mechanism.element import MechanismElement
 from proofroll.elements.mechanism.signal import Table
@@ -191,3 +194,90 @@ def test_places_and_velocities_may_both_be_of_the_centres_of_mass() -> None:
     run["v_WB"] += np.cross(placed.w_WB, arm)
     said = _told(scene, run, true)
     assert sum("of the centres of mass" in text for text in said) == 2
+
+
+def _top(true: xr.Dataset, step: float, armature: float = 0.0, damping: float = 0.0) -> xr.Dataset:
+    """The heavy top by Runge-Kutta 4 whose stages turn the attitude by mean spins: of order 2 for the spinning top."""
+    (element,) = load_scene("heavy_top").elements
+    mechanism = element.mechanism  # type: ignore[attr-defined]  # it has one
+    (body,) = mechanism.bodies
+    c, weight = np.array(body.com), body.mass * np.array(mechanism.gravity)
+    own = body.inertia + body.mass * (c @ c * np.eye(3) - np.outer(c, c))
+
+    def rate(R: Rotation, w: np.ndarray) -> np.ndarray:
+        moment = np.cross(c, R.inv().apply(weight)) - np.cross(w, own @ w) - damping * w
+        return np.linalg.solve(own + armature * np.eye(3), moment)
+
+    R = Rotation.from_quat(true["q_WB"].to_numpy()[0, 0], scalar_first=True)
+    w = R.inv().apply(np.array(true["w_WB"])[0, 0].copy())
+    states = [(R, w)]
+    for steps in np.rint(np.diff(true["time"]) / step).astype(int):
+        for _ in range(steps):
+            spins, rates = [w], [rate(R, w)]
+            for part in (0.5, 0.5, 1.0):
+                turned, spin = R * Rotation.from_rotvec(part * step * spins[-1]), w + part * step * rates[-1]
+                spins, rates = [*spins, spin], [*rates, rate(turned, spin)]
+            means = np.array([1, 2, 2, 1]) / 6
+            R, w = R * Rotation.from_rotvec(step * (means @ spins)), w + step * (means @ rates)
+        states.append((R, w))
+    found = {
+        "q_WB": [[R.as_quat(scalar_first=True)] for R, _ in states],
+        "w_WB": [[R.apply(w)] for R, w in states],
+    }
+    return true.assign({name: true[name].copy(data=np.array(values)) for name, values in found.items()})
+
+
+@cache
+def _true_top() -> tuple[Scene, xr.Dataset]:
+    scene = load_scene("heavy_top")
+    return scene, truth(scene, np.arange(21) * 5e-3)
+
+
+@pytest.mark.parametrize(
+    ("law", "said"),
+    [
+        ({}, []),
+        ({"armature": 3e-4}, ["the joint tip has an armature (rotor inertia)"]),
+        ({"damping": 3e-3}, ["the joint tip has damping"]),
+    ],
+    ids=["none", "armature", "damping"],
+)
+def test_a_small_armature_is_an_error_of_steps(law: dict[str, float], said: list[str]) -> None:
+    """A third of a hundredth of the inertia, as steps of order 2 show it, is no armature; three hundredths are one."""
+    scene, true = _true_top()
+    told = _told(scene, _top(true, 1e-3, **law), true)
+    assert [text.partition(" of ")[0] for text in told] == said
+
+
+def test_what_vanishes_with_the_step_is_no_cause() -> None:
+    """Coarse steps that move as with an armature of 7 % have no cause where the limit of small steps is the truth."""
+    scene, true = _true_top()
+    run = _top(true, 5e-3)
+    judged = Judgement("positions", "m", 1e-2, 0.0, 1e-6, 1.0, Verdict.DIFFERS)
+    (cause,) = diagnosed(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-2)])
+    assert "armature" in cause.sentence
+    assert not diagnosed(scene, [], run, true, 5e-3, [replace(judged, limit_error=1e-4)])
+
+
+def test_a_run_that_stands_still_has_no_other_gravity() -> None:
+    """Three numbers fitted to the one state of a buffer that every sample returns prove nothing."""
+    scene, true = _true_top()
+    still = true.isel(time=[-1] * true.sizes["time"]).assign_coords(time=true["time"])
+    assert not [said for said in _told(scene, still, true) if "gravity" in said]
+
+
+def test_the_first_steps_of_a_symmetric_top_tell_gravity() -> None:
+    """Round-off about the axis of symmetry, where nothing has a moment, hides no cause."""
+    (element,) = load_scene("heavy_top").elements
+    turning = element.first_motion.angular_acceleration  # type: ignore[attr-defined]  # a mechanism
+    mechanism = element.mechanism  # type: ignore[attr-defined]  # a mechanism
+    lighter = MechanismElement(replace(mechanism, gravity=tuple(x / 2 for x in mechanism.gravity)))
+    found = lighter.first_motion.angular_acceleration + np.array([0, 1e-7, 1e-8])
+    names = "acceleration of the first steps", "angular acceleration of the first steps"
+    zero = (0.0, 0.0, 0.0)
+    lines = [
+        Line(names[0], "m/s^2", zero, zero, 0.0, 1e-6).as_dict(),
+        Line(names[1], "rad/s^2", tuple(np.ravel(turning)), tuple(np.ravel(found)), 2e-3, 1e-6).as_dict(),
+    ]
+    said = [cause.says for cause in diagnose(Evidence(element, lines), hypotheses_of(element))]
+    assert said == ["the engine moves it with gravity halved"]
