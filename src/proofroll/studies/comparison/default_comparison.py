@@ -21,7 +21,7 @@ from proofroll.running.process import processor_seconds
 from proofroll.running.worker_pool import Workers
 from proofroll.studies.stability.axes import Axis, AxisTerm
 
-_UNTIL, _SAMPLES = 1.0, 50
+_UNTIL, _FIRST, _SAMPLES = 1.0, 2.0, 50  # s where the scene says nothing, s of a first look at most
 _STEP = 4e-3  # s: samples lie whole numbers of it apart, which a ladder of steps down to 1e-3 s divides
 BUDGET = 60.0  # processor-seconds that a person waits for who asks nothing in particular
 _CLOSE = "close"
@@ -35,6 +35,7 @@ def compared(
 ) -> Comparison:
     """Every formulation of every installed engine that can, held against the truth of a scene, with nothing claimed.
 
+    It is a first look: of a scene that lasts longer it has the first 2 s.
     ``parameters`` are those that differ from the defaults; engines are asked in one of ``workers``, if they are given;
     ``budget`` is the processor time of all runs [s], None: any.
 
@@ -43,14 +44,15 @@ def compared(
     """
     before = processor_seconds()
     file, scene = read_scene_file(name), load_scene(name, **parameters)
-    until, every = times_of(file)
+    until, every = times_of(replace(file, duration=min(file.duration or _UNTIL, _FIRST)))
+    rest = f" (the first {until:g} s of {file.duration:g})" if file.duration and until < file.duration - every else ""
     engines = _stepped(able(scene, workers), file.dt, workers)
     rows = [Row(engine, _CLOSE, list(Verdict), because=_BECAUSE) for engine in engines]
     if not rows:
         raise InputError("scene", name, _why_none(scene, workers))
     return Comparison(
         name=scene.name,
-        title=file.title,
+        title=file.title + rest,
         question=f"Which engines agree with the truth? {file.reason}".strip(),
         scene=name,
         until=until,

@@ -12,9 +12,10 @@ import proofroll
 def test_a_notebook_shows_a_comparison(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A scene is compared at given parameters, and its outcome is a table with a row for each run."""
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison.engine_names", lambda: ["projection"])
-    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.1)
+    monkeypatch.setattr("proofroll.studies.comparison.default_comparison._FIRST", 0.1)
     found = proofroll.compare("pendulum", out=tmp_path, jobs=1, length=2.0)
     assert [run.parameters for run in found.runs] == [{"length": 2.0}] * len(found.runs)
+    assert found.comparison.title.endswith(" (the first 0.1 s of 10)")
     shown = found._repr_html_()
     assert shown.count("<tr>") == 1 + len(found.runs)
     assert shown.count("</svg>") == len(found.runs)
