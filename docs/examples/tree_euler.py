@@ -26,6 +26,7 @@ class Settings:
     dt: Annotated[float, Gt(0)] = 1e-3  # step [s]
     resolution = "dt"
     order = 1
+    # precision = "single"  # if the engine computes in float32; nothing means double
 
 
 class TreeEuler:
