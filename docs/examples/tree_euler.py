@@ -25,8 +25,7 @@ class Settings:
     preset: Literal["default"] = "default"
     dt: Annotated[float, Gt(0)] = 1e-3  # step [s]
     resolution = "dt"
-    order = 1
-    # precision = "single"  # if the engine computes in float32; nothing means double
+    order = 1  # and, if it computes in float32, precision = "single"; nothing means double
 
 
 class TreeEuler:
