@@ -256,7 +256,7 @@ BAD = {
     "division by zero": (SLIDER_CRANK.replace("= crank/2", "= crank/0"), "bodies.0.com.0 = .* divides by zero"),
     "function call": (SLIDER_CRANK.replace("= crank/2", "= sin(crank)"), "Function 'sin' not defined"),
     "hostile expression": (SLIDER_CRANK.replace("= crank/2", "= __import__('os').getcwd()"), "bodies.0.com.0"),
-    "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*Attribute"),
+    "attribute": (SLIDER_CRANK.replace("= crank/2", "= crank.real"), "bodies.0.com.0.*crank.real.*is no arithmetic"),
     "huge power": (SLIDER_CRANK.replace("= crank/2", "= 9^9^9^9^9"), "bodies.0.com.0"),
     "velocity beyond numbers": (SLIDER_CRANK.replace("v0 = 10", "v0 = 1e200", 1), "loops = 'infinite'"),
     "assignment": (SLIDER_CRANK.replace("= crank/2", "= m = crank/2"), "no finite real number"),

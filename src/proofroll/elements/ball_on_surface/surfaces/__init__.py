@@ -1,9 +1,10 @@
 """Surfaces on which the centre of a ball moves: a file for each, and what they have in common."""
 
+from dataclasses import is_dataclass
 from functools import cache
 from typing import Any
 
-from proofroll.core.announced import loaded
+from proofroll.core.announced import leave_out, loaded
 from proofroll.elements.ball_on_surface.surfaces.bowl import Bowl
 from proofroll.elements.ball_on_surface.surfaces.cylinder import Cylinder
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
@@ -17,4 +18,10 @@ __all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolv
 @cache
 def surface_kinds() -> tuple[type[Any], ...]:
     """All kinds that a scene can name, here and in other packages: dataclasses that follow :class:`Surface`."""
-    return (Cylinder, Plane, Bowl, Cone, Torus, *(kind for _, kind in loaded("proofroll.surfaces")))
+    others = list[Any]()
+    for point, kind in loaded("proofroll.surfaces"):
+        if is_dataclass(kind):
+            others.append(kind)
+        else:
+            leave_out(point, "is no dataclass")
+    return (Cylinder, Plane, Bowl, Cone, Torus, *others)
