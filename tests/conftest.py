@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dear import pytest_runtest_setup, pytest_runtest_teardown, pytest_terminal_summary  # noqa: F401 -- hooks
 from forked_workers import Forks
 from hostile import ENTRY_POINTS
 from hypothesis import HealthCheck, Phase, settings
@@ -66,6 +67,11 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 gc.disable()
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Truths come first: their files are the longest, and begun last would leave one process without work."""
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/unit/truth/"))
+
+
 def pytest_collection_finish() -> None:
     """From here on what tests leave is collected, and what was imported is not looked at again."""
     gc.freeze()
@@ -83,8 +89,10 @@ class _TogetherWhatShares(LoadScopeScheduling):
         check = nodeid.rpartition("-")[2] if "moves_as_the_truth" in nodeid else nodeid
         # The comparison accuracy runs many cases of the paper's, which are stored by then.
         rows = nodeid.partition("-")[0].replace("[accuracy", "[paper")
-        # Drills of a unit share little beside what each of them takes; in one file they would keep one process busy.
-        unit = nodeid if self.config.option.markexpr == "drill" else path
+        # Where a mark chooses, tests of a unit share little beside what each of them takes, but with those that differ
+        # in their last parameter; in one file they would keep one process busy.
+        chosen = self.config.option.markexpr not in {"", "not drill"}
+        unit = nodeid.rpartition("-")[0] or nodeid if chosen else path
         return {"report": folder, "agreement": rows, "conformance": check, "unit": unit}.get(folder, path)
 
 
@@ -92,7 +100,7 @@ class _TogetherWhatShares(LoadScopeScheduling):
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> LoadScopeScheduling:
     """By no mark: what xdist 3.8 writes into a test's name for its groups is not seen by pytest 9.2.
 
-    In the order of the folders, of which the last have no long file: begun last, those with fewest tests left
+    In the order of the tests, of which the last are in no long file: begun last, those with fewest tests left
     one process without work.
     """
     config.option.loadscopereorder = False

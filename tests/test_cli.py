@@ -191,6 +191,7 @@ def test_run_for_a_person(proofroll: Proofroll) -> None:
     assert max(map(len, out.splitlines())) <= 100
 
 
+@pytest.mark.drill
 def test_run_tells_events(proofroll: Proofroll) -> None:
     """Each event stands with its bracket; of a long sequence the first ones do, and how many more there are."""
     slips = ["run", "sphere_in_cylinder", "--engine", "truth", "--set", "mu_static=0.15"]
@@ -361,6 +362,7 @@ def test_an_engine_of_which_there_is_no_row(proofroll: Proofroll, tmp_path: Path
     )
 
 
+@pytest.mark.drill
 def test_a_name_that_a_scene_and_a_comparison_share(proofroll: Proofroll, tmp_path: Path) -> None:
     """It means the comparison, and a line names engines without a row; with a budget or parameters, the scene."""
     given = ["compare", "heavy_top", "--out", str(tmp_path)]
@@ -701,6 +703,7 @@ def test_run_with_orientation(proofroll: Proofroll, tmp_path: Path) -> None:
         assert ("\nq_WB.w " in out) == bool(asked)
 
 
+@pytest.mark.drill
 def test_ladder(proofroll: Proofroll, tmp_path: Path) -> None:
     """The ladder is two tables and sentences within 100 columns, or one JSON document; a missing engine exits 3."""
     arguments = ["ladder", "sphere_in_cylinder", "--engine", "laddered", "--until", "0.1", "--out", str(tmp_path)]

@@ -227,6 +227,7 @@ def test_an_answer_needs_no_library_of_pages(
     assert not list(tmp_path.glob("*.svg"))
 
 
+@pytest.mark.drill
 def test_tradeoff_and_then_recommend(proofroll: Proofroll, tmp_path: Path) -> None:
     """Tables fit 100 columns, the diagram and pyperf's file are written, and an answer comes from what was measured."""
     given = ["--set", "speed=3", "--until", "0.1", "--engine", ENGINE, "--out", str(tmp_path)]
@@ -282,6 +283,7 @@ def test_what_was_found_over_a_range(measured: TradeoffStudy, capsys: pytest.Cap
         assert any(expected in " ".join(line.split()) for line in lines)
 
 
+@pytest.mark.drill
 def test_onset_to_one_percent(proofroll: Proofroll, tmp_path: Path) -> None:
     """The time of the first slip is a quantity too, and a percentage of it is one of the time until it."""
     given = [

@@ -66,6 +66,7 @@ def typed() -> set[str]:
     return set()
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)])
 def test_a_page_can_be_followed(

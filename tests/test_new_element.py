@@ -128,6 +128,7 @@ def test_compare(command_line: Proofroll) -> None:
     assert {j["observable"] for run in content["runs"] for j in run["judgements"]} == {"x", "pull", "energy_error"}
 
 
+@pytest.mark.drill
 def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
     """Tradeoff goes by the deciding observable, and recommend answers from it."""
     code, out, err = command_line("tradeoff", str(springs), "--engine", "sprung", "--until", "0.5", "--json")
@@ -139,6 +140,7 @@ def test_tradeoff_and_recommend(command_line: Proofroll, springs: Path) -> None:
     assert json.loads(out)["choice"]["engine"].startswith("sprung")
 
 
+@pytest.mark.drill
 def test_tradeoff_of_two_elements(command_line: Proofroll, springs: Path) -> None:
     """In a scene of two elements a column is headed by the element whose quantity it has."""
     two = springs.parent / "two"
@@ -152,6 +154,7 @@ def test_tradeoff_of_two_elements(command_line: Proofroll, springs: Path) -> Non
     assert "x.n [m]" in out
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("springs")
 def test_stability(command_line: Proofroll) -> None:
     """Stability finds boundaries, measures them by the kind's own number and names its own sign of failure."""

@@ -123,6 +123,7 @@ def trough(
     _look_again()
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("kind", ["trough", "dish"])
 def test_compare(proofroll: Proofroll, trough: Path, kind: str) -> None:
     """The truth has its error bar by two routes, and engines that know any surface agree with it."""

@@ -67,6 +67,7 @@ def versions(
     return run
 
 
+@pytest.mark.drill
 def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     """Verdicts, refusals, orders, defaults, numbers and speed; a verdict that changed is exit code 1."""
     code, out, err = versions("1.0", "2.0", "--rounds", "2", "--json")
@@ -94,6 +95,7 @@ def test_what_changed_is_shown(versions: Callable[..., tuple[int, str, str]], tm
     assert table(study).row_count == 2
 
 
+@pytest.mark.drill
 def test_versions_that_do_the_same(
     versions: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -124,6 +126,7 @@ def test_versions_that_are_none(versions: Callable[..., tuple[int, str, str]], o
     assert err.count("\n") == 1
 
 
+@pytest.mark.drill
 def test_versions_are_understood_as_engines_are_written(
     versions: Callable[..., tuple[int, str, str]], proofroll: Proofroll, pythons: dict[str, Path], tmp_path: Path
 ) -> None:

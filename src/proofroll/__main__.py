@@ -1,7 +1,5 @@
 """The command ``proofroll``; small, so that Ctrl-C finds it ready while the rest loads."""
 
-from __future__ import annotations
-
 
 def _leave(*_: object) -> None:
     """Ends the process at once: nothing has been begun, and an exception could be lost in whatever is being loaded."""

@@ -1,7 +1,5 @@
 """Fixture for pytest; it loads nothing before a test asks for it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

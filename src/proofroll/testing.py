@@ -4,8 +4,6 @@ The pytest plug-in of this package gives :func:`assert_agrees` as a fixture of t
 a test asks for it. pytest is not needed here.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from typing import Any
@@ -35,8 +33,8 @@ def assert_agrees(
         scene: name, path of a folder, or :func:`proofroll.load_scene`.
         engine: ``name[key=value,…]``; a class, which no package needs to announce; an engine that is built, at time 0;
             or a trajectory, as for :func:`proofroll.judge`.
-        tolerance: how far it may be off, as for :func:`proofroll.judge`.
-        because: why that is close enough.
+        tolerance: allowed error, as for :func:`proofroll.judge`.
+        because: reason for which that is close enough.
         until: last time [s]; of an engine.
         every: interval between samples [s]; by default 0.01 s, or the nearest whole number of steps.
         **settings: of the engine.

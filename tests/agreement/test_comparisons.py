@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +13,7 @@ from proofroll.core.plugins import engine_names, load_engine, parse_engine, reso
 from proofroll.core.verdict import Verdict
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.files.comparison_file import comparison_names, load_comparison
+from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 from proofroll.studies.comparison.compare import compare
@@ -28,14 +29,11 @@ LATE = {
     ("accuracy", "mujoco[formulation=free,friction_damping=1.9,dt=1e-4]"): 1.5,
 }
 
-# Their motions are as long as their verdicts need, which takes half a minute each.
-DEAR = {"sled", "two_spheres", "stick_slip"}
-
 
 def loaded(name: str) -> Comparison:
     """A comparison, no longer than its verdicts need."""
     comparison = load_comparison(name)
-    return dataclasses.replace(comparison, until=SHORTER.get(name, comparison.until))
+    return replace(comparison, until=SHORTER.get(name, comparison.until))
 
 
 def until(comparison: Comparison, row: Row) -> float:
@@ -44,12 +42,7 @@ def until(comparison: Comparison, row: Row) -> float:
 
 
 ROWS = [
-    pytest.param(
-        comparison,
-        row,
-        id=f"{comparison.name}-{row.engine}",
-        marks=[pytest.mark.drill] if comparison.name in DEAR else [],
-    )
+    pytest.param(comparison, row, id=f"{comparison.name}-{row.engine}")
     for comparison in map(loaded, comparison_names())
     for row in comparison.rows
 ]
@@ -65,7 +58,7 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 
 def middle(comparison: Comparison, row: Row) -> dict[str, float]:
     """The middle one of the combinations of parameters that are varied."""
-    points = dataclasses.replace(comparison, points=[]).variations(row)
+    points = replace(comparison, points=[]).variations(row)
     return points[len(points) // 2]
 
 
@@ -84,13 +77,28 @@ def outcomes(store: Store) -> Callable[[Comparison, Row], Outcome]:
                 if (middle(comparison, other), until(comparison, other)) == (point, end)
             ]
             # How fast it is belongs to no verdict, and would cost as much again.
-            asked = dataclasses.replace(comparison, rows=rows, vary={}, points=[dict(point)], until=end, timed=False)
+            asked = replace(comparison, rows=rows, vary={}, points=[dict(point)], until=end, timed=False)
             found[key] = compare(asked, Runner(store, jobs=1))
         return found[key]
 
     return outcome
 
 
+@pytest.mark.parametrize("name", comparison_names())
+def test_each_engine_begins(name: str, tmp_path: Path) -> None:
+    """The first row of each engine that is expected to run does so for two samples, held against the truth."""
+    comparison = load_comparison(name)
+    asked = [row for row in reversed(comparison.rows) if Verdict.REFUSED not in row.expect]
+    first = {row.engine.partition("[")[0]: replace(row, ladder=[1.0]) for row in asked}
+    rows = list(first.values())
+    point = middle(comparison, rows[0])
+    brief = replace(comparison, rows=rows, vary={}, points=[point], until=2 * comparison.every, timed=False)
+    outcome = compare(brief, Runner(Store(tmp_path), jobs=1))
+    assert [run.row.engine for run in outcome.runs if run.result.status is not Status.DONE] == []
+    assert all(run.judgements for run in outcome.runs)
+
+
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize(("comparison", "row"), ROWS)
 def test_row_is_as_the_comparison_expects(
@@ -109,6 +117,7 @@ EVENTS = {"first_slip", "event_times", "event_order"}
 LAST_SPECIAL = 2.25
 
 
+@pytest.mark.drill
 @pytest.mark.slow
 @pytest.mark.parametrize("engine", ["projection[formulation=rotating_frame]", "mujoco[formulation=chart,preset=tuned]"])
 def test_row_at_the_special_points(engine: str, store: Store) -> None:
@@ -119,7 +128,7 @@ def test_row_at_the_special_points(engine: str, store: Store) -> None:
     comparison = loaded("stick_slip")
     (row,) = (row for row in comparison.rows if row.engine == engine)
     special = [point for point in comparison.points if "mu_kinetic" in point or isinstance(point["mu_static"], Edge)]
-    comparison = dataclasses.replace(comparison, rows=[row], vary={}, points=special, until=LAST_SPECIAL)
+    comparison = replace(comparison, rows=[row], vary={}, points=special, until=LAST_SPECIAL)
 
     outcome = compare(comparison, Runner(store, jobs=1))
 

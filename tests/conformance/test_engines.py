@@ -39,9 +39,16 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 }
 
 
-# Of what hangs on a formulation's model, not on its step, one preset is asked in every run of the tests, all others in
-# the drills; where each preset moves to, and what it is certified to be, is asked in every run.
-OF_MODELS = ("builds_or_refuses", "builds_only_what_is_required", "first_steps_fit_the_scene")
+# Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
+# asked in every run of the tests, all others in the drills; what each is certified to be, and its order, in every run.
+OF_MODELS = (
+    "builds_or_refuses",
+    "builds_only_what_is_required",
+    "first_steps_fit_the_scene",
+    "samples_cost_the_same",
+    "engines_do_not_disturb_each_other",
+    "moves_as_the_truth",
+)
 
 
 def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...]:

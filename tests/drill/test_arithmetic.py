@@ -14,8 +14,11 @@ import near_bounds
 import numpy as np
 import pytest
 import yaml
+from typer.testing import CliRunner
 
+from proofroll.cli import app
 from proofroll.core.comparison import Band, Comparison, Row, Tolerance
+from proofroll.core.errors import InputError
 from proofroll.files.comparison_file import load_comparison
 from proofroll.files.trajectory_file import read
 from proofroll.running.case import Status
@@ -195,6 +198,7 @@ def test_numbers_beyond_their_bars_are_told() -> None:
     assert [name for name, *_ in beyond_bars(one, dataset(1.0, 0.5 + 2.1e-9))] == ["event_time"]
 
 
+@pytest.mark.drill
 def test_kinds_compute_otherwise(tmp_path: Path) -> None:
     """Each kind that this machine has takes effect in its processes, or says why it cannot be tried."""
     for name in ("haswell", "prescott", "no-avx2", "no-heyoka"):
@@ -215,6 +219,12 @@ def test_what_a_machine_cannot_is_named_as_not_tried(tmp_path: Path) -> None:
         ("python9", True, True),
         ("broken", bool(baseline()), True),
     ]
+
+
+def test_a_comparison_that_is_not_there_is_told_in_a_line() -> None:
+    """A misspelt name is refused before any process starts."""
+    with pytest.raises(InputError, match="there is no such comparison"):
+        CliRunner().invoke(app, ["drill", "arithmetic", "no_such_rod"], catch_exceptions=False)
 
 
 def baseline() -> str:

@@ -21,7 +21,7 @@ TOPS = (
 )  # fmt: skip
 REACTIONS = (
     samples.OnParent, samples.BodyReaction, samples.Swapped, samples.AboutCentre,
-    samples.LoopReaction, samples.LoopSwapped, samples.LoopAboutCentre,
+    samples.LoopReaction, samples.LoopSwapped, pytest.param(samples.LoopAboutCentre, marks=pytest.mark.drill),
 )  # fmt: skip
 
 

@@ -71,6 +71,7 @@ def place() -> Iterator[tuple[Site, Path]]:
         yield here, prepare(here)
 
 
+@pytest.mark.drill
 def test_a_damage_that_is_not_noticed(place: tuple[Site, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """A store that believes whatever it finds does not pass."""
 
@@ -84,6 +85,7 @@ def test_a_damage_that_is_not_noticed(place: tuple[Site, Path], monkeypatch: pyt
     assert "the next run made 0 results instead of 1" in row.problem
 
 
+@pytest.mark.drill
 def test_a_half_result_that_is_left(place: tuple[Site, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """A store that leaves half a file behind does not pass, nor does a row that says something else."""
     fault = next(fault for fault in ENGINE_FAULTS if fault.formulation == "half")
@@ -120,6 +122,7 @@ proofroll.running.ending.end_with_pipe = lambda pipe: None
 }
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("taken_out", "drill", "problem"),
     [
@@ -229,6 +232,7 @@ def test_table_for_a_person() -> None:
     assert "the next run made 1 results instead of 3" in " ".join(" ".join(lines).split())
 
 
+@pytest.mark.drill
 def test_a_site_leaves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a drill its folder is gone, the path is as it was and its engine is unheard of."""
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, ["somewhere", os.environ.get("PYTHONPATH")])))

@@ -23,6 +23,7 @@ engines = { "projection[formulation=dependent,preset=default]" = [1e-30], "mujoc
 """
 
 
+@pytest.mark.drill
 def test_a_number_that_is_off_misses(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A tenth digit that differs, an event or a run that there is not, and a larger error miss; the rest holds."""
     (tmp_path / "numbers.toml").write_text(NUMBERS, encoding="utf-8")

@@ -107,6 +107,7 @@ def check_a_hidden_defect(outcome: Outcome, defect: str, differing: set[str], ag
         assert any(f"{name} differs" in sentence for sentence in run.contradictions), (defect, name)
 
 
+@pytest.mark.drill
 def test_every_defect_is_caught(outcome: Outcome) -> None:
     """The certificate stops what was built wrongly, the verdict what moves wrongly, and nothing stops what is sound."""
     check_the_sound_engine(outcome)

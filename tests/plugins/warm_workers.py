@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from weakref import WeakKeyDictionary
@@ -18,6 +18,7 @@ from weakref import WeakKeyDictionary
 import pytest
 from hostile import ENTRY_POINTS
 
+from proofroll.running import process
 from proofroll.running.process import Worker
 from proofroll.running.worker_pool import Workers
 
@@ -30,6 +31,10 @@ _PASSING = {"PYTEST_CURRENT_TEST", "COLUMNS"}
 _FOLLOW = Path(__file__).with_name("follow.py")
 
 _Place = tuple[str, float | None, str, frozenset[tuple[str, str]]]
+
+
+def _environment(variables: Mapping[str, str]) -> frozenset[tuple[str, str]]:
+    return frozenset(item for item in variables.items() if item[0] not in _PASSING)
 
 
 def _loaded(engine: str) -> str:
@@ -48,21 +53,29 @@ class WarmWorkers:
         self._lock = threading.Lock()
         self._idle: list[tuple[_Place, Worker]] = []
         self._began: WeakKeyDictionary[Worker, _Place] = WeakKeyDictionary()
+        self._started = threading.local()
 
     @contextmanager
     def lent(self) -> Iterator[None]:
         """Meanwhile whoever wants a worker gets one of these, and gives it back instead of ending it."""
-        take = Workers.take
+        take, safe = Workers.take, process.safe_environment
+
+        def noted() -> dict[str, str]:
+            self._started.environment = safe()
+            return self._started.environment
 
         def warm(workers: Workers, engine: str) -> Worker:
-            environment = frozenset(item for item in os.environ.items() if item[0] not in _PASSING)
-            place = (_loaded(engine), workers._memory, os.getcwd() if "@" in engine else "", environment)
+            where = _loaded(engine), workers._memory, os.getcwd() if "@" in engine else ""
+            place = (*where, _environment(safe()))
             idle = next((name for name, _ in workers._idle if _loaded(name) == place[0]), None)
             found = self._take(place) if idle is None else None
             if found and "@" not in engine:
                 _follow(found)
+            self._started.environment = None
             worker = found or take(workers, idle or engine)
-            self._began.setdefault(worker, place)
+            # A thread that a test has left behind starts it after that test, in another environment than it looked for.
+            if self._started.environment is not None:
+                self._began.setdefault(worker, (*where, _environment(self._started.environment)))
             return worker
 
         def give_back(idle: list[tuple[str, Worker]]) -> None:
@@ -71,6 +84,7 @@ class WarmWorkers:
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(Workers, "take", warm)
+            patch.setattr(process, "safe_environment", noted)
             patch.setattr("proofroll.running.worker_pool._close", give_back)
             yield
 

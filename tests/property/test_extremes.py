@@ -96,6 +96,7 @@ def assert_agrees(found: xr.Dataset, true: xr.Dataset, names: tuple[str, ...] = 
         assert difference < 1e-9 * size_of(true, name) + true[name].attrs["error_bar"], name
 
 
+@pytest.mark.drill
 @settings(max_examples=12)
 @given(motion=CYLINDERS, size=SIZES, mass=MASSES)
 def test_rolling(motion: dict[str, float], size: float, mass: float) -> None:
@@ -110,6 +111,7 @@ def test_rolling(motion: dict[str, float], size: float, mass: float) -> None:
             assert np.max(np.abs(level - level[0])) < 1e-10 * np.max(np.abs(level - mass * G * dataset["z"].to_numpy()))
 
 
+@pytest.mark.drill
 @settings(max_examples=3)
 @given(motion=CYLINDERS, size=SIZES)
 def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:
@@ -119,6 +121,7 @@ def test_rolling_in_euler_angles(motion: dict[str, float], size: float) -> None:
     assert_agrees(simulated(scene, EULER, until), check_truth(scene, until))
 
 
+@pytest.mark.drill
 @settings(max_examples=8)
 @given(motion=CYLINDERS, size=SIZES, mu=st.one_of(st.just(0.0), decades(1e-3, 1e3)))
 def test_bounded_friction(motion: dict[str, float], size: float, mu: float) -> None:
@@ -142,6 +145,7 @@ def test_bounded_friction(motion: dict[str, float], size: float, mu: float) -> N
         assert float(np.max(np.abs(found[name] - true[name]))) < 1e-7 * size_of(true, name), name
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("mu", [math.inf, 0.3])
 @settings(max_examples=2)
 @given(motion=CYLINDERS, power=st.sampled_from([-20, 20, 7, -1]), heavier=st.sampled_from([-20, 13, 0]))
@@ -169,6 +173,7 @@ def test_scale(mu: float, motion: dict[str, float], power: int, heavier: int) ->
             assert difference < 1e-11 * size_of(first, name), (engine, name)
 
 
+@pytest.mark.drill
 @settings(max_examples=5)
 @given(
     tilt=st.sampled_from([0.0, 0.35, -0.35]),

@@ -47,9 +47,9 @@ def drift(engine: str, oscillations: int) -> tuple[float, float]:
         pytest.param("projection[formulation=rotating_frame,preset=tuned]", 3000, marks=needs_heyoka),
         pytest.param("reduced[preset=tuned]", 3000, marks=needs_heyoka),
         # 35 s for 10,000, which leave 4e-13 of the energy and 3e-16 of slip; what grows with time shows in 100 as well
-        pytest.param("projection[formulation=euler,preset=tuned]", 100, marks=needs_heyoka),
-        ("projection[formulation=rotating_frame]", 100),
-        ("projection[formulation=euler]", 5),
+        pytest.param("projection[formulation=euler,preset=tuned]", 100, marks=[needs_heyoka, pytest.mark.drill]),
+        pytest.param("projection[formulation=rotating_frame]", 100, marks=pytest.mark.drill),
+        pytest.param("projection[formulation=euler]", 5, marks=pytest.mark.drill),
         ("reduced[formulation=closed_form,preset=matched]", 10_000),
     ],
 )

@@ -13,12 +13,12 @@ from axe_playwright_python.base import AXE_FILE_PATH
 from browsing import Visit
 
 Visiting = Callable[..., AbstractContextManager[Visit]]
-RUN = "axe.run(document, {resultTypes: ['violations']}).then((found) => found.violations)"
+RUN = "(where) => axe.run(where || document, {resultTypes: ['violations']}).then((found) => found.violations)"
 
 
-def grave(visit: Visit) -> list[str]:
-    """Violations that are serious, critical or moderate, each with the first element that has it."""
-    found: list[dict[str, Any]] = visit.page.evaluate(RUN)
+def grave(visit: Visit, where: str = "") -> list[str]:
+    """Violations that are serious, critical or moderate, of the page or of a place, each with the first element."""
+    found: list[dict[str, Any]] = visit.page.evaluate(RUN, where)
     return [
         f"{item['impact']} {item['id']}: {item['nodes'][0]['html'][:200]} ({len(item['nodes'])})"
         for item in found
@@ -26,6 +26,7 @@ def grave(visit: Visit) -> list[str]:
     ]
 
 
+@pytest.mark.drill
 def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visit: Visiting) -> None:
     """With two comparisons that have the same points and settings, axe finds nothing either."""
     first = everything.content.comparisons[0]
@@ -36,6 +37,7 @@ def test_several_comparisons_share_no_name(everything: Any, tmp_path: Path, visi
         assert grave(opened) == []
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("width", "scheme"),
     [(1400, "light"), *(pytest.param(*look, marks=pytest.mark.drill) for look in [(900, "dark"), (400, "light")])],
@@ -55,5 +57,5 @@ def test_axe_finds_nothing_of_weight(report_page: Path, visit: Visiting, width: 
         opened.wait("document.querySelectorAll('.scroll[data-sorts]').length > 0")
         assert grave(opened) == []
         opened.page.evaluate("document.querySelector('main').append(document.createElement('button'))")
-        assert any("button-name" in text for text in grave(opened))
+        assert any("button-name" in text for text in grave(opened, "main > button:last-child"))
         opened.page.evaluate("document.querySelector('main').lastChild.remove()")

@@ -60,6 +60,7 @@ def poisoned(poisoned_page: Path, visit: Visiting) -> Iterator[Visit]:
         yield seen
 
 
+@pytest.mark.drill
 def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, poisoned: Visit) -> None:
     """Read to its end, unfolded, drawn, pointed at and clicked through: no script, element or handler of theirs.
 
@@ -84,6 +85,7 @@ def test_nothing_that_others_write_runs(drawn_page: Drawn, poisoned_page: Path, 
     assert [message for message in poisoned.messages if spoilt not in message] == []
 
 
+@pytest.mark.drill
 def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Path, visit: Visiting) -> None:
     """The check above can fail: one string that is let through once, as text or in an attribute, does its harm."""
     text = poisoned_page.read_text(encoding="utf-8")
@@ -115,6 +117,7 @@ def test_everything_that_others_write_is_shown_as_it_is_written(
     assert lost == []
 
 
+@pytest.mark.drill
 def test_long_words_of_others_do_not_widen_a_phone(poisoned_page: Path, visit: Visiting) -> None:
     """A name without a gap is broken or scrolls in its region."""
     with visit(poisoned_page, **PHONE) as seen:

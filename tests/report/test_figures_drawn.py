@@ -38,6 +38,7 @@ def test_limits_have_the_engines_error_bar(seen: Visit) -> None:
     assert exact == [1e-12]
 
 
+@pytest.mark.drill
 def test_truth_and_tolerances_have_their_lines(seen: Visit, everything: Any) -> None:
     """The band ends at the truth's error bar; each tolerance is a line of the rows that have it, and goes with them."""
     z = everything.curves[0][0].observables[1]
@@ -91,6 +92,7 @@ SKETCH = "getComputedStyle(document.querySelector('.drawing .ball')).stroke"
 GROUND = "getComputedStyle(document.body).backgroundColor"
 
 
+@pytest.mark.drill
 def test_colours_follow_the_screen_while_it_is_open_and_paper_is_white(seen: Visit) -> None:
     """Page, figures and drawings change with the scheme, a zoom stays; for print they are light in any scheme."""
     light = [seen.page.evaluate(INK), seen.page.evaluate(SKETCH), seen.page.evaluate(GROUND)]

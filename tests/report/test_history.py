@@ -71,6 +71,18 @@ def test_the_page_stands_alone(
     ]
 
 
+def test_a_panel_without_costs_says_why(nights: Path, tmp_path: Path) -> None:
+    """Where no clean run measured a cost, the panel of costs is not empty but says so; elsewhere it does not."""
+    written = tmp_path / "out" / "history.html"
+    write_history(read_history(nights), written.parent)
+    timed = written.read_text(encoding="utf-8")
+    for name, date in (("x", "2026-11-01"), ("y", "2026-11-02")):
+        keep(tmp_path / "untimed" / name, f"{date}T01:00:00", "1.0", [replace(line, clean=False) for line in ARM])
+    write_history(read_history(tmp_path / "untimed"), written.parent)
+    assert "no cost was measured" not in timed
+    assert "no cost was measured" in written.read_text(encoding="utf-8")
+
+
 def test_too_few_reports_are_told(nights: Path) -> None:
     """One report has no history; a file that is no report is named."""
     with pytest.raises(InputError, match="1 reports there"):

@@ -25,6 +25,7 @@ def seen(report_page: Path, visit: Visiting) -> Iterator[Visit]:
         yield opened
 
 
+@pytest.mark.drill
 def test_each_engine_has_a_panel_with_the_others_in_grey(seen: Visit) -> None:
     """Two engines, two panels that zoom together; what is said of a point is setting, step, error, cost and verdict."""
     panels = seen.page.evaluate(f"{PICTURE}.layout.annotations.map(({{ text }}) => text)")
@@ -38,6 +39,7 @@ def test_each_engine_has_a_panel_with_the_others_in_grey(seen: Visit) -> None:
     assert seen.messages == []
 
 
+@pytest.mark.drill
 def test_quantity_tolerance_and_engines_are_chosen(seen: Visit) -> None:
     """An engine without forces has no panel of them; a coarser tolerance rings another; hidden engines are left out."""
     ring = f"{PICTURE}.data.find((trace) => trace.name === 'choice').x[0]"
@@ -55,6 +57,7 @@ def test_quantity_tolerance_and_engines_are_chosen(seen: Visit) -> None:
     seen.wait(f"{TRACES}.length === 3")
 
 
+@pytest.mark.drill
 def test_an_error_beyond_all_size_is_cut_and_marked(everything: Any, tmp_path: Path, visit: Visiting) -> None:
     """A run that flew off to 1e30 stands at the top as a triangle; the axis ends there, and the truth is told."""
     table = everything.content.table

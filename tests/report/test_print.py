@@ -83,6 +83,7 @@ def test_nothing_is_cut_off_at_the_edge_of_the_paper(report_page: Path, visit: V
         assert any(name.startswith("H1") for name in hidden)
 
 
+@pytest.mark.drill
 def test_pdf_holds_the_verdicts_and_is_short(printed: PdfReader) -> None:
     """The text of each verdict is in the file; no page is empty, and all of them are few."""
     pages = [unicodedata.normalize("NFKC", page.extract_text()) for page in printed.pages]  # without ligatures
@@ -95,6 +96,7 @@ def test_pdf_holds_the_verdicts_and_is_short(printed: PdfReader) -> None:
     assert "Skip to the verdicts" not in text
 
 
+@pytest.mark.drill
 def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
     """A reader of the file finds their way by the headings."""
     titles = [entry.title for entry in printed.outline if not isinstance(entry, list)]
@@ -104,12 +106,14 @@ def test_pdf_has_bookmarks_and_a_title(printed: PdfReader) -> None:
     assert printed.metadata.title == "proofroll: which engine can be trusted"
 
 
+@pytest.mark.drill
 def test_what_was_never_looked_at_is_drawn_for_paper(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> None:
     """A figure far below the screen has no picture until the page is printed, once its parts are here."""
     before, printed = on_paper[2]
     assert before < printed == 6
 
 
+@pytest.mark.drill
 def test_paper_is_white_in_the_dark(on_paper: tuple[PdfReader, list[list[str]], list[int]]) -> None:
     """Who reads on a dark screen prints dark on white, the figures too, and then has their dark screen back."""
     before, (ground, ink), after = on_paper[1]

@@ -365,6 +365,7 @@ def test_the_replay_plays(written: Any, replayed: Visit) -> None:
     assert opened.requested == [(written[1] / "report.html").as_uri()]
 
 
+@pytest.mark.drill
 def test_the_replay_obeys(made: Any, replayed: Visit) -> None:
     """Keys, time line, ghosts, view and the choice of a case each change what is shown; values are the truth's."""
     opened = replayed

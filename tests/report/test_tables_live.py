@@ -91,3 +91,17 @@ def test_hidden_engines_stay_hidden_in_a_table_that_sorts(live: Visit) -> None:
     live.page.get_by_role("checkbox", name="alpha").uncheck()
     shown = live.page.locator(f"{TABLE} tbody tr:visible")
     assert shown.count() == 2
+
+
+def test_a_table_shows_that_it_has_columns_beyond_its_edge(report_page: Path, visit: Visiting) -> None:
+    """The edge of a table that is wider than the screen fades until a reader has scrolled to its last column."""
+    with visit(report_page, viewport={"width": 400, "height": 900}) as opened:
+        region = "document.querySelector(\"[aria-label='Verdicts: An invented comparison']\")"
+        opened.page.evaluate(f"{region}.scrollIntoView()")
+        opened.wait(f"getComputedStyle({region}).maskImage !== 'none'")
+        opened.page.evaluate(f"{region}.scrollLeft = {region}.scrollWidth")
+        opened.wait(f"getComputedStyle({region}).maskImage === 'none'")
+        opened.page.evaluate(f"{region}.scrollLeft = 0")
+        opened.wait(f"getComputedStyle({region}).maskImage !== 'none'")
+        opened.page.emulate_media(media="print")
+        assert opened.page.evaluate(f"getComputedStyle({region}).maskImage") == "none"

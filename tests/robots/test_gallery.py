@@ -75,6 +75,7 @@ def test_as_expected(proofroll: Proofroll, name: str) -> None:
     assert {"pinocchio", "mujoco"} <= {item["engine"] for item in row["engines"]}
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_what_was_read_before_changes_nothing() -> None:
     """A gallery reads all robots in one process of an engine: each is found alike, to the last digit, first or last."""

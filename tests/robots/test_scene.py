@@ -168,6 +168,7 @@ def test_what_an_mjcf_disables_or_has_beyond_a_scene(robot):
         load_scene(robot("cubic.xml", text.replace("KIND", "hinge").replace('"9"', '"9 2"')))
 
 
+@pytest.mark.drill
 def test_stops_are_there_when_asked_for(robot):
     """With limits=1 an engine must provide stops; without, the same motion goes through them."""
     path = robot("arm.urdf", urdf())
@@ -179,6 +180,7 @@ def test_stops_are_there_when_asked_for(robot):
     assert "ill_posed" not in struck.attrs
 
 
+@pytest.mark.drill
 def test_commands_take_a_robot_file_for_a_scene(robot, tmp_path, monkeypatch):
     """Run, compare, report and stability start from the file alone; engines that are asked are held to the truth."""
     monkeypatch.setattr("proofroll.studies.comparison.default_comparison._UNTIL", 0.2)
@@ -216,6 +218,7 @@ def test_a_robot_of_the_gallery():
     assert float(np.abs(run.positions - truth(scene, times).positions).max()) < 1e-9
 
 
+@pytest.mark.drill
 def test_what_is_advised_is_followed_to_the_end(
     proofroll: Callable[..., tuple[int, str, str]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

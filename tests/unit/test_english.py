@@ -21,9 +21,17 @@ _OPENS = re.compile(rf"(?:{_OPENERS})\b", re.IGNORECASE)
 _VAGUE = re.compile(r"\b(?:such as|nobody|another than|otherwise than|told|said of|said by|of which)\b")
 
 
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """A module or a statement with all statements in it; expressions, which are most of a tree, have no docstring."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
+            yield from _statements(child)
+
+
 def _docstrings(source: str) -> Iterator[tuple[int, str]]:
     """Line and text of every docstring of a module."""
-    for node in ast.walk(ast.parse(source)):
+    for node in _statements(ast.parse(source)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             text = ast.get_docstring(node)
             if text:

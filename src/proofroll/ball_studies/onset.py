@@ -40,7 +40,7 @@ class EngineOnset:
         engine: with the settings that were asked for.
         name: of the engine alone.
         settings: complete; empty if it could not be asked.
-        status, message: how its run ended.
+        status, message: end of its run.
         onset: the first slip with its bracket, or None.
         difference: from the truth's first slip [s]; None where one of them is none.
         verdict: ``agree``, ``disagree``, ``ill-posed``, ``refused`` or ``failed``.
@@ -96,7 +96,7 @@ def onset_study(
         parameters: its parameters; friction must be bounded.
         runner: where the cases are run.
         engines: engines with settings; all that can slip if empty.
-        until: how long to look [s].
+        until: last time to look at [s].
         uncertainty: relative uncertainty of μ and f for which the verdicts hold [1].
         progress: called with each case that is finished.
 

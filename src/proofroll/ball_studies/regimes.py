@@ -40,7 +40,7 @@ class EvenValues:
 
     Attributes:
         low, high: first and last.
-        count: how many.
+        count: number of points.
     """
 
     low: float

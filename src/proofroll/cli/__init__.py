@@ -1,7 +1,5 @@
 """The command line. Data goes to standard output, progress and problems to standard error."""
 
-from __future__ import annotations
-
 import io
 import os
 import re

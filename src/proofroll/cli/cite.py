@@ -1,7 +1,5 @@
 """Citations for a result."""
 
-from __future__ import annotations
-
 import sys
 from typing import Annotated
 

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.planning import Plan
 
 
+# Processor time for the last page, whatever it holds, and for Python's own start [s].
+_PAGE = 8.0
+
+
 def compare(
     comparison: Annotated[
         str,
@@ -125,6 +129,7 @@ def outcomes_of(
     stage: str = "",
     finished: Callable[[dict[int, Outcome], bool], None] | None = None,
     budget: float | None = None,
+    spent: float = 0.0,
 ) -> list[Outcome]:
     """Runs all comparisons with one progress bar, one after the other as far as that leaves no worker idle.
 
@@ -138,13 +143,14 @@ def outcomes_of(
         finished: called when one has ended, briefly or whole, with all that have by their numbers; True: the last.
         budget: processor time of all of them [s]; all runs then come before the first ladder, and each comparison has
             an equal share of what is left, which those after it have if it takes less.
+        spent: what of the budget has been taken before [s].
     """
     from proofroll.running.process import processor_seconds
     from proofroll.running.time_budget import TimeBudget
     from proofroll.studies.comparison.compare import run_plan
     from proofroll.studies.comparison.planning import plan
 
-    before = processor_seconds()
+    before = processor_seconds() - spent
     with options.spinner(f"{stage}cases"):
         plans = [plan(comparison, engines, runner.workers) for comparison in comparisons]
     brief = [item.brief for item in plans]
@@ -157,6 +163,8 @@ def outcomes_of(
         phases = [[*((at, item.cases) for at, item in enumerate(brief)), *grown]]
     owner = {case.key: at for at, item in reversed([*enumerate(plans)]) for case in item.cases}
     limit = TimeBudget(budget, processor_seconds() - before, owner) if budget else None
+    if limit and finished:
+        limit.after += _PAGE
     with options.progress_bar(f"{stage}cases", total=len(owner)) as advance:
         running = _Comparing(plans, runner, limit, finished, lambda text: advance(f"{stage}{text}"))
         for item in plans:
@@ -190,6 +198,7 @@ class _Comparing:
         self.results: dict[str, Result] = {}
         self.ended: dict[int, Outcome] = {}
         self._judged: dict[int, int] = {}
+        self._judging = 0.0
         self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
         self._truths = {case.key for item in plans for case in item.truths.values()}
         self._start, self._reused = time.monotonic(), runner.reused
@@ -228,8 +237,11 @@ class _Comparing:
             for number in [number for number, keys in missing.items() if keys <= {key}]:
                 del missing[number]
                 if self.finished:
+                    before = time.process_time()
                     self.judge(phase[number][0])
                     self.finished(self.ended, last and not missing)
+                    self._judging += time.process_time() - before
+                    self._keep_for_the_end()
             for keys in missing.values():
                 keys.discard(key)
 
@@ -251,9 +263,15 @@ class _Comparing:
         self.runner.run(postponed, told, self.limit, place)
         end()
 
+    def _keep_for_the_end(self) -> None:
+        """Keeps as much of the budget for judging and writing all once more as that took so far for each case."""
+        if self.limit and (judged := sum(self._judged.values())):
+            self.limit.after = max(self.limit.after, self._judging / judged * len(self.results))
+
     def _tell(self, case: Case) -> None:
         """Says how many comparisons have ended, about how long the rest takes, and which engine ran."""
-        many, ran = len(self.plans), len(self.results) - (self.runner.reused - self._reused)
+        # What is stored is counted as reused before it is judged.
+        many, ran = len(self.plans), max(0, len(self.results) - (self.runner.reused - self._reused))
         left = (time.monotonic() - self._start) / ran * (len(self._keys) - len(self.results)) if ran else 0.0
         left = min(left, self.limit.left / self.runner.jobs) if self.limit else left
         of = f"{min(len(self.ended) + 1, many)} of {many} comparisons, " if many > 1 else ""

@@ -1,7 +1,5 @@
 """Engines: what there is, and environments of other versions."""
 
-from __future__ import annotations
-
 import dataclasses
 import sys
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """A scene as a file of an engine's own, for its viewer and its other tools."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Findings about engines, run against the installed versions."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import typer

@@ -1,7 +1,5 @@
 """A trajectory of anybody's against the truth of a scene."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from pathlib import Path

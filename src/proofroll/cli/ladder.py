@@ -1,7 +1,5 @@
 """One quantity up the ladder of models, and what each optional term is worth."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -218,7 +218,7 @@ def show(
 
     Args:
         content: records, or plain data.
-        as_json: which of the two.
+        as_json: True for JSON.
         parts: makes the tables and lines.
         widest: columns; None: as many as :func:`proofroll.report.terminal.tables.console` has.
     """

@@ -1,7 +1,5 @@
 """A person's own run as a picture, and in motion."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated

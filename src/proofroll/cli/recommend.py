@@ -54,7 +54,7 @@ def recommend(
     listed apart, unless --engine asks for them. Of the cheaper ones, which all fail, the most accurate is shown.
 
     Of several scenes, studies or groups (as loops) the runs of a report answer, OUT/report.json unless --report names
-    another: what to take for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it.
+    another: a choice for each, and over all. The tolerance is then a part of the path, or '0.1 %' of it.
     """
     if len(scenes) > 1 or forces or report is not None:
         given = {

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from proofroll.running.runner import Runner
     from proofroll.studies.comparison.outcome import Outcome
 
-# Part of the time that writing unfinished pages may take.
-_WRITING = 0.05
+# Part of the processor time that writing unfinished pages may take.
+_WRITING = 0.03
 
 
 def report(
@@ -80,6 +80,7 @@ def report(
     from proofroll.running.store import alone_in
     from proofroll.running.worker_pool import Workers
 
+    before = _processor_seconds()
     if history:
         _show_history(history, out, as_json=as_json)
         return
@@ -110,7 +111,8 @@ def report(
         growing = _Growing(loaded, parts, out, lambda ended, awaited: begun(ended, command, awaited, left_out))
         with growing.told_if_stopped():
             stage = _begin(1, total, "comparisons") if loaded else ""
-            outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget) if loaded else []
+            spent = _processor_seconds() - before
+            outcomes = outcomes_of(loaded, engine or [], runner, stage, growing.add, budget, spent) if loaded else []
         made = begun(outcomes, command, left_out=left_out)
         made.earlier = earlier
         missing = made.expect(parts, out, fresh=fresh)
@@ -123,6 +125,12 @@ def report(
                 made.write(out)
         options.show(made.content, as_json, lambda: _shown(made.content, out))
     raise typer.Exit(_exit_code(made.content, exit_code(outcomes)))
+
+
+def _processor_seconds() -> float:
+    from proofroll.running.process import processor_seconds
+
+    return processor_seconds()
 
 
 def _show_history(folder: Path, out: Path, *, as_json: bool) -> None:
@@ -147,18 +155,18 @@ class _Growing:
     ) -> None:
         self._comparisons, self._parts, self._out, self._made = comparisons, parts, out, made
         self._ended: dict[int, Outcome] = {}
-        self._start, self._spent = time.monotonic(), 0.0
+        self._start, self._spent = _processor_seconds(), 0.0
 
     def add(self, ended: dict[int, Outcome], last: bool) -> None:
         """Writes the page if something is awaited, and writing has taken little time so far."""
         self._ended = ended
-        begin = time.monotonic()
-        if last or self._spent > _WRITING * (begin - self._start):
+        if last or self._spent > _WRITING * (_processor_seconds() - self._start):
             return
+        begin = time.process_time()
         self._write()
         if not self._spent:
             options.complain(f"the first of {len(self._comparisons)} comparisons is in {self._out / 'report.html'}")
-        self._spent += time.monotonic() - begin
+        self._spent += time.process_time() - begin
 
     @contextmanager
     def told_if_stopped(self) -> Iterator[None]:

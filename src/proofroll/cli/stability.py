@@ -1,7 +1,5 @@
 """Stability map: where engines stop being right."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Checks of what an engine builds and samples at time 0."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable
 from typing import Any

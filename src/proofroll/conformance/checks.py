@@ -1,7 +1,5 @@
 """The list of checks for an engine, each a callable with a name and a command that runs it alone."""
 
-from __future__ import annotations
-
 import atexit
 import itertools
 import multiprocessing
@@ -69,7 +67,7 @@ class Check:
     Attributes:
         engine: the engine's class.
         name: e.g. ``certificate_holds[free-matched-plane]``.
-        known: why the check is known to fail; empty if it should pass. A known failure that passes is a failure.
+        known: reason of a known failure, which must not pass; empty: the check should pass.
         run: the check itself.
     """
 

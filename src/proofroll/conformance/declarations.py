@@ -1,7 +1,5 @@
 """Checks of what an engine says of itself. Nothing is built."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

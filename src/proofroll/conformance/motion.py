@@ -1,7 +1,5 @@
 """Checks of how an engine moves: the runner may cut a run where it likes, and the step has the order it should."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import suppress

@@ -69,7 +69,7 @@ class Subject:
     Attributes:
         engine: the engine's class.
         settings: complete settings.
-        scene: what is simulated.
+        scene: the simulated scene.
     """
 
     engine: Any

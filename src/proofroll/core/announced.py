@@ -1,7 +1,5 @@
 """Announcements of installed packages, by entry points."""
 
-from __future__ import annotations
-
 import contextlib
 import sys
 import warnings
@@ -48,7 +46,7 @@ def _members(protocol: Any) -> list[str]:
     """Names that every class has which follows a protocol."""
     if protocol is None:
         return []
-    declared = [name for name, kind in protocol.__annotations__.items() if kind.startswith("ClassVar")]
+    declared = [name for name, kind in protocol.__annotations__.items() if "ClassVar" in str(kind)]
     return [*declared, *(name for name in vars(protocol) if name not in declared and not name.startswith("_"))]
 
 

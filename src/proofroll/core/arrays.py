@@ -1,7 +1,5 @@
 """Types of arrays, read-only arrays, and the largest difference of two arrays."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterable, Mapping

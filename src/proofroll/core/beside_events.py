@@ -4,8 +4,6 @@ Steps of a ladder share many of their ends, so an event may be as late in each o
 than each is off, and their differences say nothing of that.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

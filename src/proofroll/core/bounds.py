@@ -1,7 +1,5 @@
 """Bounds on the numbers of a model, checked when it is made."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

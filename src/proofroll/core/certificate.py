@@ -1,7 +1,5 @@
 """Equivalence first: what the engine really built, held against the scene before anything is stepped."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -42,13 +40,13 @@ class Line:
     """One quantity of the certificate.
 
     Attributes:
-        quantity: what is compared.
+        quantity: name of the compared quantity.
         unit: its unit.
         expected, found: from the scene, and read back from the engine; nothing is found where the engine is silent.
         difference: relative to the quantity's scale; None where the engine is silent.
         tolerance: largest difference that is accepted.
-        because: why the tolerance is not round-off; empty if it is.
-        roundings: how many roundings of the scale an honest engine may lose in whatever precision.
+        because: reason for a tolerance above round-off; empty: it is round-off.
+        roundings: roundings of the scale that an honest engine may lose, in whatever precision.
     """
 
     quantity: str
@@ -83,7 +81,7 @@ def certify(engine: Any, scene: Scene, settings: Any = None) -> list[Line]:
     ``settings`` are those with which it was built; in single precision each line allows its roundings.
 
     Raises:
-        Diverged: what it samples or says that it built has another shape than the scene's bodies.
+        Diverged: a sample, or a field of what was built, has another shape than the scene's bodies.
     """
     built, sample = engine.built(), shaped(scene, engine.sample(), 0.0)
     lines: list[Line] = []
@@ -106,8 +104,8 @@ def tolerated(soft: Regularised | None, cap: Regularised | None, tolerance: floa
     """Tolerance of a quantity and its reason.
 
     Args:
-        soft: what the engine says that its model softens, or None.
-        cap: how far that can be softened at all; None: not.
+        soft: softening that the engine declares, or None.
+        cap: largest softening that is accepted; None: none is.
         tolerance: of what is not softened.
         because: its reason.
     """

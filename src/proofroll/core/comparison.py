@@ -32,11 +32,7 @@ class Tolerance:
 
     @classmethod
     def parse(cls, field_name: str, text: object) -> Tolerance:
-        """Reads ``"6e-5 m"`` or ``"0.1 %"``.
-
-        Raises:
-            InputError: the text has another form.
-        """
+        """Reads ``"6e-5 m"`` or ``"0.1 %"``. Raises InputError for another form."""
         number, _, unit = str(text).partition(" ")
         try:
             value = float(number)
@@ -78,10 +74,10 @@ class Row:
         expect: expected verdicts on the row as a whole, which is the worst of its observables.
         except_at: points at which something else is expected; the first that fits counts.
         expect_for: observable -> expected verdicts on it alone.
-        because: why something else than agreement is expected.
+        because: reason for another expectation than agreement.
         ladder: factors on the step, coarse first; 1 is the run itself. [1]: no ladder, so no limit of small steps.
             The usual one is [2, 1, 0.5] or [1, 0.5, 0.25] where its steps do not divide `every`.
-        only: parameter -> values for which this row is run (all if absent).
+        only: parameter -> values for which this row is run (all if absent); no values: points that do not give it.
         order: observable -> lowest and highest order that is expected.
         limit: observable -> largest expected distance of the limit of small steps from the truth.
         bound: observable -> tolerance that replaces the band's.
@@ -124,8 +120,8 @@ class Comparison:
 
     Attributes:
         name: of the file, without ending.
-        title: what is compared, in one line.
-        question: which the comparison answers.
+        title: subject, in one line.
+        question: question that the comparison answers.
         scene: name of the scene, or path of its folder.
         until: last time [s].
         every: sampling interval [s].
@@ -137,7 +133,7 @@ class Comparison:
         timed: whether the speed of every run is measured, in clean runs of its own.
         order: place in a report, the smallest first; those without come last, by name.
         brief: parameter -> values; a report without names has only the combinations that have one of them for each.
-        left_out: how many combinations have been left out for that.
+        left_out: number of combinations left out for that.
         budget: processor time that all cases may take together, what is beyond it being left out [s]; None: any.
         spent: those of them that asking the engines has taken [s].
     """
@@ -161,7 +157,7 @@ class Comparison:
     spent: float = 0.0
 
     def briefly(self) -> Comparison:
-        """The comparison at the combinations that a report without names has."""
+        """The comparison reduced to its ``brief`` combinations."""
         vary = {name: [value for value in values if value in self.brief.get(name, values)]
                 for name, values in self.vary.items()}  # fmt: skip
         kept = replace(self, vary=vary, points=[point for point in self.points if _fits(point, self.brief)])
@@ -187,4 +183,4 @@ class Comparison:
 
 
 def _fits(point: Mapping[str, object], allowed: Mapping[str, list[float]]) -> bool:
-    return all(point.get(key) in values for key, values in allowed.items())
+    return all(point.get(key) in values if values else key not in point for key, values in allowed.items())

@@ -1,7 +1,5 @@
 """Observed order of a ladder of steps, and its limit for small steps with the uncertainty."""
 
-from __future__ import annotations
-
 import itertools
 import sys
 from collections.abc import Mapping, Sequence
@@ -49,7 +47,7 @@ class Limit:
         shown: whether the differences shrink, so that there is a limit to speak of.
         saturated: whether two tolerances gave the same run: something else limits its steps, as samples at which they
             end, and no limit of small ones follows.
-        beside: what one step beside its events does to the finest curve (:mod:`proofroll.core.beside_events`).
+        beside: effect of one step beside its events on the finest curve (:mod:`proofroll.core.beside_events`).
         rounded: whether the differences are so near to the round-off of single precision that no order shows.
         floor: of single precision that ends the refinement, as a clause; empty: none does.
     """
@@ -211,7 +209,7 @@ def floor_text(step: float, error: float, unit: str) -> str:
 
 
 def floor_of(errors: Mapping[float, float], scale: float | None, unit: str) -> str:
-    """Clause about the floor of a refinement in single precision; empty if its errors are none.
+    """Smallest error that single precision reaches, as a clause; empty where no floor shows.
 
     Args:
         errors: by step [s].

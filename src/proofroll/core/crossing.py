@@ -1,7 +1,5 @@
 """First rise of a smooth function through zero: also when it rises and falls within one step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

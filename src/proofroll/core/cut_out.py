@@ -1,7 +1,5 @@
 """Source of a part of proofroll that runs without it: definitions of several modules, cut to what a program uses."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import functools

@@ -1,7 +1,5 @@
 """Single steps of DOP853 (scipy) that can be looked into, for our own integrators and for truths."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple

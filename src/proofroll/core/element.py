@@ -65,7 +65,7 @@ class FirstMotion:
     Attributes:
         acceleration: of the bodies at time 0 in the world [m/s²], shape (bodies, 3).
         angular_acceleration: likewise [rad/s²].
-        scale: what accelerations are measured by, never zero [m/s²].
+        scale: size that accelerations are relative to, never zero [m/s²].
         moment: a time in which little happens: when an engine without a step is looked at first [s].
         pull: acceleration by the loads alone [m/s²], in whose units errors of short runs are counted: beside the
             many times larger acceleration of a fast start an error of the loads would be small. None: the scale.
@@ -89,10 +89,11 @@ class OptionalTerm:
 
     Attributes:
         name: for a person, e.g. ``rolling resistance``.
-        because: what it is for, or with which numbers it is tried.
-        put, taken: parameters of the scene with it and without.
-        asks: what is asked for with it, besides the motion.
-        capability: of an engine that cannot leave it out (:class:`proofroll.core.engine_abilities.CannotLeaveOut`).
+        because: purpose, or the numbers with which it is tried.
+        put, taken: parameters of the scene that switch the term on and off.
+        asks: results wanted with it, besides the motion.
+        capability: name under which an engine says that it cannot leave it out
+            (:class:`proofroll.core.engine_abilities.CannotLeaveOut`).
     """
 
     name: str
@@ -109,7 +110,7 @@ class Element(Protocol):
     Attributes:
         name: unique in the scene; it tells the variables of several elements apart.
         bodies: names of its rigid bodies, in the order in which a sample holds them.
-        sample_type: what an engine gives of it at a time.
+        sample_type: record that an engine returns of it at a time.
     """
 
     @property

@@ -19,9 +19,9 @@ class SeenInRun:
     """Result of a watch over a run.
 
     Attributes:
-        samples: how many of the samples are of the scene.
+        samples: number of samples that belong to the scene.
         events: in order; None: it has nothing to say of events.
-        ended: why the run ends where it does though nothing failed, or None.
+        ended: reason of an end without a failure, or None.
     """
 
     samples: int

@@ -4,8 +4,6 @@ An adapter contains no clock, no file and no plot: the runner owns the time grid
 NaN, timeouts and files. An adapter knows surfaces, contact laws, joints, never a scene by name.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Optional protocols of an engine."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -47,7 +45,7 @@ class Term:
         name: for a person, e.g. ``elimination of violations``.
         formulations: those that have it.
         on, off: settings with and without it, put over a preset.
-        because: what it is for.
+        because: purpose of the term.
         rung: whether a model with it is a rung of the ladder by itself, as a contact of more dimensions is.
     """
 
@@ -65,7 +63,7 @@ class TellsLevels(Protocol):
 
     Attributes:
         levels: formulation -> its rung.
-        terms: what can be switched on and off.
+        terms: parts of the model that can be switched on and off.
     """
 
     levels: ClassVar[Mapping[str, Level]]
@@ -148,11 +146,7 @@ class WritesModels(Protocol):
 
     @classmethod
     def model_file(cls, scene: Scene, settings: Any) -> str:
-        """Text of the model file.
-
-        Raises:
-            Refused: there is none for this scene or formulation.
-        """
+        """Text of the model file. Raises Refused if there is none for this scene or formulation."""
 
 
 @runtime_checkable

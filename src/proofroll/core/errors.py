@@ -22,7 +22,7 @@ class InputError(ProofrollError):
     Attributes:
         field: name of the offending field as the user writes it, e.g. ``radius``.
         value: the value that was given.
-        advice: what is wrong and what to do instead.
+        advice: the mistake and its remedy.
     """
 
     def __init__(self, field: str, value: object, advice: str) -> None:
@@ -99,7 +99,7 @@ def refuse_first(engine: str, settings: object, rules: Iterable[tuple[bool, str,
             raise InputError(f"{engine}: {name}", getattr(settings, name), advice)
 
 
-def place(error: BaseException) -> str:
+def raised_at(error: BaseException) -> str:
     """Line of an adapter that raised an exception, as ``file:line in function``; empty if none did.
 
     It is the last line of the first package outside the harness: what that package calls knows no better.

@@ -1,7 +1,5 @@
 """Formulas in a scene file: ``"= mass*length^2/12"`` and, in names that repeat, ``"rod{i+1}"``."""
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

@@ -1,7 +1,5 @@
 """The first acceleration of an engine from its own first steps: nothing that an adapter says can hide it."""
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
 from typing import Any
@@ -98,7 +96,7 @@ def _lines(kind: Any, scene: Scene, settings: Any, index: int, start: FirstMotio
 
 
 def softness(engine: Any, scene: Scene) -> float:
-    """Largest relative difference that a freshly built engine says its model has, as far as there can be one."""
+    """Largest softening that a freshly built engine declares, among the quantities that may be soft."""
     built = engine.built()
     each = [built] if len(scene.elements) == 1 else [built[element.name] for element in scene.elements]
     tolerances = [0.0]

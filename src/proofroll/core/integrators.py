@@ -4,8 +4,6 @@ A step can be looked into. The state inside it comes from a shorter step of the 
 a located event is as accurate as the steps are.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -14,7 +12,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.core.dop853 import Accept, controlled_step, inside_last_step, solver_from
+from proofroll.core.dop853 import Accept, controlled_step, integrated_to, solver_from
 from proofroll.core.engine import whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.core.stalling import StepWatch
@@ -69,11 +67,7 @@ class Integrator(ABC):
 
     @abstractmethod
     def advance(self, t: float) -> None:
-        """Moves to time t [s]; the last step ends there.
-
-        Raises:
-            Diverged: it gave up.
-        """
+        """Moves to time t [s]; the last step ends there. Raises Diverged if it gave up."""
 
     def aim(self, t: float) -> None:  # noqa: B027 -- the steps of most methods end anywhere
         """Says that single steps will have to end at the time t [s].
@@ -84,11 +78,7 @@ class Integrator(ABC):
 
     @abstractmethod
     def step(self, until: float, longest: float) -> None:
-        """One step, at most of this length [s] and at most to the time ``until`` [s].
-
-        Raises:
-            Diverged: it gave up.
-        """
+        """One step, at most of this length [s] and at most to the time ``until`` [s]. Raises Diverged if it gave up."""
 
     @abstractmethod
     def inside(self, t: float) -> FloatArray:
@@ -188,6 +178,7 @@ class DormandPrince853(Integrator):
         super().begin(t, x, rates, accept, scales)
         self._solver = solver_from(lambda _, y: rates(y), t, np.array(x), self._resolution, self._resolution * scales)
         self._watch = StepWatch()
+        self._inside = [(t, x)]  # times within the last step, its start first, and states there
 
     def advance(self, t: float) -> None:
         """See :class:`Integrator`."""
@@ -197,7 +188,7 @@ class DormandPrince853(Integrator):
 
     def step(self, until: float, longest: float) -> None:
         """See :class:`Integrator`."""
-        self.t_before, self.x_before = self.t, self.x
+        self.t_before, self.x_before, self._inside = self.t, self.x, [(self.t, self.x)]
         controlled_step(self._solver, self._accept, until, longest)
         self.t, self.x = float(self._solver.t), self._solver.y
 
@@ -205,7 +196,12 @@ class DormandPrince853(Integrator):
         """See :class:`Integrator`."""
         if t == self.t_before:
             return self.x_before
-        return self.x if t == self.t else self._accept(t, inside_last_step(self._solver, t))
+        if t == self.t:
+            return self.x
+        start, y = max((one for one in self._inside if one[0] <= t), key=lambda one: one[0])  # near a stop it is stiff
+        state = integrated_to(self._solver.fun, start, y, t, self._solver.rtol, self._solver.atol)
+        self._inside.append((t, state))
+        return self._accept(t, state)
 
 
 INTEGRATORS: Mapping[str, type[Integrator]] = {"rk4": RungeKutta4, "dop853": DormandPrince853}

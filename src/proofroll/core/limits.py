@@ -1,7 +1,5 @@
 """Limits of wall seconds for one run; time in which others had the processor does not count."""
 
-from __future__ import annotations
-
 # A run that somebody asked for: a row of a comparison at a point, an engine's reading of a robot file.
 TIME_LIMIT = 120.0
 # A single run from the command line, whose user may stop it by hand.

@@ -1,7 +1,5 @@
 """An engine on a scene: one model of a scene of one element, or, as no force couples elements, a model of each."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from enum import Enum
@@ -76,7 +74,7 @@ def formulation_for(requires: Collection[str], formulation: str, provides: Mappi
     Args:
         requires: by the element alone.
         formulation: of the run.
-        provides: what each formulation of the engine does.
+        provides: capabilities of each formulation of the engine.
 
     Returns:
         None where there is none.
@@ -133,11 +131,7 @@ def _settings_for(kind: Any, alone: Scene, settings: Any) -> Any:
 
 
 def sample_of(scene: Scene, element: Element, sample: AnySample) -> Sample:
-    """The part of a sample that belongs to one element.
-
-    Raises:
-        Diverged: there is none.
-    """
+    """The part of a sample that belongs to one element. Raises Diverged if there is none."""
     own = sample.get(element.name, sample) if isinstance(sample, Mapping) else sample
     if not isinstance(own, element.sample_type) or (own is sample and len(scene.elements) > 1):
         each = " for each element, by its name" if len(scene.elements) > 1 else ""

@@ -25,11 +25,11 @@ def number(value: float | None, digits: int = 2, none: str = "–") -> str:
 
 
 def error(value: float | None, digits: int = 2) -> str:
-    """An error; infinite where there is none that is finite."""
+    """Text of an error; ∞ where it is missing or not finite."""
     return number(value, digits, none="∞")
 
 
-def place(values: Sequence[float] | FloatArray) -> str:
+def vector(values: Sequence[float] | FloatArray) -> str:
     """Components of a vector; those that are round-off of the others are zero."""
     given = [float(value) for value in values]
     size = max(map(abs, given), default=0.0) or 1.0

@@ -1,7 +1,5 @@
 """Declaration of an observable by its kind of element; lists, plots and verdicts read it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -30,14 +28,14 @@ class Observable:
         headline: whether summaries show it: the motion, and the forces that a person asks for first.
         watched: whether a first look judges it though no summary shows it.
         always: whether it is judged without a tolerance, too: by half of its size, events by their number.
-        asked_as: what a scene asks for so that a first look judges it, as ``orientation``; empty: nothing.
+        asked_as: word in a scene's ``asks`` for which a first look judges it, e.g. ``orientation``; empty: none.
         decides: whether a trade-off, a stability map and a recommendation go by it by default.
         asked_for: whether a person may ask for a recommendation by it.
         column: whether a trade-off shows it beside what decides, by default.
         audit: whether it holds the reactions that an engine reports against the motion that it made.
         hangs_on_events: whether it is a matter of luck where the time of an event is ill-posed.
         difference_of: variable that it is a small difference of, and whose round-off it has; empty: none.
-        absent: why no run of the scene has it, and what to change; empty: runs have it.
+        absent: reason for which no run of the scene has it, and the remedy; empty: runs have it.
     """
 
     name: str

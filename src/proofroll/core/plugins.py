@@ -1,7 +1,5 @@
 """Engines are plug-ins: entry points of the group ``proofroll.engines``, loaded when they are needed."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Collection, Mapping
@@ -14,7 +12,7 @@ from typing import Any
 from proofroll.core.announced import announced, loaded
 from proofroll.core.element import ElementKind
 from proofroll.core.engine_abilities import MadeFor, SupportsFrom, offered
-from proofroll.core.errors import InputError, Missing, ProofrollError, place, require_known
+from proofroll.core.errors import InputError, Missing, ProofrollError, raised_at, require_known
 
 GROUP = "proofroll.engines"
 ELEMENTS = "proofroll.elements"
@@ -54,7 +52,7 @@ def load_engine(name: str) -> Any:
     except ModuleNotFoundError as error:
         raise _not_found(point, error) from None
     except AttributeError as error:
-        if place(error):  # arose inside the adapter
+        if raised_at(error):  # arose inside the adapter
             raise
         raise ProofrollError(f"{name} is announced as {point.value}, but {error}: correct the entry point") from None
     if lacking := lacking_of(kind):
@@ -83,7 +81,7 @@ def release(version: str) -> tuple[int, ...]:
 
 def _not_found(point: EntryPoint, error: ModuleNotFoundError) -> ProofrollError:
     """Error for a missing module: not installed, or misspelt."""
-    module, where = error.name or str(error), place(error)
+    module, where = error.name or str(error), raised_at(error)
     whole = f"imports {module} ({where})" if where else f"is announced as {point.value}"
     top = module.partition(".")[0]
     if top != module and find_spec(top) is not None:

@@ -23,7 +23,7 @@ class FailedRun:
         silent: whether the engine does not say so.
         truth: the true run, or None.
         scale, allowed: range of the deciding observable, and part of it that its error may be.
-        note: why the program asks proofroll, or nothing.
+        note: reason for which the program asks proofroll; empty: it does not.
     """
 
     scene: str
@@ -107,7 +107,7 @@ def program(failed: FailedRun, what: str, part: str, numbers: Mapping[str, Any],
     """Text of the whole program.
 
     Args:
-        failed: what it shows.
+        failed: the failed run that it shows.
         what: is moved, as a sentence without its end.
         part: of the engine: imports, and ``run(times)``, which yields what ``signs`` takes at each time.
         numbers: that ``signs`` uses.

@@ -4,8 +4,6 @@ A scene knows nothing of engines, and nothing of what its elements are: :mod:`pr
 them have. Engines compare :attr:`Scene.requires` with what their formulations provide.
 """
 
-from __future__ import annotations
-
 import copy
 import hashlib
 import json
@@ -31,10 +29,10 @@ class Scene:
     Attributes:
         name: folder name under ``models/``.
         title: one line for a person.
-        elements: what it is made of.
+        elements: its parts, each of one kind.
         parameters: the numbers a user can set by name, SI units.
         folder: where the scene's file and its engine-native models lie.
-        asks: what is wanted besides the motion; what is not asked for need not be modelled.
+        asks: results wanted besides the motion; others need not be modelled.
         files: names of the engine-native models in the folder, and of what these read.
 
     Raises:

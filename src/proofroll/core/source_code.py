@@ -1,7 +1,5 @@
 """Source code that a result rests on, so that none outlives a change of it."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import hashlib

@@ -1,7 +1,5 @@
 """Stall of an error control: many steps in a row, each tiny against the largest."""
 
-from __future__ import annotations
-
 from proofroll.core.errors import Diverged
 
 # No smooth motion needs such steps. A slide of a million times the crank's mass drives the crank through its dead point

@@ -1,7 +1,5 @@
 """The times at which a run is sampled."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from numbers import Real
 

@@ -39,7 +39,7 @@ class ElementTruth(Protocol):
         Args:
             element: one that it covers.
             times: of the samples [s], shape (time,).
-            asks: what is wanted besides the motion.
+            asks: results wanted besides the motion.
 
         Raises:
             Refused: two routes do not cover this; the text says why.
@@ -60,7 +60,7 @@ class FindsEdges(Protocol):
             parameter: of the scene.
             low: one of the values, in the parameter's unit.
             high: the other.
-            until: how long the event is looked for [s].
+            until: last time at which the event is looked for [s].
 
         Raises:
             InputError: it finds no edges of this parameter.

@@ -1,7 +1,5 @@
 """Checks what files and settings say against typed dataclasses, with one line about the first thing that is wrong."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass

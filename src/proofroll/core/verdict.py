@@ -1,7 +1,5 @@
 """The verdict: how an observable of one run stands to the truth, both with their error bars."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -64,7 +62,7 @@ class Judgement:
     """One observable of one run.
 
     Attributes:
-        observable, unit: what was compared.
+        observable, unit: the compared quantity and its unit.
         error: largest distance from the truth.
         truth_error_bar: of the truth, in the same unit.
         tolerance: largest error that counts as agreement.
@@ -73,9 +71,9 @@ class Judgement:
         order: observed order, or None.
         limit_error: distance of the limit of small steps from the truth, or None without a ladder.
         limit_error_bar: uncertainty of that distance.
-        limit: what the ladder says, see :class:`LimitResult`.
-        reason: why this verdict, as a clause with numbers.
-        remarks: what a reader must know though it does not change the verdict, one clause each.
+        limit: result of the ladder of steps, see :class:`LimitResult`.
+        reason: ground of the verdict, as a clause with numbers.
+        remarks: further facts for a reader that do not change the verdict, one clause each.
         floor: of single precision that ends the refinement, as a clause; empty: none does.
     """
 
@@ -127,10 +125,10 @@ def judge_curve(
         limit: of small steps, or None if there is none.
         ladder: whether several steps were asked for; without a limit they then confirm nothing.
         lost: the first of these steps that has no curve, and why, as a clause; empty if each has one.
-        doubt: what an ill-posed question leaves to be judged.
-        own_bar: how far the run itself leaves open what it shows, as where an event lies between two of its samples;
+        doubt: part of an ill-posed question that can still be judged.
+        own_bar: uncertainty of the run's own value, e.g. where an event lies between two of its samples;
             an error that may come of this alone is no difference.
-        sampled_bar: how far its samples leave that open; no run excuses itself by more.
+        sampled_bar: part of that which its samples explain; no run excuses itself by more.
         between: values of the run at a few times off the grid, and the true ones; None: there are none.
         magnitude: of the numbers whose round-off the curve has, if more than ``scale``: positions for a gap.
         precision: in which the run was computed, see :func:`proofroll.core.engine.precision_of`.
@@ -249,6 +247,8 @@ def _reason(
     """Reason of the verdict, as a clause with numbers; error bars are the truth's and the run's own."""
     truth_error_bar, own_bar = bars
     shown_error, allowed, bar = *_told_apart(error, tolerance), f"{number(truth_error_bar)}{unit}"
+    if np.isinf(truth_error_bar):
+        return "not judged: the truth does not tell it here"
     if truth_error_bar > tolerance:
         return f"not judged: the truth's error bar {bar} exceeds the tolerance {allowed}{unit}"
     if verdict == Verdict.NOT_JUDGED:

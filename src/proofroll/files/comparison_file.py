@@ -1,7 +1,5 @@
 """Reads ``comparisons/*.toml``: what is claimed about engines on a scene, with a reason for every tolerance."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

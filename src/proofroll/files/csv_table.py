@@ -4,8 +4,6 @@ The header names each column as ``q.pivot [rad]``. An array has a column for eac
 follow its name: ``p_WB/rod/x [m]``. Attributes, and what is not along time, are left out.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

@@ -1,7 +1,5 @@
 """Folders of models and files of studies: in an installed wheel, at the top of the repository, or in other packages."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from types import ModuleType

@@ -1,7 +1,5 @@
 """Plain data, as JSON can hold it: the one place where records become dictionaries."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass

@@ -32,12 +32,12 @@ class SceneFile:
     """The contents of a ``scene.toml`` before parameters are set.
 
     Attributes:
-        title: what the scene is, in one line.
+        title: description in one line.
         source: where it comes from.
         gravity: the table that all kinds of elements share.
-        parameters: what a user sets by name.
-        asks: what is wanted besides the motion, e.g. ``orientation``.
-        reason: why the scene is there, for a person.
+        parameters: numbers that a user sets by name.
+        asks: results wanted besides the motion, e.g. ``orientation``.
+        reason: purpose of the scene, for a person.
         duration: length of a run that shows what it is about [s].
         dt: step that is short enough for engines with a fixed one [s]; shown where a run with a longer one fails, and
             taken by a first look.
@@ -107,11 +107,7 @@ def _read(name: str, given: Mapping[str, object]) -> tuple[SceneFile, dict[str, 
 
 
 def scene_folder(name: str) -> Path:
-    """Folder of the scene.
-
-    Raises:
-        InputError: there is no such scene.
-    """
+    """Folder of the scene. Raises InputError if there is no such scene."""
     missing = "there is no such scene"
     own = Path(name).parent if Path(name).name == "scene.toml" else Path(name)
     for folder in (data_folder("models") / name, own):

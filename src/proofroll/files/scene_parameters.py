@@ -19,10 +19,10 @@ class Parameter:
         value: default, or the name of the parameter whose value is the default.
         unit: of the value; nothing is converted.
         symbol: as equations write it.
-        meaning: what it is, in one line; messages say it.
+        meaning: description in one line, used in messages.
         source: where the number comes from.
         above, at_least, below, at_most: bounds, as numbers or names of other parameters.
-        nonzero: why the value must not be zero.
+        nonzero: reason for which the value must not be zero.
         unbounded: whether inf is allowed.
         integer: whether it counts something.
     """

@@ -1,7 +1,5 @@
 """Files of other formats that hold a scene; who reads them is announced by entry points ``proofroll.scene_sources``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path

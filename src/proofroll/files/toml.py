@@ -1,7 +1,5 @@
 """TOML files: read with one clear line about what is wrong, and found by what they are for."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,11 +15,7 @@ _DEEPEST = 16
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The content of a file.
-
-    Raises:
-        InputError: it is broken, far too large or cannot be read.
-    """
+    """The content of a file. Raises InputError if it is broken, far too large or cannot be read."""
     try:
         if path.exists() and not path.is_file():  # a pipe would be waited for without end
             raise InputError("file", path, "this is no ordinary file")

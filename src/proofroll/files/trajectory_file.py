@@ -42,7 +42,7 @@ _NO_SUCH_FILE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, RecursionEr
 
 
 def import_xarray() -> None:
-    """Imports xarray in a process that is ours alone: from then on it takes no array of dask's.
+    """Import xarray without dask, in a process that uses no array of dask's.
 
     At its first array xarray imports all of dask, half of what a run of a second costs; no array of ours is dask's.
     """

@@ -52,11 +52,11 @@ class Against:
     Attributes:
         old: its path.
         date: when it was written.
-        versions: what ran in another version: name -> both versions.
+        versions: packages whose version changed: name -> both versions.
         costs: costs were compared, for both reports are of one machine.
         drift: median ratio of all costs, by which old ones are multiplied first: the machine's, not the engines'.
         factor: by which a cost must differ then: more where most costs scatter, on a machine that was busy.
-        compared: how many runs are in both.
+        compared: number of runs in both.
         changes: the runs that changed.
     """
 
@@ -169,7 +169,7 @@ def _changes(
     """Kind and clause of each change of a run."""
     one, other = _first(before), _first(after)
     if one.status != other.status:
-        yield "verdict", f"{one.status} → {other.status} {other.message}".rstrip()
+        yield "verdict", f"{one.status} → {other.status}: {other.message}".removesuffix(": ")
         return
     values = []
     for name, new in after.items():

@@ -20,11 +20,7 @@ _NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationD
 
 @contextmanager
 def styled(settings: Mapping[str, Any]) -> Iterator[None]:
-    """Settings of matplotlib, by name, while something is drawn.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
+    """Settings of matplotlib, by name, while something is drawn. Raises Missing if matplotlib is not installed."""
     try:
         import matplotlib as mpl
     except ModuleNotFoundError:
@@ -48,7 +44,7 @@ def drawn_file(
         settings: of matplotlib, by name.
         drawn: makes the figure.
         dpi: dots per inch of what is no line or letter.
-        said: what the file says of itself, by the names that its form has for it.
+        said: entries of the file about itself, by the names of its format.
 
     Raises:
         Missing: matplotlib is not installed.

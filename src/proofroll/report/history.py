@@ -145,6 +145,8 @@ def _drawn(engine: EngineHistory, dates: Sequence[str]) -> Figure:
             look = {"color": next(colours), "lw": 1.4, "marker": "o", "markersize": 3, "label": run.run}
         for panel, values in zip(drawn, (run.errors, run.costs), strict=True):
             panel.plot(at, [float("nan") if value is None else max(value, SMALLEST) for value in values], **look)
+    if all(cost is None for run in engine.runs for cost in run.costs):
+        drawn[1].text(0.5, 0.5, "no cost was measured by clean runs", ha="center", transform=drawn[1].transAxes)
     for panel, title in zip(drawn, ("largest error, in parts of its size", "cost [s/s]"), strict=True):
         panel.set(yscale="log", title=title, xticks=list(at), xlim=(-0.2, len(dates) - 0.8))
         panel.set_xticklabels(marks, rotation=0 if len(dates) < 7 else 60)

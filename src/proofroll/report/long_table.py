@@ -1,7 +1,5 @@
 """The long table: one line for each quantity of each run, with flat values alone; the files of a report hold it."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math
@@ -25,9 +23,9 @@ class TableLine:
         engine, version, formulation, preset, setting, precision: which; ``setting`` has preset and further options.
         own_equations: the run solves equations derived for the scene, as its truth does.
         resolution, step: setting that trades speed for accuracy, and its value.
-        status, message: how the run ended.
+        status, message: end of the run.
         verdict: of the quantity, of a run without quantities that of the run; empty: none was given.
-        limit: what a ladder of steps says of the quantity.
+        limit: result of a ladder of steps for the quantity.
         quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
         headline: summaries show it.
         error: largest distance from the truth; None: not finite, or there is none.
@@ -96,7 +94,7 @@ class LongTable:
 
     @property
     def csv(self) -> str:
-        """The same as CSV; a value that is not there, or not finite, is an empty field."""
+        """All lines as CSV; a value that is missing or not finite is an empty field."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(COLUMNS)

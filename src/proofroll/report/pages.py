@@ -46,7 +46,7 @@ def folded(html: str) -> str:
 
     What follows the summary of each is moved into the element with the id ``folds``, compressed; ``templates/page.js``
     puts it back. A fold within a fold is one of its own, and one with the attribute ``data-whole`` stays as it is.
-    Browsers so read, place and paint what is open alone.
+    So a browser reads, places and paints only what is open.
     """
     texts: list[str] = []
     levels: list[list[str]] = [[]]

@@ -29,8 +29,8 @@ class PartEntry:
 
     Attributes:
         name, title, question, scene, command: as its ``head`` has them.
-        missing: why there is nothing, and what makes it; empty if there is something.
-        study: what was found, as its file has it, or None.
+        missing: reason for which there is nothing, and the command that makes it; empty: there is something.
+        study: its stored results, or None.
         contradictions: sentences about what was claimed and is not so.
         lost: sentences about engines without which it is not whole.
     """
@@ -53,12 +53,12 @@ class Part(Protocol):
         kind: of the study, as its files have it: ``study = "…"``.
         key: under which the content lists it.
         order: place among the parts of a report, the smallest first.
-        words: what is made, for a person.
+        words: name of the part, for a person.
         command: of ``proofroll`` that makes it, with fields of ``asked`` as in ``stability {.scene}``.
         template: in the folder ``templates`` beside the class's module, with the macros
             ``section(entry, index, pictures, content)`` and ``link(entry, index, count)``; the latter for the contents.
         names: further names that the template uses; no other part has them.
-        asked: what its file says.
+        asked: content of its file.
         engines: to which it is restricted; none: all.
     """
 
@@ -74,11 +74,7 @@ class Part(Protocol):
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
-        """The part that a file asks for, restricted to some engines.
-
-        Raises:
-            InputError: the file is broken.
-        """
+        """The part that a file asks for, restricted to some engines. Raises InputError if the file is broken."""
 
     @staticmethod
     def line(entry: Any) -> str:
@@ -146,7 +142,7 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
 
 
 def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
-    """The parts of all studies' files in the order of a report; those on request only if they are kept in ``out``."""
+    """Parts of all studies' files in the order of a report; parts on request only where ``out`` has their results."""
     parts = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
     return [part for part in parts if not part.on_request or part.keeps(out)]
 

@@ -1,7 +1,5 @@
 """Lines, arrows and letters of a drawing: points in space go in, marks of an SVG picture come out."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

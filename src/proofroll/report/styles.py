@@ -1,7 +1,5 @@
 """Style of a row in all figures of a comparison: colour with dashes, width and symbol."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """One engine in two versions, for a person: a table, sentences, and a page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from rich.table import Column, Table

@@ -1,7 +1,5 @@
 """Two files of one robot: where they describe different ones, and which file has what."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import math
@@ -52,9 +50,9 @@ def against(
         path: of a URDF or MJCF, which is taken as true.
         other: of another.
         names: joint of the first -> joint of the second, where they have different names.
-        base: what carries the root of a URDF, ``fixed`` or ``free``.
+        base: support of the root of a URDF, ``fixed`` or ``free``.
         root: folder that each file and what it names lie in; by default the file's own.
-        states: how many random states are compared.
+        states: number of random states to compare.
         seed: of the states.
         time_limit: for compiling a file [s].
 

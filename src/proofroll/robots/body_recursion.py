@@ -3,8 +3,6 @@
 M comes column by column. Source: Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.robots.model import WORLD, Array, Robot, RobotBody, RobotJoint

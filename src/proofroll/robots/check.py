@@ -1,7 +1,5 @@
 """The check of one robot file: what each engine holds, where it differs, and why."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import tempfile
@@ -51,9 +49,9 @@ def check(
     Args:
         path: of a URDF or MJCF.
         engines: ``name`` or ``name[option=true,…]``; by default all whose readers are installed.
-        base: what carries the root of a URDF, ``fixed`` or ``free``.
+        base: support of the root of a URDF, ``fixed`` or ``free``.
         root: folder that the file and what it names lie in; by default the file's own.
-        states: how many random states are compared.
+        states: number of random states to compare.
         seed: of the states.
         time_limit: for each engine [s].
         accept: causes of differences that are no news, besides those in ``ROBOT.accept.toml`` beside the file.

@@ -1,7 +1,5 @@
 """Robot files: whether engines hold the model that a file describes; what else can be checked is in the harness."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """Meaning of a file in a format that an engine defines: asked of that engine, in a process of its own."""
 
-from __future__ import annotations
-
 import contextlib
 import tempfile
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Causes that close the difference of an engine, each with the difference before and after."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable
@@ -27,10 +25,10 @@ class RobotCause:
 
     Attributes:
         id: function of the hypothesis.
-        name: what the engine does.
+        name: behaviour of the engine.
         layer: the first at which it shows.
         before, after: difference at that layer without and with the hypothesis.
-        remedy: what a user does about it.
+        remedy: action of a user.
         known: engines and versions in which it was seen.
     """
 
@@ -58,8 +56,8 @@ class Search:
     """Looks for the causes of what an engine holds.
 
     Attributes:
-        file: what was read.
-        reading: what the engine holds.
+        file: the file that was read.
+        reading: model that the engine holds.
         engine: its name.
         tolerances: up to which a layer holds.
         recompiled, reread: see :class:`proofroll.robots.hypotheses.RobotEvidence`.

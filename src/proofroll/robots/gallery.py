@@ -38,7 +38,7 @@ class Entry:
         file: end of its path there.
         engines: engine -> causes of its differences; ``refuses``; ``crashed``; ``open``, also beside causes: something
             stays unexplained.
-        base: what carries the root of a URDF.
+        base: support of the root of a URDF.
     """
 
     name: str
@@ -61,11 +61,7 @@ strict(_File, Entry)
 
 
 def read_gallery(path: str | Path | None = None) -> list[Entry]:
-    """The entries of the file.
-
-    Raises:
-        InputError: it is broken, or names an unknown cause.
-    """
+    """The entries of the file. Raises InputError if it is broken, or names an unknown cause."""
     path = Path(path or data_folder("comparisons") / "robots.toml")
     known = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
     entries = validated(_File, read_toml(path), path.name).robots

@@ -1,7 +1,5 @@
 """Row of an engine's importer: its differences, their causes, and the joints it holds wrongly."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import tempfile

@@ -1,7 +1,5 @@
 """Errors and risks of a robot file, before any engine sees it."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Meaning of a robot file: our own reading of URDF, and of MJCF the answer of the engine that defines it."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Mapping
 from functools import lru_cache

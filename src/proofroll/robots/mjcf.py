@@ -1,7 +1,5 @@
 """MJCF as every engine gets it: includes put in place, everything named, without looks, contacts and missing meshes."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import itertools
@@ -41,9 +39,9 @@ _MACROS = {"replicate", "attach", "composite"}
 def stripped(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
 ) -> tuple[Element, list[LintRemark], bool]:
-    """A copy that names no file but meshes that exist in the folder ``inside``, and what was left out.
+    """Copy of an MJCF, remarks on what it leaves out, and True if all files that the MJCF names lie in ``inside``.
 
-    The third is true if all files that are named, looks included, lie in that folder.
+    The copy names meshes alone, those that exist in that folder.
 
     Raises:
         InputError: it includes a file outside the folder, or holds what the check does not cover.

@@ -1,7 +1,5 @@
 """Default classes of MJCF: what an element has from the class that it belongs to."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree.ElementTree import Element

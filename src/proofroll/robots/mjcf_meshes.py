@@ -1,7 +1,5 @@
 """Shapes of an MJCF that name meshes or height fields: those that give no mass are left out."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Actuators of an MJCF as tables of a scene, their controls at zero."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 from xml.etree.ElementTree import Element

@@ -1,7 +1,5 @@
 """Reading of a robot file: safely, once, and without what engines must not load."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from xml.etree.ElementTree import Element
@@ -21,7 +19,7 @@ def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand
 
     Args:
         path: of a URDF or MJCF.
-        base: what carries the root of a URDF, ``fixed`` or ``free``.
+        base: support of the root of a URDF, ``fixed`` or ``free``.
         root: folder that the file and what it names lie in; by default the file's own.
         expand: writes out what macros of a format (repetition, attached models) stand for.
 

@@ -1,7 +1,5 @@
 """Place of an engine's largest difference at a layer: the joint, the state, the engine's number and the true one."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.robots.layers import RobotTruth

@@ -1,7 +1,5 @@
 """Numbers of a robot file that no machine has: most often another unit, or a default that was not meant."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

@@ -28,7 +28,7 @@ class Request:
         kind: ``urdf`` or ``mjcf``.
         base: for URDF, ``fixed`` (the root is part of the world) or ``free``.
         base_joint: name under which the reading has the free joint of a URDF's root.
-        options: what the user gave for this engine, a key of the reader's ``options`` each.
+        options: the user's options for this engine, by keys of the reader's ``options``.
         children: moving joint -> the body that it carries, as the file names them.
         states: at which everything is evaluated.
         torques: moving joint -> torques for the forward dynamics, shape (states, velocities of the joint).
@@ -64,7 +64,7 @@ class Reading:
         inverse: torque for the accelerations asked, without damping, friction and springs, shape (states, n); None: not
             offered.
         forward: acceleration for the torques asked, with all of them, shape (states, n); None: not offered.
-        remarks: what the reader did and what the engine said, as sentences.
+        remarks: actions of the reader and messages of the engine, as sentences.
     """
 
     joints: tuple[str, ...]
@@ -130,7 +130,7 @@ class RobotReader(Protocol):
 
     @property
     def tolerances(self) -> Mapping[str, float]:
-        """See above; a class attribute will do."""
+        """Tolerances by layer; a class attribute is enough."""
 
     def version(self) -> str:
         """Version of the engine."""
@@ -170,7 +170,7 @@ def evaluate(
     """The arrays of a :class:`Reading` from an engine that is asked state by state.
 
     Args:
-        request: what was asked.
+        request: the request.
         joints: the engine's moving joints in the order of its velocities.
         dofs: velocities of each.
         at: puts the engine into one state; ``inverse`` and ``forward`` are called before the next one.

@@ -1,7 +1,5 @@
 """A file read by an engine in a process of its own: both sides of the pipe."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import dataclasses
@@ -44,7 +42,7 @@ def load_reader(name: str) -> Any:
 
     Raises:
         InputError: no installed package announces one for this engine.
-        Missing: what it needs is not installed.
+        Missing: a package that it needs is not installed.
     """
     require_reader(name)
     point = next(point for point in announced(GROUP) if point.name == name)
@@ -62,9 +60,9 @@ class ReaderAnswer:
 
     Attributes:
         version: of the engine.
-        says: what the reader says with every reading.
+        says: sentence shown with every reading of this engine.
         tolerances: where the engine's own precision is less than double's, by layer.
-        reading: what it holds; None: it refused.
+        reading: model that the engine holds; None: it refused.
         refused: why, in its own words.
         fed: see :class:`proofroll.robots.protocol.RobotReader`.
     """
@@ -205,11 +203,7 @@ def write(file: RobotFile, folder: Path) -> Path:
 
 
 def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
-    """Options as the user writes them.
-
-    Raises:
-        InputError: one is neither true nor false.
-    """
+    """Options as the user writes them. Raises InputError if one is neither true nor false."""
     options = {}
     for key, value in given.items():
         if str(value).lower() not in {"true", "false"}:

@@ -1,7 +1,5 @@
 """Records of a check of a robot file, and of the gallery's robots."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -32,8 +30,8 @@ class ImporterRow:
         layers: those that it offers.
         causes: of its differences.
         unexplained: the first layer that they leave open.
-        held: how much it holds of the copy that is compared, which has no looks, no contacts and only meshes with mass.
-        as_written: what its importer does with the file as it is, where that is asked.
+        held: result for the compared copy, which has no looks, no contacts and only meshes with mass.
+        as_written: result of its importer on the file as it is, where that is asked.
         fed: the engine has no importer: it was fed from our reading, and what it leaves out is no news of a file.
         accepted: all causes of its differences are among those that the user accepts.
         where: body or joint with the largest difference, at the first layer that fails.
@@ -139,7 +137,7 @@ class AgainstCheck(RobotCheck):
         against_by: by whose reading it has its meaning.
         matched: joint of the first file -> its partner in the second.
         absent, added: moving joints that only the first file has, or only the second.
-        values: what joints have otherwise.
+        values: other values of joints.
     """
 
     against: str

@@ -1,7 +1,5 @@
 """A robot file as every engine gets it: read once and safely, without what loads other files."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re
@@ -40,7 +38,7 @@ class RobotFile:
         kind: ``urdf`` or ``mjcf``.
         root: the content that engines get; of MJCF with all includes.
         base: ``fixed`` or ``free``: what carries the root of a URDF; of MJCF the file says so itself.
-        remarks: what was left out or changed on the way.
+        remarks: omissions and changes on the way.
         contained: whether all files that it names, looks included, lie in the folder that files are read from.
     """
 
@@ -147,11 +145,7 @@ def names_files_inside(root: Element, folder: Path, inside: Path) -> bool:
 
 
 def required_file(folder: Path, element: Element, inside: Path) -> Path:
-    """The file that an element names.
-
-    Raises:
-        InputError: it lies outside the folder ``inside``.
-    """
+    """The file that an element names. Raises InputError if it lies outside the folder ``inside``."""
     target = file_inside(folder, element.get("file", ""), inside)
     if target is None:
         said = (

@@ -4,8 +4,6 @@ Links that fixed joints hold together are one body, in the frame of the link tha
 looks are left out, actuators of an MJCF act where they are asked for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """The result of a check on the terminal, within 80 columns."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator, Sequence
 from pathlib import Path

@@ -4,8 +4,6 @@ A, here: Jacobians in world axes, M = Σ Jᵀ I J, and h from the accelerations 
 B, :mod:`proofroll.robots.body_recursion`: recursive Newton-Euler with spatial vectors in body axes.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Our own reading of URDF, by its specification (wiki.ros.org/urdf/XML): what the file says, nothing invented."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections import Counter

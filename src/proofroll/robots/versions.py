@@ -1,7 +1,5 @@
 """A robot file in two versions of one engine's importer."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Descriptions of engines and facts of cases, each asked in a worker process."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import os
@@ -96,11 +94,7 @@ def resolve_with_truth(
     workers: Workers | None = None,
     requires: Collection[str] = (),
 ) -> tuple[list[EngineFacts | ProofrollError], EngineFacts]:
-    """Facts as by :func:`resolve`, and the truth's.
-
-    Raises:
-        ProofrollError: the truth cannot be asked.
-    """
+    """Facts as by :func:`resolve`, and those of the truth. Raises ProofrollError if the truth cannot be asked."""
     *facts, truth = resolve([*engines, ("truth", {})], workers, requires)
     if not isinstance(truth, EngineFacts):
         raise truth

@@ -50,11 +50,11 @@ class EngineDescription:
         presets: formulation -> preset -> complete settings.
         summary: one line for a person.
         levels: formulation -> rung of the ladder of models; empty if not declared.
-        terms: what can be switched on and off.
+        terms: parts of the model that can be switched on and off.
         inherent: formulation -> what is always in its model -> why.
         defaults: its default values.
         oldest: version from which on its adapter supports it; empty: not declared.
-        made_for: formulation -> what a scene has to require one of for it to be offered, sorted; none: any scene.
+        made_for: formulation -> capabilities, sorted; it is offered to scenes that require one of them. None: to all.
     """
 
     name: str
@@ -82,10 +82,11 @@ class EngineFacts:
         settings: complete settings of the formulation, by name.
         resolution: name of the setting that trades speed for accuracy, ``dt`` or ``rtol``.
         order: declared order of convergence, or None.
-        lowered: what a scene may require -> the order with it, see
+        highest: order where the scene does not lower it; None: as declared.
+        lowered: requirement of a scene -> order of convergence with it, see
             :class:`proofroll.core.engine_abilities.LowersOrder`.
         shares: routes of the truth that it shares, see :class:`proofroll.core.engine_abilities.SharesEquations`.
-        caveat: what of these settings is not the engine's own, shown beside its verdicts; empty: nothing.
+        caveat: part of these settings that is not the engine's own, shown beside its verdicts; empty: none.
         families: of the laws that it solves, see :class:`proofroll.core.engine_abilities.TellsFamily`.
         family: those of them that a scene asks for; empty: none.
         precision: in which it computes, see :func:`proofroll.core.engine.precision_of`.
@@ -100,6 +101,7 @@ class EngineFacts:
     settings: dict[str, Any]
     resolution: str | None = None
     order: int | None = None
+    highest: int | None = None
     lowered: dict[str, int] = field(default_factory=dict)
     shares: list[str] = field(default_factory=list)
     caveat: str = ""
@@ -118,7 +120,9 @@ class EngineFacts:
         """Facts with the order of convergence and the laws for a scene with these requirements."""
         laws = dict.fromkeys(clause for need, clause in self.families.items() if need in requires)
         order = lowest(self.order, self.lowered, requires)
-        return replace(self, order=order, lowered={}, family="; ".join(laws), families={})
+        return replace(
+            self, order=order, highest=self.highest or self.order, lowered={}, family="; ".join(laws), families={}
+        )
 
 
 @dataclass(frozen=True)
@@ -133,7 +137,7 @@ class Case:
         until, every: last time and sampling interval [s].
         timed: whether a second, clean run that only advances is timed.
         time_limit: seconds after which the case is ended, but for those in which others had the processor [s].
-        asks: what is wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
+        asks: results wanted besides the motion; see :class:`proofroll.core.scene.Scene`.
         turns: whether samples are taken between those every ``every`` where turns of angles have to be counted
             (:func:`proofroll.core.turns.samples_between`); no study needs that, and an adaptive step ends at each.
         between: of the truth, times off the grid at which some engine is sampled [s]
@@ -172,7 +176,7 @@ class Result:
     """Result of a case.
 
     Attributes:
-        status: how it ended.
+        status: success, or the way in which it failed.
         message: one sentence about it.
         wall_seconds: inside ``advance`` during the sampled run [s].
         build_seconds: before the first step: one ``build`` with what it compiles [s], or None.

@@ -4,8 +4,6 @@ The runner stays the only planner. It asks a cluster instead of its own threads;
 keep its workers busy, and gives back each result as the runner's own worker process would have.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import logging
@@ -56,7 +54,7 @@ class Cluster:
 
     Args:
         address: of a scheduler, ``tcp://…`` or ``tls://…``; or ``local``, ``local:4``: so many workers on this machine.
-        task: what a worker does for a case; another only to measure what all around it costs.
+        task: function that a worker calls for a case; replaced only to measure the cost of all around it.
 
     Raises:
         InputError: the address is none, or nothing answers there.

@@ -1,7 +1,5 @@
 """Worker of a Dask cluster: one case in the same watched process that would run it at home."""
 
-from __future__ import annotations
-
 import base64
 import collections
 import dataclasses

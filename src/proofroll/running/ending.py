@@ -1,7 +1,5 @@
 """A process that ends with the one that started it, however that one ends, and only then by Ctrl-C."""
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import os

@@ -5,8 +5,6 @@ written last: what has none is a half, and is made anew. An environment is never
 goes on meaning what was installed.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -77,7 +75,7 @@ def remembered() -> list[Environment]:
 
 def find(name: str, label: str) -> Environment | None:
     """The environment ``name@label``, or None."""
-    return _read(place(name, label)) if re.fullmatch(_LABEL, label) else None
+    return _read(folder_of(name, label)) if re.fullmatch(_LABEL, label) else None
 
 
 def shown_name(engine: str) -> str:
@@ -91,12 +89,8 @@ def shown_name(engine: str) -> str:
     return f"{name}@{next(known, folder.name)}"
 
 
-def place(name: str, label: str) -> Path:
-    """The folder of an environment.
-
-    Raises:
-        InputError: the label is no name of a folder.
-    """
+def folder_of(name: str, label: str) -> Path:
+    """The folder of an environment. Raises InputError if the label is no name of a folder."""
     if not re.fullmatch(_LABEL, label):
         raise InputError("label", label, "use letters, digits, dots, hyphens and plus signs, e.g. 3.8.1")
     return root() / name / label
@@ -110,7 +104,7 @@ def remove(engine: str) -> None:
         ProofrollError: it cannot be deleted.
     """
     known = [f"{item.name}@{item.label}" for item in remembered()]
-    folder = place(plain_name(engine), place_of(engine)) if place_of(engine) else None
+    folder = folder_of(plain_name(engine), place_of(engine)) if place_of(engine) else None
     if folder is None or not folder.is_dir():
         there_are = f"choose from {choices(known)}" if known else "there is none"
         raise InputError("environment", engine, f"no such environment is remembered; {there_are}")

@@ -1,7 +1,5 @@
 """First message of a worker, which keeps numbers of another proofroll, or of another place, apart."""
 
-from __future__ import annotations
-
 import platform
 import sys
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Identity of an engine: its settings, its versions and the code that its results rest on."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import hashlib

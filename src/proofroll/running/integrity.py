@@ -1,7 +1,5 @@
 """Check of a worker's process: an engine must not replace the functions that judge it."""
 
-from __future__ import annotations
-
 import importlib
 import operator
 import sys

@@ -1,7 +1,5 @@
 """Engines ``NAME@PLACE``: a worker in another Python, which has proofroll and the engine."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

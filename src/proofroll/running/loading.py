@@ -1,7 +1,5 @@
 """Engines and scenes as a case names them, in the process that runs it: it is the right ones, or an error."""
 
-from __future__ import annotations
-
 import gc
 from typing import Any
 
@@ -63,7 +61,7 @@ def scene_of(case: Case) -> Scene:
 
     Raises:
         InputError: there is no such scene or parameter.
-        ProofrollError: what is read here is not the scene for which the case was made.
+        ProofrollError: the scene read here is not the one for which the case was made.
     """
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     if scene.digest != case.scene_digest:

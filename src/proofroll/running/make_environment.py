@@ -1,7 +1,5 @@
 """Makes the environment of an engine in another version: a virtual environment with the engine and this proofroll."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 import hashlib
@@ -77,7 +75,7 @@ def add(
     label = label or pinned
     if not label:
         raise InputError("--label", label, "no version is pinned by ==; say by which label it shall be remembered")
-    folder = environments.place(name, label)
+    folder = environments.folder_of(name, label)
     taken = environments.find(name, label)
     if taken is not None:
         advice = f"it is there already ({', '.join(taken.requirements)}); proofroll engines remove {name}@{label} first"

@@ -1,7 +1,5 @@
 """Manifest of a trajectory: how it was made."""
 
-from __future__ import annotations
-
 import json
 import platform
 import sys

@@ -6,8 +6,6 @@ row could not say why. The watch is as fine as the parent's tick; what is faster
 volunteer for it before anybody else (``oom_score_adj``).
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import os

@@ -77,7 +77,7 @@ def _count(worker: Worker, used: float) -> None:
 
 
 def safe_environment() -> dict[str, str]:
-    """The environment of a Python that imports no module of the working folder, where ``-m`` and ``-c`` look first."""
+    """Environment variables of a child Python that must not import from the working folder (``-m``, ``-c``)."""
     return {**os.environ, "PYTHONSAFEPATH": "1"}
 
 
@@ -90,7 +90,7 @@ class Worker:
     """A worker process; restarted by making a new one.
 
     Args:
-        memory: how much it may have, its children included [GB]; by default :func:`memory.memory_limit`.
+        memory: limit for it and its children [GB]; by default :func:`memory.memory_limit`.
         python: another interpreter in which it runs; by default this one.
 
     Attributes:

@@ -1,7 +1,5 @@
 """An engine that is a program of its own, in any language: ``NAME@program:PATH``. See docs/worker_protocol.md."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import math

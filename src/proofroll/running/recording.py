@@ -41,7 +41,7 @@ class Recording:
         wall_seconds: spent inside ``advance`` [s].
         advancing, sampling: spent inside ``advance``, and inside ``sample`` and around it: wall and processor seconds
             [s].
-        passed: what was sampled at each time at which the engine was stopped, by time [s].
+        passed: samples at the times at which the engine was stopped, by time [s].
         remarks: of the engine about a run that went well (:class:`proofroll.core.engine_abilities.TellsRemarks`).
     """
 

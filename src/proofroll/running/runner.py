@@ -36,7 +36,7 @@ class Runner:
 
     Args:
         store: where results are kept.
-        jobs: how many workers run at once.
+        jobs: number of workers at once.
         fresh: run every case again, once, whatever is stored.
         cluster: where the cases run; None: here. Engines are asked here, and speeds measured here, all the same.
         workers: processes that may have loaded an engine already; None: new ones.

@@ -1,7 +1,5 @@
 """Measures the speed of cases in worker processes, one at a time, so that nothing of ours runs beside them."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Self
 

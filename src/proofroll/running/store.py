@@ -1,7 +1,5 @@
 """Results on disk: one trajectory and one record per case, each whole or not there, named by the case's key."""
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import dataclasses

@@ -1,7 +1,5 @@
 """Processor time that the cases of one study may take together, for studies that would rather leave something out."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections import Counter, defaultdict
@@ -10,32 +8,34 @@ from types import MappingProxyType
 
 from proofroll.running.process import processor_seconds
 
-# Part of the seconds that cases get; the rest is for reading and judging what came of them.
-_OF_CASES = 0.9
+# Part of the seconds that is kept for reading and judging what comes of the cases, until it is known what that takes.
+_AFTER = 0.1
 # A case with less time than it takes to start a process is not begun [s].
 _LEAST = 0.5
-# Share of a group, as far as there is so much [s]: a truth and the first runs. Fifty shares of less end no truth, and
-# the same command would begin the same ones again; so the first groups get it, and the others when it goes on.
+# Least share of a group, as far as so much is left [s]: enough for a truth and the first runs. With less no group would
+# finish anything, and the same command would begin the same runs again.
 _SHARE = 10.0
 
 
 class TimeBudget:
     """Processor time of the cases of one study; what it does not suffice for is left out.
 
-    Cases belong to groups, as the comparisons of a report. A group that begins may take an equal share of what is
-    left among the groups that wait, but at least what a truth needs; what it does not take is for those after it. A
-    case may take what is left of its group's share, divided by the cases of the group that run side by side, and no
-    more than is left in all divided by all that do: so all together never take more, however long each of them does.
-    A case that was ended begins again with more time alone.
+    Cases belong to groups, as the comparisons of a report. A group that begins gets an equal part of the time left,
+    but at least what a truth needs; what it leaves over is for later groups. A case gets an equal part of its group's
+    time among the cases of the group that run now, and never more than an equal part of the time left among all that
+    run: so the sum is never exceeded. A case that was ended begins again, and only with more time.
 
     Args:
         seconds: of processor time, that of this process included [s].
         spent: those of them that asking the engines has taken already [s].
         group: of cases by key; all others are one.
+
+    Attributes:
+        after: processor time that is kept for what comes after the cases [s].
     """
 
     def __init__(self, seconds: float, spent: float = 0.0, group: Mapping[str, int] = MappingProxyType({})) -> None:
-        self.seconds = seconds
+        self.seconds, self.after = seconds, _AFTER * seconds
         self._start, self._lost = processor_seconds() - spent, 0.0
         self._group = group
         self._begun: dict[str, tuple[float, float]] = {}
@@ -59,7 +59,7 @@ class TimeBudget:
     def _left(self) -> float:
         """See :attr:`left`; under the lock."""
         used = processor_seconds() - self._start + self._lost + sum(map(self._passed, self._begun))
-        return max(0.0, _OF_CASES * self.seconds - used)
+        return max(0.0, self.seconds - self.after - used)
 
     def _passed(self, case: str) -> float:
         """Seconds of a case that has begun: by the wall, where others may have the processor, but what it may take."""

@@ -68,7 +68,7 @@ class CleanRuns:
     Attributes:
         rates: of each, wall seconds per simulated second; none where they are not the run that is judged.
         wall, processor: of all [s].
-        remarks: what a person should know of them, one clause each.
+        remarks: warnings about the times, one clause each.
     """
 
     rates: list[float] = field(default_factory=list)

@@ -4,8 +4,6 @@ Whatever slows the machine for a while slows everything that is measured in that
 taken round by round.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import platform
@@ -81,9 +79,9 @@ def interleaved(
 
     Args:
         tasks: measure something once and give seconds, or None where it cannot be measured: it is then left out.
-        rounds: how many rounds count.
+        rounds: number of rounds that count.
         progress: called with a task's name after each of its measurements.
-        once_above: what takes longer than this in the first round [s] is measured no more, and that value counts.
+        once_above: longest time of a first round [s] that is measured again; above it that value counts.
         enough: asked after each round; true ends the measurement.
     """
     order = random.Random(0)

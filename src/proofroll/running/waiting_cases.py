@@ -1,7 +1,5 @@
 """Cases that wait for a worker, by engine."""
 
-from __future__ import annotations
-
 import threading
 from collections import deque
 from collections.abc import Mapping

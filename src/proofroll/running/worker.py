@@ -4,8 +4,6 @@
 reach the answers, and what an engine breaks costs only this process.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import os
@@ -15,7 +13,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, place, require_known
+from proofroll.core.errors import Diverged, InputError, Missing, ProofrollError, Refused, raised_at, require_known
 from proofroll.running.case import Case
 from proofroll.running.ending import end_with, end_with_pipe
 from proofroll.running.handshake import identify_and_settle
@@ -105,7 +103,7 @@ def call(function: str, arguments: dict[str, Any]) -> dict[str, Any]:
 
 def one_line(error: BaseException) -> str:
     """Kind and text of an exception in one line, and where in the engine's adapter it arose."""
-    text, where = " ".join(str(error).split()), place(error)
+    text, where = " ".join(str(error).split()), raised_at(error)
     said = f"{type(error).__name__}: {text}"[:400] if text else type(error).__name__
     return f"{said} ({where})" if where else said
 

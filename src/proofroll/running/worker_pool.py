@@ -1,7 +1,5 @@
 """Worker processes that are kept for the engine they have loaded: starting another costs more than many a case."""
 
-from __future__ import annotations
-
 import threading
 import weakref
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The one place that makes cases: of any study, and of one run as the command line asks for it."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

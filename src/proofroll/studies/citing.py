@@ -3,8 +3,6 @@
 Each belongs to what it is about: a file ``references.bib`` beside an engine's module, a truth's, or a ``scene.toml``.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import re

@@ -1,7 +1,5 @@
 """Judgements of the claims in a study's file."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 
@@ -13,7 +11,7 @@ class ClaimJudgement:
         claim: in one sentence.
         because: its reason.
         holds: None: undecided, for what is measured does not tell.
-        found: what the study shows, in one sentence.
+        found: result of the study, in one sentence.
     """
 
     claim: str

@@ -60,11 +60,11 @@ class RunOutcome:
     Attributes:
         stable: it reached the end without a sign of failure, and was not wrong by the whole range.
         accurate: and the deciding observable held 1 % of its range; where there is no truth the same as stable.
-        failure: what went wrong first, if it was not accurate.
+        failure: first fault, if it was not accurate.
         silent: it failed, and the engine did not report it.
         error: largest error of the deciding observable in parts of its range; None if it is not known.
         time: when the failure showed [s].
-        message: how the run ended.
+        message: last words of the run.
     """
 
     stable: bool
@@ -81,7 +81,7 @@ class Yardstick:
     """Sizes and limits by which a run counts as failed.
 
     Attributes:
-        scene: what was run.
+        scene: the scene that was run.
         truth: the true run; None where there is none.
         name: of the deciding observable.
         true: its values; None where there is no truth.

@@ -1,7 +1,5 @@
 """Findings about engines: a file each under ``findings/``, with a program with the engine alone."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
@@ -35,13 +33,13 @@ class EngineFinding:
 
     Attributes:
         name: of the file.
-        title: what the engine does, in one line.
+        title: behaviour of the engine, in one line.
         engine: whose.
         package: distribution that has to be installed.
         seen: versions in which it was seen, for a person.
         gone: versions in which it was seen to be gone; may be empty.
         issue: address of the public thread about it; may be empty.
-        text: what the documentation says, what happens, why it matters, what to do.
+        text: words of the documentation, observed behaviour, consequence, remedy.
         program: source; exit code 10 if it shows.
     """
 
@@ -97,11 +95,7 @@ def load_findings(engines: Iterable[str] = ()) -> list[EngineFinding]:
 
 
 def read_finding(path: Path) -> EngineFinding:
-    """One file: TOML between lines of +++, then text with one Python program.
-
-    Raises:
-        InputError: what is missing.
-    """
+    """One file: TOML between lines of +++, then text with one Python program. Raises InputError if one is missing."""
     parts = _FRONT.match(path.read_text(encoding="utf-8"))
     if parts is None:
         raise InputError(str(path), path.name, "it has to begin with TOML between two lines of +++")

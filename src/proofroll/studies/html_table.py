@@ -1,7 +1,5 @@
 """A table of results as a notebook shows it, with a small drawing in each row."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from html import escape

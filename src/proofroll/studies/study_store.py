@@ -3,8 +3,6 @@
 The inputs besides the question are found without importing a single engine.
 """
 
-from __future__ import annotations
-
 import datetime
 import hashlib
 import json
@@ -136,10 +134,6 @@ def _seal(study: Mapping[str, Any]) -> str:
 
 
 def keep(study: Any, path: Path) -> None:
-    """Writes a study as :func:`kept` reads it.
-
-    Raises:
-        ProofrollError: the folder cannot be written.
-    """
+    """Writes a study as :func:`kept` reads it. Raises ProofrollError if the folder cannot be written."""
     content = plain(study)
     write_text(path, json.dumps({**content, "seal": _seal(content)}))

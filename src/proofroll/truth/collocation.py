@@ -7,8 +7,6 @@ the collocation polynomial, so the polynomial is as accurate between the ends of
 Source of the method: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ motion is followed with its parameters moved down and up by a part :data:`MOVE`,
 well posed where the same events come, and where they and the motion between them move evenly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ A route integrates one stretch and decides what comes next; :func:`follow` puts 
 physics. Two routes may share this module, which finds where guards rise through zero, and nothing else.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
@@ -26,7 +24,8 @@ _STUCK = 50
 # Stretches shorter than this part of the time that has passed, after which it makes none either unless they have shrunk
 # to this part of what they were: rebounds shrink by e each, 400 by a tenth for every e up to 0.9997.
 _SHORT, _MANY, _SHRUNK = 1e-6, 400, 0.9
-# Stretches after which those to come are counted if they do not shrink; and the most of a path: a minute of work.
+# Stretches after which those to come are counted if neither they nor their states shrink; and the most of a path: a
+# minute of work.
 _LOOK, _MOST = 100, 1000
 
 
@@ -38,7 +37,7 @@ class Happening:
         kind: as the kind of element names its events.
         name: of what changes.
         time: [s].
-        blur: how far off the time may be, by every route [s].
+        blur: uncertainty of the time, of every route [s].
     """
 
     kind: str
@@ -69,7 +68,7 @@ class Stretch(Generic[ModeT]):
 
     Attributes:
         start, end: [s].
-        mode: what holds and pushes.
+        mode: names of the constraints and forces that act.
         first: the state at the start.
         last: the state at the end, before anything changes there.
         guard: number of the guard that ended it; None: the end of time.
@@ -91,10 +90,10 @@ class Transition(Generic[ModeT]):
 
     Attributes:
         state, mode: of the next leg; no mode: what follows is not known, and the path ends.
-        happenings: what changed.
-        margin: how far from another outcome the forces were, relative; inf where nothing was decided.
+        happenings: changes of mode, by name.
+        margin: relative distance of the forces from another outcome; inf where nothing was decided.
         delay: time after the leg's end at which the changes are over [s]: infinitely many may follow each other within.
-        blur: how far off that delay may be, by every route [s].
+        blur: uncertainty of that delay, of every route [s].
     """
 
     state: State
@@ -199,13 +198,24 @@ def _refuse_many(legs: Sequence[Span], until: float) -> None:
     """
     if len(legs) % _LOOK:
         return
-    start, middle, end = legs[-_LOOK].start, legs[-_LOOK // 2].start, legs[-1].end
-    ahead = (until - end) * _LOOK / (end - start) if end > start else np.inf
-    if len(legs) + ahead > _MOST and end - middle > _SHRUNK * (middle - start):
+    last, end = legs[-_LOOK:], legs[-1].end
+    spans = [last[_LOOK // 2].start - last[0].start, end - last[_LOOK // 2].start]
+    calm = sum(spans) < _SHRUNK * end * _LOOK / len(legs)  # what was calm before may be so again
+    ahead = (until - end) * _LOOK / sum(spans) if sum(spans) > 0.0 else np.inf
+    if len(legs) + (0.0 if calm else ahead) > _MOST and min(spans) > _SHRUNK * max(spans) and not _narrows(last):
         raise Diverged(
             f"by t = {end:g} s there have been {len(legs)} changes, some {number(ahead, 1)} are to come, "
             f"and the truth follows {_MOST}"
         )
+
+
+def _narrows(legs: Sequence[Span]) -> bool:
+    """True if the states between which stretches lead come nearer to each other; their last number is the time."""
+    starts = np.array([leg.first[:-1] for leg in legs if isinstance(leg, Stretch)])
+    if not len(starts):
+        return False
+    first, second = (np.linalg.norm(np.ptp(half, axis=0)) for half in np.array_split(starts, 2))
+    return bool(second < _SHRUNK * first)
 
 
 def walked(

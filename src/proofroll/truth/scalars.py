@@ -3,8 +3,6 @@
 Zeros and ones that are plain floats fold away, so that what a mechanism's geometry makes zero never becomes a term.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -101,6 +101,7 @@ def arithmetic(
 ) -> None:
     """Compute as other processors do: other kernels, instructions, threads, Pythons; exit 1 if a decision differs."""
     from proofroll.core.errors import require_known
+    from proofroll.files.comparison_file import load_comparison
     from proofroll_drill.arithmetic.kinds import kinds
     from proofroll_drill.arithmetic.matrix import TESTS, comparison_files, matrix
     from proofroll_drill.table import arithmetic_lines, arithmetic_table
@@ -112,6 +113,8 @@ def arithmetic(
         require_known("--tests", tests, TESTS, "there are")
     asked = [item for item in known.values() if not kind or item.name in kind]
     files = (comparison or comparison_files()) if comparisons else []
+    for name in comparison or ():
+        load_comparison(name)
     if files and asked[0].name != "reference":  # decisions are held against those of this machine
         asked.insert(0, known["reference"])
     with progress_bar("arithmetic", total=len(asked)) as advance:

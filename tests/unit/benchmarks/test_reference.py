@@ -54,6 +54,7 @@ def test_the_numeric_model_holds_its_bound() -> None:
     assert numeric(FREE, "rotating_frame", TIMES, TRUE_P, 1e-20) is None
 
 
+@pytest.mark.drill
 def test_search_takes_what_holds(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Every configuration found holds the bound on z and none is compiled; a bound that nothing holds finds nothing."""
     monkeypatch.setattr(searching, "engine_names", lambda: ["projection"])
@@ -103,6 +104,7 @@ def test_a_ratio_needs_both() -> None:
     assert (nothing["value"], nothing["met"]) == (None, False)
 
 
+@pytest.mark.drill
 @needs_heyoka
 def test_the_whole_without_engines(monkeypatch: pytest.MonkeyPatch) -> None:
     """The content is one JSON document with every ratio, and its tables fit the terminal."""

@@ -26,6 +26,9 @@ from proofroll.report.figure import styled
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
 
+# All runs of the paper take half a minute.
+pytestmark = pytest.mark.drill
+
 # What most is drawn and said of.
 RUNS = ("free4", "resisted4")
 # Long enough for the first slip past 1.7 s.

@@ -77,6 +77,7 @@ def test_how_a_scene_starts(
         assert word in out
 
 
+@pytest.mark.drill
 def test_a_scene_is_drawn(proofroll: Proofroll, tmp_path: Path) -> None:
     """With --plot the scene at its start, its parameters and how it starts are a page; a study or robot has none."""
     page = tmp_path / "scene.html"

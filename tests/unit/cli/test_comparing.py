@@ -6,14 +6,17 @@ import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from mixed_scene import BALL_AND_PENDULUM
 
+from proofroll.cli.comparing import _Comparing
 from proofroll.files.comparison_file import load_comparison
 from proofroll.running.time_budget import TimeBudget
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_each_engine_is_started_once(
     tmp_path: Path,
@@ -37,6 +40,7 @@ def mixed(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.drill
 def test_a_scene_of_two_kinds_is_compared(
     tmp_path: Path, mixed: Path, command_line: Callable[..., tuple[int, str, str]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -98,6 +102,29 @@ def test_a_first_look_stays_within_its_budget(
     content = json.loads(out)
     assert (content["budget"], content["beyond_budget"]) == (50, [])
     assert {row["verdict"] for row in content["rows"]} == {"agrees"}
+
+
+def test_the_time_that_is_left_is_never_less_than_none() -> None:
+    """While results that are kept are being judged, a line says nothing about the rest; later it counts what ran."""
+    said: list[str] = []
+    runner: Any = SimpleNamespace(reused=0, jobs=1)
+    running = _Comparing([], runner, None, None, said.append)
+    running._keys = list("abcdefgh")
+    for running.runner.reused, running.results in ((6, {"a": None}), (6, dict.fromkeys("abcdefg"))):  # type: ignore[assignment]
+        running._tell(SimpleNamespace(engine=SimpleNamespace(name="mujoco")))  # type: ignore[arg-type]
+    assert said[0] == "mujoco"
+    assert said[1].startswith("about ")
+    assert "-" not in said[1].partition(" s left")[0].replace("e-", "")
+
+
+def test_what_judging_took_is_kept_of_a_budget_for_the_end() -> None:
+    """Four of twelve cases took 6 s to judge and to write, so all that have ended by now are given 12 s."""
+    budget = TimeBudget(100.0)
+    runner: Any = SimpleNamespace(reused=0, jobs=1)
+    running = _Comparing([], runner, budget, None, print)
+    running._judging, running._judged, running.results = 6.0, {0: 4}, dict.fromkeys("abcdefgh")  # type: ignore[assignment]
+    running._keep_for_the_end()
+    assert budget.after == 12.0
 
 
 def test_a_budget_is_for_scenes(command_line: Callable[..., tuple[int, str, str]]) -> None:

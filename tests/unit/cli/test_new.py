@@ -55,6 +55,7 @@ def test_a_comparison(
     assert ("reduced" in names) == (scene == "inclined_plane")  # it has no equations of a rod
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("kind", ["ball", "mechanism"])
 def test_an_engine(proofroll: Proofroll, folder: Path, kind: str) -> None:
     """A new engine announces its class from a package that hides no other, and passes its own conformance test."""

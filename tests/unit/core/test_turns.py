@@ -79,6 +79,7 @@ def test_a_small_mechanism_has_no_more_than_a_run_can_bear() -> None:
     assert 200 < len(between) <= 1_000
 
 
+@pytest.mark.drill
 def test_a_built_engine_is_not_blamed(fine: dict[str, float]) -> None:
     """An engine whose steps nobody knows is sampled as asked: its angle is held against the truth up to whole turns."""
     scene = load_scene("pendulum")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from proofroll.core.dop853 import TIGHTEST
 from proofroll.core.errors import Diverged
 from proofroll.core.integrators import INTEGRATORS
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess
@@ -47,6 +48,53 @@ def test_a_mode_ends_where_its_margin_does(name: str, resolution: float) -> None
     assert [event.time for event in motion.events] == pytest.approx([fall, 2 * fall], rel=1e-10)
     assert all(event.time_low <= event.time <= event.time_high for event in motion.events)
     assert {event.name for event in motion.events} == {"ground"}
+
+
+class Stopping(AlternatingMotion[str]):
+    """A slip in two dimensions that friction ends while it turns; its direction has no value where it is zero."""
+
+    alternates = "slips"
+    counted = 0
+
+    def __init__(self, stepper: Any) -> None:
+        equations: Any = SimpleNamespace(applied=SimpleNamespace(now=0.0))
+        super().__init__(equations, stepper, lambda _, x: x)
+        self._enter(0.0, np.array([1.0, 0.5, 0.0]), "slip")
+
+    def _look(self, y: Any) -> None:
+        self._toward = self._heading(y)
+
+    def _heading(self, y: Any) -> Any:
+        size = np.hypot(*y[:2])
+        return y[:2] / size * (1 if y[:2] @ self._toward >= 0 else -1) if size else self._toward
+
+    def _enter(self, t: float, y: Any, mode: str) -> None:
+        self._toward = y[:2]
+        super()._enter(t, y, mode)
+
+    def _rates(self, y: Any) -> Any:
+        self.counted += 1
+        return -self._heading(y) + [-y[1], y[0]] if self.mode == "slip" else np.zeros(2)
+
+    def _excess(self, y: Any) -> list[Excess]:
+        return [Excess(0, "still", -float(y[:2] @ self._toward), self.mode == "slip")]
+
+    def _crossing(self, end: Excess) -> float:
+        self.counted = 0
+        return super()._crossing(end)
+
+    def _next(self, y: Any, which: int, kind: str) -> tuple[Any, str, list[tuple[str, str]]]:
+        assert (which, kind) == (0, "still")
+        self.located = self.counted
+        return y, "stick", [("stick", "ground")]
+
+
+def test_a_stop_is_located_without_coming_near_it_each_time_anew() -> None:
+    """Short steps lead to where a slip ends: they are taken once, and its time has the digits of the method."""
+    motion = Stopping(INTEGRATORS["dop853"](TIGHTEST))
+    motion.advance(2.0)
+    assert [event.time for event in motion.events] == pytest.approx([np.hypot(1.0, 0.5)], abs=1e-13)
+    assert motion.located < 1000  # rates: 675, and 1,565 where each trial begins with the step that holds the stop
 
 
 def test_modes_that_end_at_once_end_the_run() -> None:

@@ -11,6 +11,7 @@ from proofroll.elements.mechanism import Body, Joint, Mechanism
 from proofroll.elements.mechanism.drives import Actuator, Coupling
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll_drill.published import true_values
 
 CUBE = Body("mass", 1.0, inertia=(0.1, 0.1, 0.1))
 G = 9.81
@@ -26,6 +27,7 @@ def place(run):
     return float(run.sample().p_WB[0, 2])
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("options", "tolerance"),
     [({}, 1e-10), pytest.param({"integrator": "rk4", "dt": 1e-3}, 1e-7, marks=pytest.mark.drill)],
@@ -35,8 +37,9 @@ def test_a_mass_on_a_spring_rubs_to_rest_off_the_middle(options, tolerance):
     if options:
         options |= {"rtol": 2.220446049250313e-14}
     run = runs.build("dependent", runs.model("spring_friction"), **options)
-    run.advance(3.0)
-    assert run.sample().p_WB[0, 0] == pytest.approx(0.0363281234516611, abs=tolerance)
+    (true,) = true_values("spring_friction")
+    run.advance(true["at"])
+    assert run.sample().p_WB[0, 0] == pytest.approx(true["values"]["q.slide"], abs=tolerance)
     run.advance(5.5)
     assert run.sample().p_WB[0, 0] == pytest.approx(0.02, abs=tolerance)
     assert not run.sample().v_WB[0, 0] > tolerance
@@ -45,15 +48,17 @@ def test_a_mass_on_a_spring_rubs_to_rest_off_the_middle(options, tolerance):
     assert run.events()[-1].time == pytest.approx(1.7 * np.pi, abs=tolerance)
 
 
+@pytest.mark.drill
 def test_a_pendulum_rubs_to_rest():
     """It stops where and when an energy balance and a quadrature say, as its turns do."""
     run = runs.build("dependent", runs.model("pendulum_friction"))
     run.advance(7.2)
+    (true,) = true_values("pendulum_friction")
     turn, *_, last = run.events()
-    assert turn.time == pytest.approx(1.04080620663580, abs=1e-10)
-    assert last.time == pytest.approx(7.09217092106288, abs=1e-9)
+    assert turn.time == pytest.approx(true["events"][0], abs=1e-10)
+    assert last.time == pytest.approx(true["rests"], abs=1e-9)
     axis = run.sample().q_WB[0]
-    assert 2 * np.arctan2(axis[1:].sum(), axis[0]) == pytest.approx(-0.0290843317121, abs=1e-9)
+    assert 2 * np.arctan2(axis[1:].sum(), axis[0]) == pytest.approx(true["values"]["q.pivot"], abs=1e-9)
 
 
 def test_friction_holds_what_is_lighter_and_carries_its_weight():
@@ -67,7 +72,7 @@ def test_friction_holds_what_is_lighter_and_carries_its_weight():
     assert place(heavy) == pytest.approx(-0.5 * (G - 5) * 0.25, abs=1e-12)
 
 
-@pytest.mark.parametrize("restitution", [0.0, 0.5])
+@pytest.mark.parametrize("restitution", [0.0, pytest.param(0.5, marks=pytest.mark.drill)])
 def test_a_mass_falls_on_a_stop(restitution):
     """It rests there at once, or rebounds by parabolas, the next of which is the square of the restitution as high."""
     run = runs.build("dependent", slider(q0=(1.0,), limits=(0.0, 2.0), restitution=restitution))
@@ -146,14 +151,16 @@ def test_an_effort_meets_its_limit_when_it_should(options, tolerance):
     """The clamp of a servo is a switch: its times are exact to the order of the method, and so is what follows."""
     options |= {"rtol": 2.220446049250313e-14} if options else {}
     run = runs.build("dependent", runs.model("saturated_servo"), **options)
-    run.advance(1.0)
-    times = [0.245657137141714, 0.324272287425472, 0.726726594852378, 0.843002288039135]
+    (true,) = true_values("saturated_servo")
+    run.advance(true["at"])
     assert [event.kind for event in run.events()] == ["release", "saturate"] * 2
-    np.testing.assert_allclose([event.time for event in run.events()], times, atol=tolerance)
-    assert run.sample().p_WB[0, 0] == pytest.approx(0.694076613248125506, abs=tolerance)
-    assert run.sample().v_WB[0, 0] == pytest.approx(0.127876511755251, abs=20 * tolerance)
+    np.testing.assert_allclose([event.time for event in run.events()], true["events"], atol=tolerance)
+    place, speed = true["values"].values()
+    assert run.sample().p_WB[0, 0] == pytest.approx(place, abs=tolerance)
+    assert run.sample().v_WB[0, 0] == pytest.approx(speed, abs=20 * tolerance)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("target", [Formula("2*sin(9*t)"), Table((0.0, 0.15, 0.3), (0.0, 2.0, -2.0))])
 def test_friction_a_stop_a_limit_and_a_target_in_time_switch_together(target):
     """A servo with a limit pushes a mass that rubs onto its stop and off it: the motion and the forces are true."""

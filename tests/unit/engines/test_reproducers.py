@@ -82,7 +82,8 @@ def name_of(value: Any) -> str:
 
 @pytest.mark.parametrize(
     ("scene", "engine", "formulation", "options", "parameters"),
-    [(CYLINDER, *one) for one in PROGRAMS] + [(PLANE, *one) for one in PROGRAMS if one[1] != "facets"],
+    [(CYLINDER, *one) for one in PROGRAMS]
+    + [pytest.param(PLANE, *one, marks=pytest.mark.drill) for one in PROGRAMS if one[1] != "facets"],
     ids=name_of,
 )
 def test_the_same_motion(

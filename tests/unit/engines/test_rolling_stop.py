@@ -25,6 +25,7 @@ ENGINES = [
 ]
 
 
+@pytest.mark.drill
 @settings(max_examples=10, deadline=None)
 @given(speed=st.floats(0.01, 3), f=st.floats(1e-5, 0.01), k=st.floats(0.1, 1))
 def test_closed_form(speed: float, f: float, k: float) -> None:

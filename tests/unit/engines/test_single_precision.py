@@ -74,7 +74,7 @@ def test_errors_stay_errors(name: str) -> None:
     scene = load_scene(name)
     errors = {}
     for precision in ("single", "double"):
-        run = simulate(scene, Single, until=0.3, every=0.05, precision=precision, formulation="rk4")
+        run = simulate(scene, Single, until=0.1, every=0.05, precision=precision, formulation="rk4")
         found = judge_run(run, scene, {"positions": "0.1 %"})
         errors[precision] = found.compared[0].judgement.error
         assert found.agrees
@@ -177,6 +177,7 @@ because = "it computes with 24 bits"
 """
 
 
+@pytest.mark.drill
 @pytest.mark.usefixtures("single")
 def test_a_comparison_tells_precision_and_floor(
     command_line: Callable[..., tuple[int, str, str]], tmp_path: Path
@@ -249,12 +250,20 @@ def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
     assert dataclasses.replace(found, facts=double).envelope("x")[4] == 1e-5
 
 
-@pytest.mark.parametrize("check", [pytest.param(c, id=c.name) for c in checks(Single) if "entry_point" not in c.name])
+@pytest.mark.parametrize(
+    "check",
+    [
+        pytest.param(check, id=check.name, marks=pytest.mark.drill if "[rk4" in check.name else ())
+        for check in checks(Single)
+        if "entry_point" not in check.name
+    ],
+)
 def test_single_precision_conforms(check: Callable[[], None]) -> None:
     """The checks for engines' authors let an engine in float32 pass."""
     check()
 
 
+@pytest.mark.drill
 def test_conformance_can_run_each_preset_in_a_process_of_its_own() -> None:
     """A switch of the whole process fails no check of another preset there; without, one accuses the other."""
     name = "certificate_holds[{}-matched-pendulum]"

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -127,6 +128,10 @@ def test_variations(load: Callable[..., Comparison]) -> None:
         {"speed": 4, "rolling_resistance": 5e-4},
     ]
     assert [point["speed"] for point in comparison.variations(comparison.rows[1])] == [4, 4]
+    point = "[[points]]\nspeed = 4\nmu_static = 0.3\n[tolerances.tight]"
+    comparison = load("[tolerances.tight]", point)
+    without = replace(comparison.rows[1], only={"speed": [4.0], "mu_static": []})
+    assert [point.get("mu_static") for point in comparison.variations(without)] == [None, None]
 
 
 def test_tolerance() -> None:

@@ -60,7 +60,7 @@ def test_the_same_numbers_have_not_changed() -> None:
         ({"error": 5.01e-4}, "value", "error of x 5e-4 → 5.01e-4 m"),
         ({"error": 5.01e-4, "unit": "1"}, "value", "error of x 5e-4 → 5.01e-4"),
         ({"verdict": "differs", "error": 5e-2}, "verdict", "x agrees → differs"),
-        ({"status": "crashed", "message": "it ended"}, "verdict", "done → crashed it ended"),
+        ({"status": "crashed", "message": "it ended"}, "verdict", "done → crashed: it ended"),
         ({"error": None}, "value", "error of x 5e-4 → ∞ m"),
         (SLOW, "cost", "cost 0.01 (9e-3 to 0.011) → 0.02 (0.019 to 0.021) s/s"),
     ],

@@ -46,6 +46,7 @@ def wheels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_an_environment_is_made_remembered_and_removed(wheels: Path, proofroll: Callable[..., Any]) -> None:
     """By pip, with this proofroll; its label runs the version that was asked for, and nothing is left of it at last."""
@@ -102,6 +103,7 @@ def test_what_makes_no_environment_says_why(
     assert not list(wheels.parent.glob("engines/*"))
 
 
+@pytest.mark.drill
 def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path) -> None:
     """Ctrl-C ends what was started, exits 130, and no half is taken for a whole."""
     pidfile = tmp_path / "pid"
@@ -116,7 +118,7 @@ def test_an_interrupted_environment_leaves_nothing(wheels: Path, tmp_path: Path)
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     assert process.wait(60) == 130
-    folder = environments.place("aged", "2.0")
+    folder = environments.folder_of("aged", "2.0")
     assert not folder.exists()
     assert environments.remembered() == []
     assert wait_until(lambda: not alive(int(pidfile.read_text())))

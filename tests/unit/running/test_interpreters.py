@@ -73,6 +73,7 @@ def test_an_engine_runs_where_its_name_says(
     assert files[0] != files[1]
 
 
+@pytest.mark.drill
 def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     """The same packages at another path make the same case, so that what is stored is used; other packages do not."""
     other = seeing(tmp_path / "copy", "1.0")
@@ -83,6 +84,7 @@ def test_a_place_is_no_part_of_a_result(old: Path, tmp_path: Path) -> None:
     assert case_in(other).key != case_in(old).key
 
 
+@pytest.mark.drill
 @pytest.mark.own_workers
 def test_an_environment_that_changed_is_a_row(old: Path, tmp_path: Path) -> None:
     """An engine upgraded, or deleted, after it was asked fails with both versions; all other rows arrive."""
@@ -214,6 +216,7 @@ def test_releases(text: str, numbers: tuple[int, ...]) -> None:
     assert release(text) == numbers
 
 
+@pytest.mark.drill
 def test_the_command_line_takes_a_place(old: Path, proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """Run, and compare with the rows of an engine moved there."""
     code, out, _ = proofroll("run", "inclined_plane", "--engine", f"aged@{old}", "--until", "0.02", "--json")

@@ -51,6 +51,7 @@ def built(name: str, scene: str = "pendulum", **options: Any) -> Any:
     return kind.build(load_scene(scene), resolve_settings(kind, options))
 
 
+@pytest.mark.drill
 def test_a_program_in_perl_is_judged(proofroll: Callable[..., Any], tmp_path: Path) -> None:
     """The example agrees with the truth, at the order that it declares."""
     claim = tmp_path / "rod.toml"
@@ -135,7 +136,7 @@ def test_a_program_that_is_waited_for(
     command: str, command_line: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A command says now and then that it waits for a program to say what it is."""
-    program = script(tmp_path / "rod", "read -r line; sleep 2; exit 1")
+    program = script(tmp_path / "rod", "read -r line; sleep 0.7; exit 1")
     monkeypatch.setattr("proofroll.cli.options._SAID_EVERY", 0.1)
     row = f'[[rows]]\nengine = "rod@program:{program}"\nexpect = "agrees"\ntolerance = "any"\n'
     bands = '[tolerances.any]\nbecause = "none is needed"\npositions = "1 %"\n'

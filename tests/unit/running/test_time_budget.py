@@ -55,6 +55,15 @@ def test_what_a_case_did_not_take_is_for_others(monkeypatch: pytest.MonkeyPatch)
     assert 80 < budget.begin("c", 8) <= 88
 
 
+def test_what_comes_after_the_cases_keeps_its_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tenth is kept for judging what came of them, or what that turns out to take."""
+    monkeypatch.setattr("proofroll.running.time_budget.processor_seconds", lambda: 0.0)
+    budget = TimeBudget(100.0, 10.0)
+    assert budget.left == pytest.approx(80.0)
+    budget.after = 35.0
+    assert budget.left == pytest.approx(55.0)
+
+
 def test_each_group_has_an_equal_share(monkeypatch: pytest.MonkeyPatch) -> None:
     """A group that takes all that it may leaves as much to each of the others, and one that takes less leaves more."""
     used = 0.0
@@ -160,10 +169,10 @@ def test_cases_beyond_the_budget_are_left_out(
     """A case that takes what there is ends, those after it are not begun, and the same call goes on with them."""
     install_engines(ENTRY_POINTS)
     slow, quick = make_case("hangs"), make_case("oracle")
-    runner, budget = Runner(Store(tmp_path), jobs=jobs), TimeBudget(4.0)
+    runner, budget = Runner(Store(tmp_path), jobs=jobs), TimeBudget(2.0)
     first = runner.run([slow], budget=budget)[slow.key]
     assert first.status is Status.LEFT_OUT
-    assert first.message == "the 4 s of processor time did not suffice"
+    assert first.message == "the 2 s of processor time did not suffice"
     second = runner.run([quick, dataclasses.replace(quick, until=0.2)], budget=budget)
     assert {result.status for result in second.values()} == {Status.LEFT_OUT}
     assert {result.status for result in runner.run([quick], budget=TimeBudget(60.0)).values()} == {Status.DONE}

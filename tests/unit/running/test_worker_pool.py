@@ -37,6 +37,7 @@ def test_a_worker_is_kept_for_its_engine() -> None:
     workers.close()
 
 
+@pytest.mark.drill
 def test_a_prepared_worker_serves_the_engine_and_a_wrong_name_is_left_to_who_asks_next() -> None:
     """An engine's process is kept once it has imported what a run needs; of nonsense nothing is kept or raised."""
     workers = Workers()
@@ -68,6 +69,7 @@ def test_idle_workers_are_bounded_and_end_with_their_owner() -> None:
     assert all(worker._process.poll() is not None for worker in lent)
 
 
+@pytest.mark.drill
 def test_a_study_starts_each_engine_once(tmp_path: Path) -> None:
     """Settings, runs and further runs of one engine are asked of the processes that were started first."""
     runner = Runner(Store(tmp_path), jobs=1)

@@ -75,7 +75,7 @@ def test_without_lift_off_nothing_changes() -> None:
     assert cut[1.0] is run
 
 
-@pytest.mark.parametrize("other", ["pendulum", "inclined_plane", "faster"])
+@pytest.mark.parametrize("other", [pytest.param("pendulum", marks=pytest.mark.drill), "inclined_plane", "faster"])
 def test_a_ball_that_leaves_cuts_what_is_beside_it(other: str) -> None:
     """A run ends for all elements where one of them leaves the wall; all are judged up to there, also their events."""
     first = lying()

@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.parts import Body
 from proofroll.elements.mechanism.signal import Formula, Table
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
+from proofroll_drill.published import true_values
 
 TIGHT = 1e-12  # of what two routes at 1e-14 leave, with room
 ONES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
@@ -36,8 +37,9 @@ def slider(actuator: Actuator | None = None, mass: float = 1.0, **more: object) 
 
 def test_a_servo_moves_as_a_damped_oscillator() -> None:
     """Its place, speed and effort at half a second are those of two complex roots."""
-    found = motion("servo", [0.0, 0.5])
-    x, v = 1.00554445182408973, -3.68948219323025222
+    (true,) = true_values("servo")
+    found = motion("servo", [0.0, true["at"]])
+    x, v = true["values"].values()
     assert found.record.q[1, 0] == pytest.approx(x, abs=TIGHT)
     assert found.record.v[1, 0] == pytest.approx(v, abs=TIGHT)
     assert found.record.named[:, 0] == pytest.approx([100.0, 100 * (1 - x) - 4 * v], abs=100 * TIGHT)
@@ -45,20 +47,23 @@ def test_a_servo_moves_as_a_damped_oscillator() -> None:
     assert found.events == ()
 
 
+@pytest.mark.drill
 def test_a_limit_clamps_the_whole_effort() -> None:
     """The effort leaves and reaches its limit at the roots of the piecewise closed form."""
-    found = motion("saturated_servo", [0.0, 0.1, 0.5, 1.0])
-    expected = (0.245657137141714, 0.324272287425472, 0.726726594852378, 0.843002288039135)
+    (true,) = true_values("saturated_servo")
+    found = motion("saturated_servo", [0.0, 0.1, 0.5, true["at"]])
     assert [event.kind for event in found.events] == ["release", "saturate", "release", "saturate"]
-    for event, time in zip(found.events, expected, strict=True):
+    for event, time in zip(found.events, true["events"], strict=True):
         assert event.time == pytest.approx(time, abs=TIGHT)
         assert event.name == "servo"
-    assert found.record.q[-1, 0] == pytest.approx(0.694076613248125506, abs=TIGHT)
-    assert found.record.v[-1, 0] == pytest.approx(0.127876511755251, abs=TIGHT)
+    place, speed = true["values"].values()
+    assert found.record.q[-1, 0] == pytest.approx(place, abs=TIGHT)
+    assert found.record.v[-1, 0] == pytest.approx(speed, abs=TIGHT)
     assert found.record.named[:, 0] == pytest.approx([20.0, 20.0, -20.0, 20.0], abs=1e-10)
     assert found.bars["q"][-1] < TIGHT
 
 
+@pytest.mark.drill
 def test_a_limit_that_is_never_reached_changes_nothing() -> None:
     """A servo whose limit is larger than all its efforts has the truth of one without a limit."""
     one, two = motion("servo", [0.0, 0.5, 1.0]), motion("saturated_servo", [0.0, 0.5, 1.0], limit=150.0)
@@ -86,16 +91,18 @@ def test_a_gear_carries_the_force_of_the_second_wheel() -> None:
     assert found.record.wrench[:, :, 5] == pytest.approx(np.array([[0.5, -1.0]] * 3), abs=TIGHT)
 
 
+@pytest.mark.drill
 def test_an_arm_under_servos_is_that_of_its_own_equations() -> None:
     """Both angles are those of Lagrange's equations, integrated beforehand to thirteen digits."""
-    found = motion("arm_pd", [0.0, 0.1, 0.2, 0.5, 1.0], armature=0.0)
-    a = (0.23626707478537, 0.37429121540015, 0.50907031540782, 0.43786597702448)
-    b = (-0.65247382917625, -0.89726151996199, -0.92085720881267, -0.96593345099848)
-    assert found.record.q[1:] == pytest.approx(np.array([a, b]).T, abs=1e-13)
+    true = true_values("arm_pd")
+    found = motion("arm_pd", [0.0, *(each["at"] for each in true)], armature=0.0)
+    angles = np.array([list(each["values"].values()) for each in true])
+    assert found.record.q[1:] == pytest.approx(angles, abs=1e-13)
     assert found.bars["q"][-1] < TIGHT
-    assert abs(motion("arm_pd", [0.0, 0.1]).record.q[1, 0] - a[0]) > 1e-2, "armature changes it"
+    assert abs(motion("arm_pd", [0.0, 0.1]).record.q[1, 0] - angles[0, 0]) > 1e-2, "armature changes it"
 
 
+@pytest.mark.drill
 def test_a_true_rotor_turns_with_the_rod_that_carries_it() -> None:
     """A rotor behind a gear n adds I [[1, n], [n, n^2]] to the mass matrix, and its mass; armature is n^2 I alone."""
     inertia, n, mass, g = 1e-4, 50.0, 0.1, 9.81

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -86,6 +88,45 @@ def test_thousands_of_rebounds_are_refused_as_soon_as_they_are_seen() -> None:
     ):
         follow(route, 1.0)
     assert route.count == 100
+
+
+class Swinging:
+    """Stretches of given lengths, between states of given sizes on both sides of zero."""
+
+    def __init__(self, lengths: Sequence[float], sizes: Sequence[float]) -> None:
+        """Starts before the first."""
+        self.lengths, self.sizes, self.count = lengths, sizes, 0
+
+    def begin(self) -> Transition[str]:
+        """See the protocol."""
+        return self.change(None)
+
+    def walk(self, time: float, state: FloatArray, mode: str, until: float) -> Stretch[str]:
+        """See the protocol."""
+        self.count += 1
+        if self.count > len(self.lengths):
+            return Stretch(time, until, mode, state, state, None)
+        return Stretch(time, min(time + self.lengths[self.count - 1], until), mode, state, state, 0)
+
+    def change(self, leg: Stretch[str] | None) -> Transition[str]:
+        """See the protocol."""
+        size = self.sizes[min(self.count, len(self.sizes) - 1)]
+        return Transition(np.array([(-1) ** self.count * size, leg.end if leg else 0.0]), "on", (), np.inf)
+
+
+@pytest.mark.parametrize(
+    ("lengths", "sizes"),
+    [
+        pytest.param([10.0, *[1e-3] * 250], [1.0], id="a burst after calm"),
+        pytest.param([1e-3] * 150, np.linspace(1.0, 0.1, 150), id="swings that die out"),
+        pytest.param([1e-3 * 1.01**k for k in range(300)], [1.0], id="stretches that grow"),
+    ],
+)
+def test_quick_changes_that_make_progress_are_followed(lengths: Sequence[float], sizes: Sequence[float]) -> None:
+    """A hundred quick changes are no reason to expect thousands where the motion was calm before, or dies out."""
+    route = Swinging(lengths, sizes)
+    assert follow(route, 100.0).known
+    assert route.count == len(lengths) + 1
 
 
 def test_rebounds_that_shrink_by_a_hundredth_make_progress() -> None:

@@ -1,7 +1,5 @@
 """Drawings of a ball with symbols: where it touches, and as a whole, by the kind of its wall or as coordinate lines."""
 
-from __future__ import annotations
-
 import itertools
 from functools import singledispatch
 

@@ -27,6 +27,10 @@ CLOSES = 1 / 20
 # A difference below this part of the quantity's size says nothing about causes: the truth's samples, between which a
 # spline is laid, know themselves no better.
 _LEAST = 1e-7
+# A step that is coarse for a motion changes its equations as a number near the scene's does (Hairer, Lubich and Wanner
+# 2006, chapter IX: modified equations): a fitted number that is no farther from the scene's, as a part of it or of what
+# is natural for it, accuses nobody.
+METHOD = 1e-2
 # At time 0 both sides are exact numbers: what is left of a difference is round-off.
 CLOSES_EXACTLY = 1e-6
 _AS_GOOD = 3.0
@@ -38,14 +42,14 @@ class Evidence:
     """Facts that a diagnosis explains: certificate, run and truth.
 
     Attributes:
-        element: what was to be simulated.
+        element: the simulated element of the scene.
         lines: of the certificate (:meth:`proofroll.core.certificate.Line.as_dict`).
         run, truth: the element's variables, at the same times; None: the engine was not run.
         step: of the engine [s], or None.
         settled: observables that were judged and found right: nothing about them is to be explained.
         by_step: whether the limit of small steps leaves no more of the difference than a cause may: the run moves by
             the scene's equations.
-        found: what hypotheses have found in it, see :func:`proofroll.core.diagnosis.fitting.once`.
+        found: results that hypotheses share, see :func:`proofroll.core.diagnosis.fitting.once`.
     """
 
     element: Any
@@ -64,16 +68,17 @@ class Cause:
 
     Attributes:
         id: of the hypothesis.
-        says: what the engine does, as a clause; empty: a method's own error does it as well, so it is no accusation,
-            and is no proof of anything else.
+        says: behaviour of the engine, as a clause.
         quantity, unit: of the difference that it closes.
         before, after: difference without and with the hypothesis, in ``unit``.
-        remedy: what an author looks at.
-        fitted: how many numbers were chosen so that it closes.
+        remedy: place for an author to look at.
+        fitted: number of free numbers that were fitted.
         covers: further quantities that it explains; no other cause is looked for.
         closes: largest part of the difference that it may leave.
         alternative: whether it explains what another cause explains as well: from outside the two look the same.
-        explains: how many independent numbers of the difference it closes; None: as many as there are samples.
+        explains: independent numbers of the difference that it closes; None: as many as there are samples.
+        change: distance of its fitted numbers from the scene's, as a part of them or of a natural size; infinite: those
+            of a known mistake.
     """
 
     id: str
@@ -88,6 +93,12 @@ class Cause:
     closes: float = CLOSES
     alternative: bool = False
     explains: int | None = None
+    change: float = np.inf
+
+    @property
+    def accuses(self) -> bool:
+        """True if a method's own error does not do it as well; what a method does proves nothing else, either."""
+        return self.change > METHOD
 
     @property
     def proven(self) -> bool:
@@ -114,7 +125,7 @@ class Hypothesis:
 
     Attributes:
         id: unique within the kind of element.
-        grounds: what it tests, and on what grounds that proves it.
+        grounds: its test, and the reason for which that proves it.
         test: gives causes worth looking at; those that do not close the difference are dropped by :func:`diagnose`.
     """
 
@@ -156,7 +167,7 @@ def diagnose(evidence: Evidence, hypotheses: Sequence[Hypothesis]) -> list[Cause
             causes.append(cause)
         elif all(_rivals(cause, rival) for rival in rivals) and len(rivals) <= _ALTERNATIVES:
             causes.append(dataclasses.replace(cause, alternative=True))
-    known = [cause for cause in causes if cause.says and not any(_unsure(cause, other) for other in proven)]
+    known = [cause for cause in causes if cause.accuses and not any(_unsure(cause, other) for other in proven)]
     told = [cause for cause in known if not cause.alternative]
     # an alternative is one to a cause that is told
     return told + [cause for cause in known if cause.alternative and any(_share(cause, first) for first in told)]

@@ -3,8 +3,6 @@
 The true curve is laid through its samples; the first and last few, beyond which it would be needed, are left out.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
@@ -51,7 +49,7 @@ def late(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, f
 
 
 def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[float, float, float] | None:
-    """Factor on the speed of reported time, and the differences without and with it; None: too few samples."""
+    """Factor of the clock, largest difference before and after correction by it; None: too few samples."""
     from scipy.interpolate import make_interp_spline
 
     comparable = _comparable(time, said, true)
@@ -66,6 +64,11 @@ def stretched(time: FloatArray, said: FloatArray, true: FloatArray) -> tuple[flo
 
     faster = float(np.clip(fitted(left, 0.0, 1.0), -_PACE, _PACE))
     return 1 + faster, float(np.max(np.abs(left(0.0)))), float(np.max(np.abs(left(faster))))
+
+
+def in_steps(delay: float, step: float | None) -> float:
+    """Size of a shift in time, in steps; infinite where there are none."""
+    return abs(delay) / step if step else np.inf
 
 
 def said_delay(delay: float, step: float | None) -> str:

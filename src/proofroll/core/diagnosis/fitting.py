@@ -1,7 +1,5 @@
 """Other models of an element held against its certificate or its run, and the number of one that explains it best."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, wraps
@@ -19,9 +17,6 @@ ABOVE = 20.0
 
 _ROUNDS = 8
 _STEP = 1e-4
-# A step that is coarse for a motion changes its equations as a factor near one does (Hairer, Lubich and Wanner 2006,
-# chapter IX: modified equations); a factor that nobody makes by mistake says nothing nearer to one than this.
-_METHOD = 1e-2
 # Part of the largest change, or of the difference, from which on a number is changed at all.
 _CHANGED = 1e-6
 # Numbers that mistakes make: a fitted factor this near to one of them is taken to be it.
@@ -77,14 +72,9 @@ def said_factor(factor: float) -> str:
     return known[1] if known else f"{factor:.6g} times"
 
 
-def telling(factor: float) -> bool:
-    """True if a factor is that of a known mistake, or farther from 1 than a method's error can be."""
-    return known_factor(factor) is not None or beyond_method(factor - 1, 1.0)
-
-
-def beyond_method(added: float, own: float) -> bool:
-    """True if what is added to a number of this size is more than a method's error can be."""
-    return abs(added) > _METHOD * own
+def change_by(factor: float) -> float:
+    """Change of a number by a factor, see :class:`.Cause`."""
+    return abs(factor - 1) if known_factor(factor) is None else np.inf
 
 
 def possible(factor: float, signed: bool) -> bool:
@@ -97,7 +87,7 @@ class Residuals(Generic[M]):
     """Residuals of a difference under models of an element.
 
     Attributes:
-        left: what a model leaves, as one row of numbers; infinite for None, which is no model.
+        left: residual of a model, as one row of numbers; infinite for None, which is no model.
         quantity, unit: of what it leaves.
         before: largest that the scene's own model leaves.
         closes: part of it that a proof may leave.
@@ -152,15 +142,15 @@ class Residuals(Generic[M]):
         """Fitted number of a model: the one with the smallest remainder."""
         return fitted(lambda x: self.left(model(x)), start, 1.0)
 
-    def cause(self, name: str, says: str, model: M | None, remedy: str, number: int) -> Cause:
-        """Cause: the engine moves by this model, in which so many numbers were fitted."""
+    def cause(self, name: str, says: str, model: M | None, remedy: str, number: int, change: float = np.inf) -> Cause:
+        """Cause: the engine moves by this model, in which so many numbers were fitted, with this change of them."""
         after = self.largest(model)
         closes = after <= self.closes * self.before
         if closes and (model is None or self.contradicted(model)):
             after = np.inf
         explains = self.explained(model) if number and closes else None
         proof = self.quantity, self.unit, self.before, after, remedy, number, self.covers, self.closes
-        return Cause(name, says, *proof, explains=explains)
+        return Cause(name, says, *proof, explains=explains, change=change)
 
 
 def once(residuals: Callable[[Evidence], Iterator[FactT]]) -> Callable[[Evidence], Sequence[FactT]]:
@@ -183,7 +173,7 @@ def any_gravity(
     """Hypothesis: gravity points another way.
 
     Args:
-        residuals: what models of an element are held against.
+        residuals: data that models of an element are fitted to.
         gravity_of: an element in the scene [m/s²].
         falling: the model of an element in which gravity is another.
     """
@@ -198,8 +188,8 @@ def any_gravity(
             gravity = g - np.linalg.lstsq(np.stack(slopes, axis=-1), at, rcond=None)[0]
             gravity = np.where(np.abs(gravity) < 1e-6 * max(float(np.max(np.abs(gravity))), 1e-300), 0.0, gravity)
             off, size = (float(np.linalg.norm(x)) for x in (gravity - g, g))
-            told = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
-            says = told if beyond_method(off, size) else ""
-            yield held.cause("direction of gravity", says, falling(element, gravity), "look at the axes of gravity", 3)
+            says = f"the engine's gravity is ({', '.join(f'{x:.4g}' for x in gravity)}) m/s^2"
+            model, remedy = falling(element, gravity), "look at the axes of gravity"
+            yield held.cause("direction of gravity", says, model, remedy, 3, off / size if size else np.inf)
 
     return test

@@ -1,7 +1,5 @@
 """Certificates under a hypothesis: what an engine says of time 0, held against what another model would say."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -57,7 +55,7 @@ def built_otherwise(given: Collection[str], covers: tuple[str, ...]) -> Hypothes
 
     Args:
         given: quantities that an engine is given.
-        covers: what follows from them.
+        covers: quantities that follow from them.
     """
 
     @hypothesis(

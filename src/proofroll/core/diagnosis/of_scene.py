@@ -29,7 +29,7 @@ class Diagnosis:
     Attributes:
         element: its name.
         cause: with its proof.
-        seen: what of the run is right and what is not, as the beginning of the sentence; may be empty.
+        seen: right and wrong parts of the run, as the beginning of the sentence; may be empty.
     """
 
     element: str

@@ -13,7 +13,8 @@ import numpy as np
 from proofroll.core.arrays import FloatArray, in_single_precision
 from proofroll.core.certificate import ROUNDED
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, Hypothesis, above_round_off, apart, hypothesis
-from proofroll.core.diagnosis.clocks import late, said_delay, stretched
+from proofroll.core.diagnosis.clocks import in_steps, late, said_delay, stretched
+from proofroll.core.diagnosis.fitting import change_by
 from proofroll.core.diagnosis.lines import differing, single_precision
 from proofroll.core.diagnosis.vectors import Reported
 from proofroll.core.multi_element import REQUIRED
@@ -63,7 +64,7 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
 
     Args:
         state: reported motion of an element and a run [m], shape (time, …).
-        covers: what it explains.
+        covers: quantities that it explains.
     """
 
     @hypothesis(
@@ -83,13 +84,15 @@ def another_clock(state: Callable[[Any, xr.Dataset], FloatArray], covers: tuple[
             delay, before, after = moved
             says = f"every sample is {said_delay(delay, evidence.step)}: the motion is right at another time"
             remedy = "advance(t) has to end at t, neither a step before nor after it"
-            yield Cause("late", says, "state", "m", before, after, remedy, 1, covers, _CLOCK)
+            change = in_steps(delay, evidence.step)
+            yield Cause("late", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
         paced = stretched(time, said, true)
         if paced is not None:
             rate, before, after = paced
             says = f"the engine's time runs {rate:.6g} times as fast as it says: the motion is right at other times"
             remedy = "the step that the engine takes is not the one that is counted"
-            yield Cause("clock", says, "state", "m", before, after, remedy, 1, covers, _CLOCK)
+            change = change_by(rate)
+            yield Cause("clock", says, "state", "m", before, after, remedy, 1, covers, _CLOCK, change=change)
 
     return test
 
@@ -124,9 +127,9 @@ def reported_vectors(
     Args:
         units: variable -> what it is in words, and its unit.
         frames: in which they may be given by mistake, at each time of the true run.
-        clock: which explains all of them, if it does.
+        clock: error of the clock, if it explains all of them.
         least: size below which a variable of an element stands still.
-        besides: what else one of them may be.
+        besides: other explanations of one of them.
     """
 
     @hypothesis(

@@ -14,8 +14,8 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import CLOSES, Cause, above_round_off, apart
-from proofroll.core.diagnosis.clocks import late, said_delay
-from proofroll.core.diagnosis.fitting import known_factor, said_factor
+from proofroll.core.diagnosis.clocks import in_steps, late, said_delay
+from proofroll.core.diagnosis.fitting import change_by, known_factor, said_factor
 
 WORLD = "world"
 # A rotation is fitted with three numbers, a scale or a shift with one, a limit with one.
@@ -51,7 +51,7 @@ class Reported:
         time: [s], shape (time,).
         frames: name -> rotations whose columns are the frame's axes in the world, shape (time, …, 3, 3).
         least: size below which the quantity stands still, in its unit.
-        bar: how far the truth itself is known, in its unit.
+        bar: error bar of the truth, in its unit.
     """
 
     name: str
@@ -97,6 +97,7 @@ class Reported:
         number: int = 0,
         closes: float = CLOSES,
         explains: int | None = None,
+        change: float = np.inf,
     ) -> Cause:
         """Cause: the engine reports ``explained`` instead of the truth, as far as the truth is determined.
 
@@ -109,7 +110,9 @@ class Reported:
         if before < self.before / 2:
             after = np.inf  # most of the difference is in what is left aside
         proof = self.name, self.unit, before, after
-        return Cause(f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes, explains=explains)
+        return Cause(
+            f"{kind}.{self.name}", says, *proof, remedy, number, closes=closes, explains=explains, change=change
+        )
 
     def causes(self, step: float | None) -> Iterator[Cause]:
         """All of this module, as far as there is a difference."""
@@ -166,7 +169,8 @@ class Reported:
             yield self.cause("scaled", says, factor * self.true, remedy)
         else:  # some factor takes any number to any other
             sizes = np.abs(self.true[np.abs(self.true) > _EXACT * self.size])
-            yield self.cause("scaled", says, factor * self.true, remedy, 1, _EXACT, _distinct(sizes, self.size))
+            explains, change = _distinct(sizes, self.size), change_by(factor)
+            yield self.cause("scaled", says, factor * self.true, remedy, 1, _EXACT, explains, change)
 
     def _clamped(self) -> Iterator[Cause]:
         """A limit is held exactly, as a unit is."""
@@ -182,8 +186,9 @@ class Reported:
             remedy = f"find what limits {self.name} to {largest:.6g} {self.unit}"
             says = f"{what} is clamped at {at}{largest:.6g} {self.unit}"
             above = true[true > largest] - largest
-            explains = _distinct(above, float(np.max(above, initial=0.0)))
-            yield self.cause("clamped", says, explained, remedy, 1, _EXACT, explains)
+            most = float(np.max(above, initial=0.0))
+            change = most / (largest + most) if most else np.inf
+            yield self.cause("clamped", says, explained, remedy, 1, _EXACT, _distinct(above, most), change)
 
     def _late(self, step: float | None) -> Iterator[Cause]:
         off = np.nan_to_num(np.abs(self.said - self.true))
@@ -194,9 +199,10 @@ class Reported:
         delay, before, after = shift
         # Half a step is what a method of first order makes of places, x + h v, by itself
         own = self.unit == "m" and bool(step) and abs(abs(delay) / (step or 1.0) - 0.5) < _HALF
-        says = "" if own else f"{self.name} is {said_delay(delay, step)}"
+        says = f"{self.name} is {said_delay(delay, step)}"
         remedy = f"sample {self.name} at the time that was asked for"
-        yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1)
+        change = 0.0 if own else in_steps(delay, step)
+        yield Cause(f"late.{self.name}", says, self.name, self.unit, before, after, remedy, 1, change=change)
 
 
 def into(frame: FloatArray, vectors: FloatArray) -> FloatArray:

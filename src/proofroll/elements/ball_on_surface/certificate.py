@@ -1,7 +1,5 @@
 """Certificate of a ball on a surface, line by line, with the caps on what a model may soften."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """All variables of a run of a ball on a surface, from its state and the contact force."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

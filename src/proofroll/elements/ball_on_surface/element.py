@@ -226,11 +226,7 @@ class BallOnSurface:
 
 
 def rolling_ball(scene: Scene) -> RollingBall:
-    """The scene's one ball on its one surface.
-
-    Raises:
-        Refused: the scene is not one ball on one surface.
-    """
+    """The scene's one ball on its one surface. Raises Refused if there is another element."""
     (element,) = scene.elements if len(scene.elements) == 1 else (None,)
     if not isinstance(element, BallOnSurface):
         what = ", ".join(item.name for item in scene.elements)

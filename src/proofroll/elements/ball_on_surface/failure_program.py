@@ -1,7 +1,5 @@
 """The text of the programs: what each is about, the engine's part, the numbers to hold it against, and the check."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.core import program_text

@@ -4,8 +4,6 @@ Signs as in Blajer (2006), with the frame of :mod:`ball_on_surface.surfaces`: th
 Array arguments may carry leading dimensions.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -65,7 +63,9 @@ def always_pressed(body: RollingBall) -> bool:
     p_WB = body.surface.position(u)
     gravity, bends = body.surface.normal(p_WB) @ body.gravity, np.linalg.eigvalsh(body.surface.normal_gradient(p_WB))
     round_off = 1e-12 * float(np.linalg.norm(body.gravity))
-    return bool(np.min(gravity) >= -round_off and np.min(bends) >= -1e-12 * max(float(np.max(bends)), 1.0))
+    return bool(
+        np.min(gravity) >= -round_off and np.min(bends) >= -1e-12 * max(float(np.max(bends)), 1 / body.ball.radius)
+    )
 
 
 def normal_force(body: RollingBall, p_WB: FloatArray, force: FloatArray) -> FloatArray:

@@ -116,7 +116,7 @@ class InitialMotion:
         spin: ω1, about the normal e1 [rad/s].
         tangential_spin: ω2 and ω3, about e2 and e3 [rad/s]; left out: those of rolling without slip. Rolling along e2
             with the speed V has ω3 = -V/a, along e3 ω2 = V/a; with anything else the ball starts slipping.
-        gap: how far the ball is from the wall [m].
+        gap: distance of the ball from the wall [m].
     """
 
     body: str

@@ -1,7 +1,5 @@
 """Motion of the ball in the world: what every route to the truth returns."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +15,7 @@ class BallMotion:
     Attributes:
         p_WB, v_WB, w_WB: centre [m], its velocity [m/s], angular velocity [rad/s], shape (time, 3).
         force: of the wall on the ball [N], shape (time, 3).
-        route: how it was found, for a person.
+        route: name of the method that found it, for a person.
     """
 
     p_WB: FloatArray

@@ -3,8 +3,6 @@
 They are for :meth:`proofroll.core.engine_abilities.Reproduces.reproducer`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -40,7 +38,7 @@ def cut_program(
     """A program: numbers, the definitions ``wanted`` with all that they need, ``BODY`` and ``SETTINGS``, and ``run``.
 
     Args:
-        body: what runs; of it and of the settings the program has what is asked for somewhere.
+        body: the ball; the program holds the attributes of it, and of the settings, that its code reads.
         settings: of the engine.
         wanted: functions and classes.
         uses: attributes that ``run`` asks for.

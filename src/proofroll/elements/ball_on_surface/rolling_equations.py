@@ -4,8 +4,6 @@ The truth's first route and the engine ``reduced`` both rest on this module. So 
 about these equations: only the truth's second route, which does not know them, checks them.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Sample of a ball on a surface: its state with the wall's reaction; and the model read back from the engine."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar

@@ -1,12 +1,10 @@
 """Start of a ball, in words for the author of the scene."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
 
-from proofroll.core.number_format import place
+from proofroll.core.number_format import vector
 from proofroll.elements.ball_on_surface.mechanics import initial_response, normal_force
 from proofroll.elements.ball_on_surface.model import RollingBall
 
@@ -16,8 +14,8 @@ def start_facts(body: RollingBall) -> Sequence[str]:
     named = zip(body.wall.coordinates, body.u0.tolist(), body.wall.units, strict=True)
     at = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
     said = [
-        f"{body.ball.name}: centre at {place(body.p0)} m in the world ({at}), velocity {place(body.v0)} m/s, "
-        f"spin {place(body.w0)} rad/s"
+        f"{body.ball.name}: centre at {vector(body.p0)} m in the world ({at}), velocity {vector(body.v0)} m/s, "
+        f"spin {vector(body.w0)} rad/s"
     ]
     if body.gap0:
         return [*said, f"it starts {body.gap0:.4g} m above the {body.wall.kind} and falls"]

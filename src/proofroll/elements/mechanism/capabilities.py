@@ -1,7 +1,5 @@
 """Capabilities that a mechanism requires of a formulation, and the check that it provides them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 

@@ -1,7 +1,5 @@
 """Checks of what a user gives: numbers, vectors, axes, inertias; each failure is one clear line."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import numpy as np
@@ -42,22 +40,14 @@ def assign(item: object, **values: Any) -> None:
 
 
 def name(value: Any, kind: str) -> str:
-    """The value as a name.
-
-    Raises:
-        InputError: it is empty or cannot be printed.
-    """
+    """The value as a name. Raises InputError if it is empty or cannot be printed."""
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise InputError(f"{kind}.name", value, "give a name")
     return value
 
 
 def number(field: str, value: Any, *, at_least: float | None = None) -> float:
-    """The value as a finite float.
-
-    Raises:
-        InputError: it is none, or lies below ``at_least``.
-    """
+    """The value as a finite float. Raises InputError if it is none, or lies below ``at_least``."""
     try:
         return numbers(field, [value], 1, at_least=at_least)[0]
     except InputError as error:
@@ -86,21 +76,13 @@ def numbers(field: str, value: Any, count: int, *, at_least: float | None = None
 
 
 def vector(field: str, value: Any) -> Vector:
-    """The value as three finite floats.
-
-    Raises:
-        InputError: it is not that.
-    """
+    """The value as three finite floats. Raises InputError if it is not that."""
     x, y, z = numbers(field, value, 3)
     return x, y, z
 
 
 def axis(field: str, value: Any) -> Vector:
-    """The value as a unit vector.
-
-    Raises:
-        InputError: it is no vector, or zero.
-    """
+    """The value as a unit vector. Raises InputError if it is no vector, or zero."""
     found = np.array(vector(field, value))
     length = float(np.linalg.norm(found))
     if length == 0.0:

@@ -3,8 +3,6 @@
 Engines decide modes in their own way: agreement with code that they share would be no evidence.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 
@@ -12,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proofroll.core.errors import NotUnique, Refused
+from proofroll.elements.mechanism.analysis import RANK
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import Mode, SwitchedJoint, held_by
+from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_by
 
 _MOST_PIVOTS = 1000  # of the complementarity problem; a few joints take as many as they are
 
@@ -38,13 +37,18 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
         try:
             f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
         except np.linalg.LinAlgError:
-            raise Refused("several joints hold one degree of freedom: their forces are not determinate") from None
+            raise Refused(REDUNDANT) from None
         a = free + G @ f
         wrong = np.flatnonzero((held & ((f > high) | (f < low))) | ((state > 0) & (a > 0)) | ((state < 0) & (a < 0)))
         if not len(wrong):
             return state, f, a
         k = int(wrong[0])
         state[k] = 0 if state[k] else (1 if f[k] > high[k] else -1)
+    scale = np.sqrt(np.diag(G))
+    if np.linalg.matrix_rank(G / np.outer(scale, scale), tol=RANK) < len(
+        G
+    ):  # only round-off kept it from being singular
+        raise Refused(REDUNDANT)
     raise Refused("which joints hold is not found: the complementarity problem has no solution by pivots")
 
 

@@ -177,7 +177,7 @@ class MechanismElement:
 
     @cached_property
     def speed(self) -> float:
-        """Largest speed at the start, or that of falling by its size, or of crossing it in its time [m/s]."""
+        """Largest speed at the start or after a fall by its length; without both its length over natural time [m/s]."""
         moving = max(float(np.max(np.abs(self.start.v_WB))), float(np.max(np.abs(self.start.w_WB))) * self.length)
         fall = float(np.sqrt(self.length * np.linalg.norm(self.mechanism.gravity)))
         return max(moving, fall) or self.length / self.natural_time
@@ -347,7 +347,7 @@ class MechanismElement:
                 continue
             values = truth[item.name].to_numpy() if item.name in truth else np.zeros(1)
             if item.role == Role.REACTION and item.name not in natural:
-                sizes[item.name] = float(np.nanmax(np.abs(values)))
+                sizes[item.name] = float(np.nanmax(np.abs(values), initial=0.0))
             else:
                 sizes[item.name] = natural.get(item.name) or float(np.max(np.ptp(values, axis=0)))
         return sizes

@@ -6,8 +6,6 @@ each step the violations of Φ and C v are eliminated along the locked direction
 spherical and free joints are states in the child's axes, which keeps digits when a body spins fast.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -25,7 +23,7 @@ from proofroll.elements.mechanism.named_forces import lengths, on_joint, taken
 from proofroll.elements.mechanism.record import Record, gathered, integrated
 from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
-from proofroll.elements.mechanism.switches import STOPPED, Mode, held_by, switched_joints
+from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_by, switched_joints
 
 _NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
 _EQUAL_STEP = 2e-3  # s
@@ -122,7 +120,7 @@ class JointCoordinates:
             return Solution(into @ free, np.zeros(0), motion, rows, None, C, np.zeros(0))
         U, S, Vt = np.linalg.svd(C @ into, full_matrices=False)
         if held and (rank > len(S) or S[rank - 1] < RANK * S[0]):
-            raise Refused("joints that hold lock more than can move: their forces are not determinate")
+            raise Refused(REDUNDANT)
         locked, back = Vt[:rank], U[:, :rank].T / S[:rank, None]
         normal = -back @ bias - locked @ free
         locked_into = into @ locked.T

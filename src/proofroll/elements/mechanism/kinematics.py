@@ -1,7 +1,5 @@
 """Forward kinematics of a mechanism's tree in joint coordinates, and the rows of its loops."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Points that close a loop, for engines whose constraints hold points together and nothing else."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.elements.mechanism.kinematics import Tree

@@ -49,7 +49,7 @@ class Mechanism:
         gravity: acceleration in the world's axes, m/s².
         actuators: motors of joints.
         couplings: pairs of joints that move together.
-        unmodelled: what else its source has, in a few words each; every route and engine refuses it.
+        unmodelled: further things in its source, in a few words each, for which every route and engine refuses it.
     """
 
     bodies: tuple[Body, ...]

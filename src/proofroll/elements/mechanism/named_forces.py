@@ -1,7 +1,5 @@
 """Forces along coordinates that have names: efforts of actuators, of couplings, of dry friction and of stops."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

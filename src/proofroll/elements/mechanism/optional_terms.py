@@ -1,7 +1,5 @@
 """Parts of the model of a mechanism that a scene can have or not, for the ladder of models."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from proofroll.core.element import OptionalTerm

@@ -1,7 +1,5 @@
 """Poses and velocities of everything in a mechanism, from those of its bodies at many times."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

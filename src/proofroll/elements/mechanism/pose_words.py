@@ -1,7 +1,5 @@
 """The pose of a mechanism in words, for a message."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.elements.mechanism.model import Mechanism

@@ -5,8 +5,6 @@ tables themselves, ``[[repeat.bodies]]``, ``[[repeat.joints]]`` …; their texts
 expressions ``i``. A joint with ``dependent = true`` has its q0 and v0 found from the loops; its own q0 is the guess.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
 from typing import Any

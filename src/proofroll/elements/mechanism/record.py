@@ -1,7 +1,5 @@
 """Record of a route of the truth on a mechanism, in an order that both routes keep, and its steps."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """Rotations as 3×3 matrices and scalar-first unit quaternions."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

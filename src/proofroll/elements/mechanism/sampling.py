@@ -1,7 +1,5 @@
 """Sample of a mechanism besides its motion, and the mechanism of a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -109,7 +107,7 @@ def mechanism_of(scene: Any) -> Mechanism:
 
 
 def independent(rows: Array) -> int:
-    """Number of independent constraint rows, of any scale, shape (rows, velocities)."""
+    """Rank of constraint rows, each first scaled to length 1, shape (rows, velocities)."""
     if not rows.size:
         return 0
     sizes = np.linalg.norm(rows, axis=1, keepdims=True)

@@ -1,7 +1,5 @@
 """Numbers that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -112,11 +110,7 @@ def breaks(signals: Sequence[Signal]) -> list[float]:
 
 
 def checked(field: str, given: Any) -> Signal:
-    """Signal of a part of a mechanism.
-
-    Raises:
-        InputError: it is none.
-    """
+    """Signal of a part of a mechanism. Raises InputError if the value is none."""
     return given if isinstance(given, Formula | Table) else checks.number(field, given)
 
 
@@ -129,9 +123,11 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
     try:
         if isinstance(given, str) and given.startswith("=") and TIME not in numbers.values:
             used = _names(given[1:])
-            if TIME in used:
+            if used & {TIME, *FUNCTIONS}:
                 for name in sorted(used - {TIME, "pi", *FUNCTIONS}):
-                    require_known(field, name, sorted(numbers.values), "there is no such parameter; choose from")
+                    require_known(
+                        field, name, [TIME, *sorted(numbers.values)], "there is no such parameter; choose from"
+                    )
                 own = tuple((name, float(value)) for name, value in numbers.values.items() if name in used)
                 made = Formula(given[1:].strip(), own)
                 _check_unit(field, made.text, numbers, units)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proofroll.core.number_format import place
+from proofroll.core.number_format import vector
 from proofroll.elements.mechanism.contacts.start import touches
 from proofroll.elements.mechanism.kinematics import Tree
 
@@ -31,7 +31,7 @@ def start_facts(element: MechanismElement) -> Sequence[str]:
     for body in mechanism.bodies[:_MOST]:
         centre = moving.point(body.name, body.com)[0]
         speed = float(np.linalg.norm(moving.velocity(body.name, body.com)[0]))
-        said.append(f"{body.name}: centre of mass at {place(centre)} m, speed {speed:.4g} m/s")
+        said.append(f"{body.name}: centre of mass at {vector(centre)} m, speed {speed:.4g} m/s")
     if more := len(mechanism.bodies) - _MOST:
         said += [f"and {more} more bodies"] if more > 0 else []
     touching = touches(mechanism, Tree(mechanism).at(*mechanism.start()))

@@ -5,8 +5,6 @@ friction; ``stick`` where friction holds it; ``low`` or ``high`` where a stop do
 limit is ``least``, ``linear`` or ``greatest``.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +20,10 @@ Mode = tuple[str, ...]
 SETTLED = math.exp(-13.5)
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
+REDUNDANT = (
+    "several joints hold one degree of freedom, so that their forces are not determinate: "
+    "keep the friction or the stop of one of them"
+)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,6 @@ coordinates.
 Mechanisms are bodies in redundant coordinates (:mod:`redundant`) or its kinematic tree (:mod:`tree`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Ball, weight and rolling resistance shared by the two rigid-body formulations."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

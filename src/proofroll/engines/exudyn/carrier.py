@@ -5,8 +5,6 @@ carrier. Rolling is two constraints between rates of relative coordinates. Every
 without rolling resistance no Python runs while it integrates. The carrier has no mass and no inertia at all.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -29,7 +27,7 @@ class RollingRow(NamedTuple):
     Attributes:
         item: Exudyn's number of it.
         generator: whose coordinate of the carrier it takes.
-        along: what the ball moves per unit of that coordinate, along e2 or e3 [m/unit].
+        along: motion of the ball per unit of that coordinate, along e2 or e3 [m/unit].
         axis: of the spin, in the world at time 0.
     """
 

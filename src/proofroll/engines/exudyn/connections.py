@@ -3,8 +3,6 @@
 Each has two markers with the axes of the joint's own frames, along whose first Exudyn gives its reactions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -60,7 +58,7 @@ def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], 
 class Connections:
     """Connects the bodies of a system, by name, the world among them.
 
-    Exudyn has their reference at ``com``, and their axes as ``turns`` turn ours.
+    ``com``: Exudyn's reference point of each body; ``turns``: rotation from our body axes to Exudyn's.
     """
 
     def __init__(

@@ -10,8 +10,6 @@ that stands for a coefficient of restitution (``impactModel`` 2, the mixed model
 Martins), while friction stops the contact point.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

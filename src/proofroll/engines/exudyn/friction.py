@@ -4,8 +4,6 @@ Two components along e2 and e3 everywhere. While the ball slips, the force is -Î
 held over one step, so that Newton's method never meets the kink of the law at rest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

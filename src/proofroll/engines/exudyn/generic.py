@@ -5,8 +5,6 @@ surface; the wall is one constraint on a coordinate and rolling two rows that ar
 constant coefficients. What is tested is Exudyn's integration of a system with multipliers, not its bodies or joints.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Forces of the formulation ``generic``: gravity, inertia, rolling resistance and friction in its coordinates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

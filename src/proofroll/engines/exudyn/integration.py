@@ -1,7 +1,5 @@
 """Exudyn's own implicit time integration, driven from sample to sample without losing its state."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -79,8 +77,8 @@ class Integration:
 
     Attributes:
         t: present time [s].
-        complaint: why a user function of the system has stopped the run for good.
-        events: what the system's user functions have found of stick, slip and lift-off so far.
+        complaint: reason for which a user function of the system ended the run.
+        events: stick, slip and lift-off found so far by the system's user functions.
     """
 
     def __init__(

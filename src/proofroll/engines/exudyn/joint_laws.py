@@ -7,8 +7,6 @@ target and no limit is a ``CoordinateSpringDamper``; any other effort is a user 
 iterate. A coupling is an ``ObjectConnectorCoordinate``, and so is what holds a rotor, the armature, to its joint.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

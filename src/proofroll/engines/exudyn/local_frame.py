@@ -1,7 +1,5 @@
 """Surfaces as a body that moves along them sees them: coefficients that do not change from place to place."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exudyn's modules without types: its stubs leave ``self`` out of every method and so describe other signatures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

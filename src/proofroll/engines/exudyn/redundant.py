@@ -3,8 +3,6 @@
 Bodies are referenced at their centres of mass.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import zip_longest
 from typing import Any, ClassVar

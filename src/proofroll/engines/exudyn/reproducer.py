@@ -1,7 +1,5 @@
 """Writes the program that shows what Exudyn does without proofroll: with a ball on a wall, or with a mechanism."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

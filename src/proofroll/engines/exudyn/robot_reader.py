@@ -1,7 +1,5 @@
 """A robot in Exudyn, which reads no such files: its kinematic tree is fed from our reading."""
 
-from __future__ import annotations
-
 import importlib.metadata
 from collections.abc import Mapping
 from typing import Any, ClassVar

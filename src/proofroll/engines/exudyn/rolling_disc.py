@@ -4,8 +4,6 @@
 normal and the disc's axis before every Newton residual makes the disc's lowest point the ball's contact point.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Settings of the Exudyn adapter and the presets of its formulations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Literal
@@ -22,7 +20,7 @@ class ExudynSettings:
             ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction); of
             mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same
             with its penalty contacts of spheres) or ``tree`` (its kinematic tree in joint coordinates).
-        preset: which preset the values started from.
+        preset: name of the preset that the values started from.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
             (undamped, constraints at velocity level); of ``tree`` ``rk44`` or ``rk67``, explicit.
@@ -31,7 +29,7 @@ class ExudynSettings:
         newton_tolerance: relative tolerance of Newton's method [1]; the absolute one is a hundredth of it, which is
             the engine's own ratio. Explicit integrators have none, and look at neither this nor ``jacobian``.
         jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
-        halvings: how often a step is halved where Newton's method fails, before the run ends; ``contact`` and
+        halvings: number of times a step is halved where Newton's method fails, before the run ends; ``contact`` and
             ``spheres`` only, as the following. With 0, and in the other formulations, all steps are dt.
         stiffness: of the contact's normal force [N/m].
         friction_zone: slip velocity up to which friction is proportional to it [m/s].

@@ -5,8 +5,6 @@ another sphere as ``ObjectContactSphereSphere``. Friction is proportional to the
 Coulomb's beyond, in the direction of the slip: what sticks creeps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -4,8 +4,6 @@ Its links have their frames on their joints, so that everything of a body is tur
 neither reactions nor joints of more than one coordinate.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ by user functions (``CoordinateVectorConstraint``); along e1 it is the wall. As 
 Exudyn's integration of a system with multipliers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The adapter: builds, steps and reads MuJoCo for any ball on any surface."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Self

@@ -1,7 +1,5 @@
 """The ball on joints that follow the surface's coordinates, in real contact with a plane that follows it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -63,9 +63,9 @@ class Resistance:
     """The torque of rolling resistance.
 
     Attributes:
-        f: how far the normal force is shifted forward [m].
+        f: distance by which the normal force is shifted forward [m].
         stopping: torque that takes 1 m/s from a ball that rolls within a step: (1 + κ) m a / dt [N s].
-        pull: what gravity would add to the velocity of a ball that rolls within a step: dt g / (1 + κ) [m/s].
+        pull: velocity that gravity adds to a rolling ball within a step: dt g / (1 + κ) [m/s].
     """
 
     f: float
@@ -114,7 +114,7 @@ class Resistance:
         torque[:] = scale * np.cross(ahead, e1)
 
     def lever(self) -> float:
-        """The lever that the torque has at a normal force of 1 N and a speed at which the ball goes on [m]."""
+        """Lever arm of the resistance torque at N = 1 N, at a speed too fast to stop in one step [m]."""
         torque = np.zeros(3)
         self.apply(torque, 1.0, (1.0, 0.0, 0.0), (0.0, 1.0 + 2 * self.f / self.stopping, 0.0))
         return float(np.linalg.norm(torque))

@@ -1,7 +1,5 @@
 """Base of the three ways to present a wall to MuJoCo."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Any
 
@@ -28,11 +26,7 @@ class Formulation(ABC):
     @staticmethod
     @abstractmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Sets the numbers of the wall and of the joints.
-
-        Raises:
-            Refused: the wall cannot be presented so.
-        """
+        """Sets the numbers of the wall and of the joints. Raises Refused if the wall cannot be presented so."""
 
     @property
     def resists(self) -> bool:

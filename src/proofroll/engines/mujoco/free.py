@@ -1,7 +1,5 @@
 """A free ball: on a plane that is re-posed tangent to the wall before each step, or in a ring of boxes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Bounded friction: whether MuJoCo's contact holds or slips, when that changed, and what a slip needs besides."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable
 from typing import Any

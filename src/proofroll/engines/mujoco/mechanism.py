@@ -1,7 +1,5 @@
 """A mechanism in MuJoCo: start, steps, and what is read back of its model and its states."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar
 

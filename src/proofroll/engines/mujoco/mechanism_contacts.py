@@ -4,8 +4,6 @@ A vertex is a sphere of almost no radius, a circle a cylinder of almost no heigh
 MuJoCo refuses, the top of a wide box.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Formulation ``geoms``: a mechanism of :mod:`~proofroll.engines.mujoco.mechanism` whose bodies may touch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -12,7 +10,6 @@ import numpy as np
 from proofroll.core.engine import Regularised
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.capabilities import MechanismCapability
-from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.contacts.family import Family, of_contact
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import DEPENDENT, MechanismBuilt, MechanismSample, mechanism_of
@@ -56,11 +53,7 @@ class MujocoGeoms(MujocoMechanism):
         self._contacts = Contacts(self._model, own)
 
     def spec(self) -> Any:
-        """MjSpec, whose keyframe ``start`` is time 0.
-
-        Raises:
-            Refused: each step edits the contacts.
-        """
+        """MjSpec, whose keyframe ``start`` is time 0. Raises Refused if each step edits the contacts."""
         if self._settings.cone_correction:
             raise Refused("the correction of the cone is made in every step, and in no MJCF; set cone_correction=false")
         return super().spec()
@@ -99,7 +92,7 @@ class MujocoGeoms(MujocoMechanism):
         told = {f"contact_{name}": value for name, value in read._asdict().items()}
         if not self._evaluated().ncon:
             return replace(plain, **told)
-        softened, unsaid = dict(plain.regularised), dict[str, None]()
+        softened = dict(plain.regularised)
         hard = self._hard(self._evaluated())
         load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
         for name, wanted in hard.items():
@@ -107,9 +100,7 @@ class MujocoGeoms(MujocoMechanism):
             rest = load / float(np.abs(hard["acceleration"]).max() or np.finfo(float).tiny)
             difference = float(np.abs(wanted - getattr(plain, name)).max()) / size
             softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
-            if softened[name].tolerance > CAPS["acceleration"].tolerance:
-                unsaid[name] = None  # the first step of a hop tells nothing of the model
-        return replace(plain, **told, **unsaid, regularised=softened)
+        return replace(plain, **told, regularised=softened)
 
     def _hard(self, data: Any) -> dict[str, Array]:
         """Accelerations by MuJoCo's own terms with the hardest contacts, with J̇v and without the cone's lift."""

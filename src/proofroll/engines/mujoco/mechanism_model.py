@@ -7,8 +7,6 @@ where the mechanism is planar; in space a revolute loop needs two points of its 
 it freely, without any drift that would tell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

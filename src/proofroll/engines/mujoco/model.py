@@ -3,8 +3,6 @@
 A scene without a file has the structure that is written here.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

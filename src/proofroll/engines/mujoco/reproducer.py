@@ -1,7 +1,5 @@
 """Writes the program that shows what MuJoCo does without proofroll: with a ball on a wall, or with a mechanism."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Iterable, Iterator, Sequence
@@ -55,7 +53,7 @@ def run(times):
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`; from the model as MuJoCo writes it, and at time 0."""
+    """Program that loads the model as MuJoCo has saved it, at time 0 (``Reproduces`` in ``core.engine_abilities``)."""
     contact, formulation = body.contact, {"free": Free, "chart": Chart, "facets": Facets}[settings.formulation]
     bounded = math.isfinite(contact.mu_static)
     if bounded and contact.mu_static != contact.mu_kinetic:

@@ -1,7 +1,5 @@
 """MuJoCo's own importer of URDF and MJCF, its compiled model read back."""
 
-from __future__ import annotations
-
 import importlib.metadata
 from collections.abc import Mapping
 from pathlib import Path

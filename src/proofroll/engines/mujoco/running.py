@@ -1,7 +1,5 @@
 """Code around the steps that every model in MuJoCo needs."""
 
-from __future__ import annotations
-
 import ctypes
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Settings of MuJoCo, the three presets of each formulation, and the terms of its model that a setting switches."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal

@@ -1,7 +1,5 @@
 """Certificate tolerances for MuJoCo's soft contact: changes at time 0, and their bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 

@@ -1,7 +1,5 @@
 """The initial state, and how deep a soft contact has to be to carry the load."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache
@@ -34,7 +32,7 @@ _FALSE_POSITION = 15
 _TOUCHING = 1e-13
 
 
-def place(model: Any, data: Any, body: RollingBall, depth: float) -> None:
+def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
     """The scene's initial motion with the ball ``depth`` [m] inside the wall, before any forces are known.
 
     MuJoCo's contact point lies midway between the two surfaces, at a - depth/2 from the centre; the ball rolls
@@ -75,7 +73,7 @@ def start(
     rounds = _rounds(body, settings, slips)
 
     def evaluate_at(depth: float) -> None:
-        place(model, data, body, depth)
+        put_ball(model, data, body, depth)
         now = data.qvel.copy()
         for index in range(rounds):
             before = data.qacc.copy()

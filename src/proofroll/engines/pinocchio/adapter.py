@@ -1,7 +1,5 @@
 """The adapter between proofroll and Pinocchio."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Base of the two formulations with rows, for the integrators and the adapter."""
 
-from __future__ import annotations
-
 import math
 import sys
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """Formulation ``composite``: joints that follow the surface, so that the ball cannot leave it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple

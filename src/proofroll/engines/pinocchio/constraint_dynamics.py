@@ -4,8 +4,6 @@ It holds points or whole frames together, which leaves out the loops between: a 
 (one where the mechanism is planar). Without the proximal term μ, dependent rows give NaN.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ The wall is presented as a plane, posed anew in each step tangent to it at the c
 finds the impulse of the step in its friction cone.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -74,17 +72,13 @@ class ContactSteps:
         solver, tolerance: Pinocchio's solver, and where it stops.
         started: whether a step was made.
         bounded: whether friction is.
-        mu_static, mu_kinetic: what the cone is given [1].
+        mu_static, mu_kinetic: coefficients of the cone [1].
         q, v: joint configuration and velocity.
         happened: events so far; with unbounded friction, too.
     """
 
     def __init__(self, body: RollingBall, settings: PinocchioSettings) -> None:
-        """Starts at time 0.
-
-        Raises:
-            Refused: Pinocchio's solver does not find the first impulse.
-        """
+        """Starts at time 0. Raises Refused if Pinocchio's solver does not find the first impulse."""
         self._surface, self._f = body.surface, body.contact.rolling_resistance
         rolls = 1 + body.ball.inertia_ratio
         # Of a ball that rolls: moment per rate of its speed [N s²], and acceleration by gravity [m/s²].
@@ -191,12 +185,14 @@ class ContactSteps:
         Pinocchio's solver has no restitution. Where the ball would reach the wall within the step, it is asked for
         the velocity after an impact instead; an approach of a few steps of gravity is no impact any more.
         """
+        e = self._restitution
+        if e is None:
+            return gap / self.dt
         x, y, z, *_ = triad
         vx, vy, vz = v
         gx, gy, gz = self._gravity
         approach, pull = x * vx + y * vy + z * vz, x * gx + y * gy + z * gz
-        e = self._restitution
-        if e is None or e * approach <= _SOFT * abs(pull) * self.dt or gap > self.dt * (approach + self.dt * pull):
+        if e * approach <= _SOFT * abs(pull) * self.dt or gap > self.dt * (approach + self.dt * pull):
             return gap / self.dt
         return -e * approach
 

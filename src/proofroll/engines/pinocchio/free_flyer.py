@@ -1,7 +1,5 @@
 """Formulation ``free_flyer``: a free ball, held on the surface and kept from slipping by three rows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

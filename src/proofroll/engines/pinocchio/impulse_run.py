@@ -1,7 +1,5 @@
 """Formulation ``impulses``: bodies that touch, joints that rub and stop, and what is read back of their motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +9,6 @@ import pinocchio as pin
 from proofroll.core.engine import Regularised, whole_steps
 from proofroll.core.errors import Diverged
 from proofroll.elements.mechanism import WORLD, Mechanism
-from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.engines.pinocchio.impulses import Impulses, ImpulseSteps
@@ -92,21 +89,18 @@ class ImpulseRun(MechanismRun):
     def built(self) -> MechanismBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         plain, span = super().built(), _PART * self._dt
-        hard, twice = (self._accelerations(self._beginning(length), length) for length in (span, 2 * span))
+        hard, twice = (
+            self._accelerations(self.steps.beginning(length, convex=False), length) for length in (span, 2 * span)
+        )
         step = self._accelerations(self.steps.kick(self.steps.q, self.steps.v), self._dt)
-        softened, unsaid = dict[str, Regularised](), dict[str, None]()
+        softened = dict[str, Regularised]()
         for name, value in hard.items():
             size = float(np.abs(value).max()) or 1.0  # nothing moves otherwise than freely
             others = twice[name], step[name], getattr(plain, name)
             unsure = float(self._settings.solver_tolerance or 0.0) / span / size
             apart = sum(float(np.abs(value - other).max()) / size for other in others)
             softened[name] = Regularised(_MARGIN * (unsure + apart), _PARTS if self._settings.convex else _FOUND)
-            if softened[name].tolerance > CAPS["acceleration"].tolerance:
-                unsaid[name] = None  # the first step of a hop tells nothing of the model
-        return replace(plain, **unsaid, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
-
-    def _beginning(self, span: float) -> Impulses:
-        return self.steps.beginning(span, convex=False)
+        return replace(plain, **self.steps.read() if self.steps.contacts else {}, regularised=softened)
 
     def _accelerations(self, kick: Impulses, span: float) -> dict[str, Array]:
         """Accelerations of all bodies in the time of a kick [s]."""

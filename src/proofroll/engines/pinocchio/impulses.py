@@ -5,8 +5,6 @@ a step in the cones of friction: those of Coulomb's law (De Saxcé's term makes 
 the convex problem without it, whose contacts part as they slip.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -16,7 +14,7 @@ import pinocchio as pin
 from proofroll.core.errors import Diverged, Refused
 from proofroll.elements.mechanism.capabilities import ALL_JOINTS, ALL_LOOPS, FORCES, MechanismCapability
 from proofroll.elements.mechanism.contacts.family import Family, of_contact
-from proofroll.elements.mechanism.contacts.start import TOUCHING, scale_of
+from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.engines.pinocchio.joint_rows import JointRows
@@ -83,11 +81,7 @@ class ImpulseSteps:
     """
 
     def __init__(self, tree: JointTree, settings: PinocchioSettings) -> None:
-        """Starts at time 0.
-
-        Raises:
-            Refused: Pinocchio's solver returns wrong impulses for such contacts.
-        """
+        """Starts at time 0. Raises Refused if Pinocchio's solver returns wrong impulses for such contacts."""
         self._tree, self._model, self._data = tree, tree.model, tree.model.createData()
         self._settings, self._dt = settings, float(settings.dt or 0.0)
         self._midpoint = settings.integrator == "midpoint"
@@ -95,7 +89,7 @@ class ImpulseSteps:
         self.contacts = mechanism.contacts
         self.q, self.v, self.t = tree.q0, tree.v0, 0.0
         self._gravity = float(np.linalg.norm(mechanism.gravity))
-        self._touching = scale_of(mechanism).gap
+        self._touching = natural_scale(mechanism).gap
         self._index = mechanism.body_index
         self.restitution = np.array([contact.restitution for contact in self.contacts])
         self.joints = JointRows(tree)
@@ -146,7 +140,7 @@ class ImpulseSteps:
         shifts = np.zeros((len(self._returned), 3))
         shifts[: len(touching)] = (ahead - J) @ self.v
         apart = [each.gap > self._touching for each in touching] + [False] * len(self.joints.friction)
-        shifts[apart + [item.gap(self.q) > TOUCHING for item in self.joints.stops], 2] = np.inf
+        shifts[apart + [not item.closed(self.q) for item in self.joints.stops], 2] = np.inf
         return self._solved(J, free, inverse, touching, shifts, span, convex=convex)
 
     def read(self) -> dict[str, Any]:

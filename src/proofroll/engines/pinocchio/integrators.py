@@ -1,7 +1,5 @@
 """Time stepping on the configurations of Pinocchio."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from typing import Any

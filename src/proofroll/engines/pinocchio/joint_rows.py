@@ -1,7 +1,5 @@
 """Dry friction and stops of joints as Pinocchio's own constraints of one row each, for its solver of a step."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +30,10 @@ class JointRow(NamedTuple):
     def gap(self, q: Array) -> float:
         """Distance from the stop."""
         return self.sign * float(q[self.joint.coordinate] - (self.limit or 0.0))
+
+    def closed(self, q: Array) -> bool:
+        """True if the joint is at the stop."""
+        return self.gap(q) <= AT_STOP * (self.joint.high - self.joint.low)
 
 
 class JointRows:
@@ -77,8 +79,7 @@ class JointRows:
         """
         along = {"friction": np.full(self._count, np.nan), "stop": np.full(self._count, np.nan)}
         total = {joint.number: 0.0 for joint in self.switched}
-        ways = ((item, item.joint.high - item.joint.low) for item in self.stops)
-        closed = {item.joint.number for item, way in ways if item.gap(q) <= AT_STOP * way}
+        closed = {item.joint.number for item in self.stops if item.closed(q)}
         for item, size in zip((*self.friction, *self.stops), force, strict=True):
             if item.limit is None or item.joint.number in closed:
                 total[item.joint.number] += item.sign * float(size)

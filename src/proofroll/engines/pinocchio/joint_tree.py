@@ -5,8 +5,6 @@ mass matrix without a word. A joint's frame is our frame B on the child; bodies 
 the joint that carries them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Formulations ``null_space`` and ``constraint_dynamics``: a mechanism's motion, and what is read back of it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

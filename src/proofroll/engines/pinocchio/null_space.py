@@ -5,8 +5,6 @@ Which row depends on which never matters, and the number of independent ones is 
 found anew at each evaluation, it flickers with round-off.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any, NamedTuple
 

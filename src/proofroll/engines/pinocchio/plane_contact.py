@@ -5,8 +5,6 @@ components in the ball's turning axes, and a step of semi-implicit Euler multipl
 1 + (ω dt)², so that a fast ball blows up at any useful step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

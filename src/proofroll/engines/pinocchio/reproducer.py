@@ -1,7 +1,5 @@
 """Writes the program that shows what Pinocchio does without proofroll: the steps of the adapter, cut out of it."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

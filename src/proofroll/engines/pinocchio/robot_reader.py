@@ -1,7 +1,5 @@
 """Pinocchio's own importers of URDF and MJCF, the model read back."""
 
-from __future__ import annotations
-
 import importlib.metadata
 from collections.abc import Mapping
 from typing import Any, ClassVar

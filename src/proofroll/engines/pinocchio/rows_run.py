@@ -1,7 +1,5 @@
 """Formulations ``composite`` and ``free_flyer``: a mechanism with rows on top, and the integrator of its motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Settings of Pinocchio, and the presets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal

@@ -10,8 +10,6 @@ the rate that friction takes from |u|, that is the direction of b, lagging by |u
 ω_b.
 """
 
-from __future__ import annotations
-
 import math
 from enum import Enum, auto
 from typing import Any

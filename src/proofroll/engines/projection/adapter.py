@@ -1,7 +1,5 @@
 """The projection method behind proofroll's engine protocol."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, Self

@@ -4,8 +4,6 @@ Between two switches the equations are smooth; a switch is located within a step
 that it is as accurate as these.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from typing import ClassVar, Generic, NamedTuple, TypeVar

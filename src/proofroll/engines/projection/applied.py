@@ -1,7 +1,5 @@
 """Applied forces of a mechanism besides its weight: springs between points, and laws of joints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple

@@ -79,7 +79,7 @@ class ConnectionRows(NamedTuple):
 
     Attributes:
         residual, rate: Φ and Φ̇.
-        form: what takes the relative twist to Φ̇, (rows, 16).
+        form: matrix from the relative twist to Φ̇, (rows, 16).
         force, torque: of a unit multiplier on body b at its point.
         x, y: the axes of rows of angles; none of those of points, which are first.
         twist: gives this row the rate 1, and other rows of the connection, where it is closed, none; (rows, 16).

@@ -6,8 +6,6 @@ follows from Coulomb's law at all contacts at once, by the same solver as in the
 alike is no news, that both move alike in between is.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -21,7 +19,7 @@ from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
 from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
-from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale, scale_of
+from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.elements.mechanism.signal import breaks
@@ -40,7 +38,7 @@ class ContactsThere(NamedTuple):
     Attributes:
         touching: each of them.
         J: of each slide by the velocities ν, (contacts, 3, nv).
-        response: what a force along the velocities makes of their rates, times Jᵀ, (nv, contacts, 3).
+        response: rates of the velocities by a force along them (inverse mass matrix), times Jᵀ, (nv, contacts, 3).
         rate: of each slide without forces of contact, (contacts, 3).
     """
 
@@ -67,8 +65,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         super().__init__(equations, stepper, accept, breaks(mechanism.signals))
         self.contacts, self._index = mechanism.contacts, mechanism.body_index
         self.friction = np.array([contact.friction for contact in self.contacts])
-        scale = scale_of(mechanism)
-        self._unit = math.prod(natural_scale(mechanism))  # a natural speed
+        scale = natural_scale(mechanism)
+        self._unit = math.prod(scale)  # a natural speed
         self._still = scale.speed
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}

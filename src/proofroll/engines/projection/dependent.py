@@ -14,8 +14,6 @@ Sources: W. Blajer, Math. Comput. Model. Dyn. Syst. 12(6), 2006, 543-553, for th
 Syst. Dyn. 7, 2002, 265-284, for the elimination of constraint violations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -27,6 +25,7 @@ from proofroll.core.errors import Refused
 from proofroll.elements.mechanism import Mechanism, Tree
 from proofroll.elements.mechanism.rotations import Array, to_quaternion
 from proofroll.elements.mechanism.sampling import DEPENDENT, independent_anywhere
+from proofroll.elements.mechanism.switches import REDUNDANT
 from proofroll.engines.projection.applied import Applied
 from proofroll.engines.projection.connections import SKEW, Bodies, ConnectionRows, ProjectedConnections
 from proofroll.engines.projection.elimination import Closing, Elimination, Loads, RowSplit, Space
@@ -190,7 +189,7 @@ class DependentCoordinates:
         if not held:
             self.regularity = split.least
         elif split.least < DEPENDENT:
-            raise Refused("joints that hold lock more than can move: their forces are not determinate")
+            raise Refused(REDUNDANT)
         velocities, multipliers = split(push.T, np.broadcast_to(wanted - of_given, (*push.shape[:-1], len(C))).T)
         return velocities.T, multipliers.T
 
@@ -233,7 +232,7 @@ class DependentCoordinates:
         return _joined(v, quaternion_rates(q, w), solved.linear, solved.angular)
 
     def eliminated(self, x: Array, held: Sequence[int] = ()) -> Array:
-        """The state with its violations taken away within the constrained subspace; quaternions of unit length.
+        """State projected onto the constraints, quaternions normalised.
 
         Velocities that are ``held`` stay what they are.
         """

@@ -7,8 +7,6 @@ over its mass, p = [place; 1], its element (k, l) is ⟨S_k, S_l Σ_l⟩, where 
 on differences of two twists, and are few: their singular vectors in the metric of DᵀMD take dependent rows as they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -112,7 +110,7 @@ class Elimination:
         return np.asarray(bodies.pose[c] @ self._own @ bodies.inverse[c])
 
     def inertia(self, bodies: Bodies) -> Array:
-        """Σ of the bodies along the world's axes, (bodies, 4, 4)."""
+        """Matrices Σ (mass, first and second moments) of the bodies along the world's axes, (bodies, 4, 4)."""
         pose = bodies.pose[:-1]
         return np.asarray(pose @ self._inertia @ pose.swapaxes(1, 2))
 
@@ -142,10 +140,10 @@ class Elimination:
 
         Args:
             bodies: their motion.
-            relative: what the joints ask of the twists of their children, less those of their parents, but for what
+            relative: twists of children less those of their parents, as the joints prescribe them, but for what
                 they leave free, (…, joints, 16).
             loads: forces on the bodies.
-            closing: what further rows make of it.
+            closing: effect of further rows on it.
 
         Returns:
             (…, bodies + 1, 4, 4), the same of the velocities, (…, nv), and the multipliers of the further rows.

@@ -7,8 +7,6 @@ without friction. Both rows of C see the same inertia, so C M⁻¹ Cᵀ = (1/m +
 times that, reversed: the static cone and the drive say the same.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

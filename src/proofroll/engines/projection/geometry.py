@@ -3,8 +3,6 @@
 The frame F has the columns e1 (normal, towards the wall), e2 (along the first coordinate) and e3 = e1 × e2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,7 +85,7 @@ class Uniform:
     Then everything along the local axes is constant, and the frame at u is the one at u = 0 turned by the motions.
 
     Attributes:
-        column: which coordinate turns the frame; None if none does.
+        column: index of the coordinate that turns the frame; None: none does.
     """
 
     def __init__(self, surface: Surface, generators: tuple[Generator, Generator]) -> None:

@@ -5,8 +5,6 @@ rest, those that hold follow from a quadratic program with bounds. Decisions and
 :mod:`proofroll.elements.mechanism.complementarity`, by which the truth decides: neither can hide an error of the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Formulation ``dependent``: a mechanism by the projection method, and what is read back."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

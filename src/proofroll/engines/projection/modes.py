@@ -14,8 +14,6 @@ The angle between both at the change is of the order ε² (T ψ̇)², some 1e-9 
 is no parameter of the result but of the cost: the steps that an explicit method needs fall like 1/√ε.
 """
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from enum import Enum, auto
@@ -100,7 +98,7 @@ class ContactMode(ABC):
 
     @abstractmethod
     def rates(self, y: FloatArray) -> FloatArray:
-        """ẏ."""
+        """Rate of the mode's state."""
 
     @abstractmethod
     def x(self, y: FloatArray) -> FloatArray:

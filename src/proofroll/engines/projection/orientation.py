@@ -35,7 +35,7 @@ class Orientation(ABC):
 
     Attributes:
         size: number of angles.
-        periodic: which of them say the same after a whole turn.
+        periodic: those that are the same after a whole turn.
     """
 
     size: ClassVar[int] = 0
@@ -47,11 +47,7 @@ class Orientation(ABC):
 
     @abstractmethod
     def pose(self, angles: Sequence[float]) -> tuple[float, ...]:
-        """Numbers on which A depends, besides the frame.
-
-        Raises:
-            ArithmeticError: the angles are not finite.
-        """
+        """Numbers on which A depends, besides the frame. Raises ArithmeticError if the angles are not finite."""
 
     @abstractmethod
     def angular_velocity(self, pose: tuple[float, ...], r: Sequence[float], frame: Frame) -> Vector:
@@ -59,11 +55,7 @@ class Orientation(ABC):
 
     @abstractmethod
     def solved(self, pose: tuple[float, ...], rate: Vector, frame: Frame) -> Vector:
-        """A⁻¹ of a vector along e1, e2, e3.
-
-        Raises:
-            ArithmeticError: A is singular.
-        """
+        """A⁻¹ of a vector along e1, e2, e3. Raises ArithmeticError if A is singular."""
 
     @abstractmethod
     def acceleration(

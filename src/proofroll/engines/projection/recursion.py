@@ -4,8 +4,6 @@ Its cost grows with the number of bodies and no faster, without a matrix of all 
 enough for a compiler.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

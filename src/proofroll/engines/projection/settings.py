@@ -1,7 +1,5 @@
 """Settings of the projection method."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
@@ -34,7 +32,7 @@ class ProjectionSettings:
         elimination: remove the violation of the rolling constraints after each step (taylor: after every few); None
             is yes. In ``rotating_frame`` on a surface of constant curvature no step leaves a violation, for there the
             constraints are linear with constant coefficients, but round-off does, and it grows.
-        singularity: what ``euler`` does near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
+        singularity: action of ``euler`` near θ = 0 and π: ``renew``, choose the body's axes anew and say so, or
             ``stop``, as the paper's equations do by themselves.
         equations: ``projected``, with the projections carried out in numpy at every evaluation, or of mechanisms
             ``compiled`` (heyoka; trees of joints without springs of their own).

@@ -1,7 +1,5 @@
 """The sequence of sticking and slipping: which mode holds, when it ends, and which comes next."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
@@ -28,7 +26,7 @@ class Switching:
 
     Attributes:
         friction: the law between ball and wall.
-        mode: which holds now.
+        mode: the one that holds now.
         stepper: where the motion is.
         events: so far.
     """
@@ -48,7 +46,7 @@ class Switching:
 
         Args:
             ball: its equations.
-            body: what they are of.
+            body: the ball that they belong to.
             stepper: new.
             x: coordinates and velocities.
             scales: natural size of each component of x.

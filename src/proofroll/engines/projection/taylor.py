@@ -1,7 +1,5 @@
 """The projection method's equations, solved in symbols, as compiled Taylor series (heyoka)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The least model of a ball that rolls on a surface: a closed form, or five equations without constraints."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The runs of a comparison as lines of the long table, those of its ladders of steps among them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Distance of a comparison's rows from the truth, over all cases."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

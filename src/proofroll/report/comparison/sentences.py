@@ -1,7 +1,5 @@
 """Conclusions of a comparison, as sentences written from the data alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """The records of a comparison (:mod:`proofroll.report.comparison.records`), made from what it found."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

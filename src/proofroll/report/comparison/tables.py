@@ -1,7 +1,5 @@
 """The report's tables as rows: what is judged and expected, costs, tolerances, and why to believe a row."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

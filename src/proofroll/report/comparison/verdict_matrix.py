@@ -1,7 +1,5 @@
 """The matrix of verdicts: for each setting and observable a cell with verdict, error and a link to its evidence."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

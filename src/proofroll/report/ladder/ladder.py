@@ -1,7 +1,5 @@
 """Content of ``proofroll ladder``: as records and in sentences."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -46,10 +44,10 @@ class TermFound:
 
     Attributes:
         term, kind, engine, formulation, because: see :class:`Switch`.
-        verdict: what it is worth.
-        reason: why.
+        verdict: word for its worth, as ``needed``.
+        reason: ground of the verdict.
         on, off: with it and without.
-        cost: how many times longer it takes with it.
+        cost: ratio of the run's times with it and without.
         change: of the quantity when it is left out.
         error_change: error without it less error with it.
     """

@@ -1,7 +1,5 @@
 """The ladder of models as two tables of the terminal."""
 
-from __future__ import annotations
-
 from rich.table import Column, Table
 from rich.text import Text
 

@@ -1,7 +1,5 @@
 """Advice in words: what to take for each group of scenes and each scene, what else there is, and what serves all."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Candidates of a choice: each setting with each of its steps in each study, over all places of the study."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -24,9 +22,9 @@ class Candidate:
         cost: wall seconds per simulated second at the slowest place; None: not measured.
         clean: the cost is that of clean runs.
         blame: verdict of a place without a result; None: every place has one.
-        motion_limit, forces_limit: what its ladder of steps says of either.
+        motion_limit, forces_limit: result of its ladder of steps for either.
         href: id of the evidence of the place that is furthest off.
-        message: why a place has no result.
+        message: reason for which a place has no result.
     """
 
     row: int

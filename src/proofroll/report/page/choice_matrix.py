@@ -1,7 +1,5 @@
 """Matrix of engines and groups of scenes: of each the cheapest run that holds a tolerance, or why none does."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -114,7 +112,9 @@ class ChoiceMatrix:
         if own and not judged:
             what = "no forces" if forces else "no motion"
             return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
-        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in judged]
+        # What nothing can be said of, as for lack of time, says nothing against the scenes that ran.
+        said = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
+        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in said or judged]
         return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
 
     @cached_property

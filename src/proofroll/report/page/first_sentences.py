@@ -1,7 +1,5 @@
 """Three sentences for the whole report, written from its data: what agrees, what does not, and what to use."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """A report while it grows: written after the comparisons, and again after each further study."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,7 +26,7 @@ class Report:
     """Content of the report's files.
 
     Attributes:
-        compared: what it says of the comparisons.
+        compared: its parts about the comparisons.
         curves: of each comparison, for the figures.
         replay: of the comparisons, as their kind of element gives it.
         parts: the further studies, in the order of the content's lists.

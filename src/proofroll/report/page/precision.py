@@ -1,7 +1,5 @@
 """Error against cost of every run of a study: the points of its work–precision pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

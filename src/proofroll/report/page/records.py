@@ -101,11 +101,11 @@ class ReportContent:
         comparisons: in their order.
         awaited: titles of comparisons that are still being run.
         left_out: names of the comparisons that a report of all studies leaves out.
-        engine_findings: what is known of engines.
+        engine_findings: known faults and surprises of engines.
         entries: of further studies, by the key of their kind.
         environment: where and with what it was made.
         table: every quantity of every run.
-        against: what changed since an earlier report.
+        against: changes since an earlier report.
         replay: its cases without their numbers, which follow from the trajectories that they name.
     """
 

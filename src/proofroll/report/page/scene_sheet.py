@@ -1,7 +1,5 @@
 """Sheet of a comparison's scene: its drawing, and every parameter with symbol, values, unit, meaning and source."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

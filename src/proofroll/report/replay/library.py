@@ -1,7 +1,5 @@
 """Parts of the page for the replay besides its own program: three.js, and numbers packed small."""
 
-from __future__ import annotations
-
 import io
 import re
 import zipfile

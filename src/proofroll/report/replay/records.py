@@ -32,7 +32,7 @@ class Ghost:
         distance: of its bodies from the true ones, at most [m].
         motion: its trajectory.
         file: in which that is stored, as the page calls it; empty: in none.
-        message: why it ended early; empty if it did not.
+        message: reason for which it ended early; empty: it did not.
     """
 
     key: str
@@ -63,9 +63,9 @@ class Replayed:
         scene: with the parameters of the case.
         true: the true motion.
         file: in which it is stored, as the page calls it; empty: in none.
-        ghosts: what stands beside it.
+        ghosts: motions drawn beside it.
         group: of cases to which it belongs.
-        label: what it is called in its group.
+        label: name in its group.
     """
 
     scene: Scene
@@ -97,7 +97,7 @@ class PackedNumbers:
         """Adds an array whose first axis is time; nothing where there is none.
 
         Args:
-            name: what the page calls it.
+            name: name on the page.
             run: whose it is; -1: of all.
             values: shape (n, ...).
             step: to which it is rounded, in its unit.
@@ -117,8 +117,8 @@ class ReplayKind(NamedTuple):
 
     Attributes:
         name: under which the page's program knows how to draw it.
-        seen: how far a body of a scene can be off and look right [m].
-        draw: what is drawn of a truth and its ghosts.
+        seen: largest error of a body that still looks right [m].
+        draw: function that draws a truth and its ghosts.
     """
 
     name: str
@@ -166,7 +166,7 @@ class Replay:
         start: number of the case to begin with.
         cases: in words.
         packed: the numbers of each case.
-        speeds: how fast a person can let it run.
+        speeds: speeds of the replay that a person can choose.
     """
 
     library: dict[str, str] | None

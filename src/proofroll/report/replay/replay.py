@@ -1,7 +1,5 @@
 """The replay: which cases and which runs it shows, and their numbers packed for the page. Kinds of scenes draw them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -78,7 +76,7 @@ def frame_times(until: float, fastest: float) -> FloatArray:
 
 
 def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]:
-    """A truth and its ghosts in words, with what is drawn of them; and the numbers, packed."""
+    """Description of a truth with its ghosts and their drawing, and their numbers as packed text."""
     own, frames, drawn = kind.draw(replayed)
     first = {ghost.engine: ghost for ghost in reversed(replayed.ghosts)}  # the one furthest off comes first
     until, whole = own["until"], own["frames"]

@@ -27,11 +27,7 @@ def require_ending(path: Path, option: str = "--out") -> None:
 
 
 def read_run(path: Path) -> xr.Dataset:
-    """The run in a file.
-
-    Raises:
-        InputError: there is no such file, or it holds no run.
-    """
+    """The run in a file. Raises InputError if there is no such file, or it holds no run."""
     from proofroll.files.trajectory_file import read
 
     try:
@@ -60,7 +56,7 @@ def draw_run(dataset: xr.Dataset, path: Path) -> None:
     """Draws every curve of a run in a panel of its own, over one axis of time; the file's ending says which kind.
 
     Raises:
-        Missing: what draws it is not installed.
+        Missing: matplotlib is not installed.
     """
     try:
         (_page if path.suffix.lower() == ".html" else _picture)(dataset, path)

@@ -35,7 +35,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
 
     Args:
         path: of the file, for messages.
-        run: what it holds.
+        run: the run that it shows.
         scene_of_run: name or path of its scene; None: as the file says.
 
     Raises:

@@ -1,7 +1,5 @@
 """Content of ``proofroll run``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +23,7 @@ class RunContent:
 
     Attributes:
         parameters: every parameter of the scene with its value, defaults among them.
-        asks: what was wanted besides the motion.
+        asks: results that were wanted besides the motion.
         precision: in which the engine computes, single or double.
         build_seconds: before the first step, with what is compiled [s]; None: nothing was built.
         until, every: last time and sampling interval [s].

@@ -1,7 +1,5 @@
 """A stability map on the terminal, within 100 columns."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -70,20 +68,24 @@ def boundary_table(study: StabilityStudy) -> Table:
     before = ""
     for (curve, axis), points in grouped(study).items():
         name = name_of(points[0])
-        kinds = Counter(point.failure for point in points if point.failure)
-        silent = sum(point.silent for point in points)
-        common = kinds.most_common(1)
-        beyond = f"{common[0][0]} {silent}!" if common and silent else common[0][0] if common else ""
         table.add_row(
             Text(name if name != before else ""),
             axis,
             _range(points, "stable"),
             _range(points, "accurate"),
             Text(_explained(explained.get((curve, axis)), study.step_symbols)),
-            Text(beyond),
+            Text(_beyond(points)),
         )
         before = name
     return table
+
+
+def _beyond(points: Sequence[BoundaryPoint]) -> str:
+    """Most frequent failure beyond the boundaries; of two that are as frequent, a silent one."""
+    kinds = Counter(point.failure for point in sorted(points, key=lambda each: not each.silent) if point.failure)
+    common = next((kind for kind, _ in kinds.most_common(1)), "")
+    silent = sum(point.silent for point in points if point.failure == common)
+    return f"{common} {silent}!" if silent else common
 
 
 def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]:
@@ -95,7 +97,7 @@ def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]
 
 
 def size(point: BoundaryPoint, side: str) -> float | None:
-    """A boundary as the first dimensionless number that the scene has of a step; a tolerance as it is."""
+    """Size shown for a boundary: the first dimensionless number of its step, or the tolerance itself."""
     limit = point.sides[side]
     if point.resolution != "dt":
         return limit.largest

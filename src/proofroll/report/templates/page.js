@@ -90,9 +90,12 @@ const folds = (() => {
   follow();
 })();
 
-// A table says so while there are rows below those that it shows.
+// A table says so while there are rows below those that it shows; its edge fades while there are columns beyond it.
 (() => {
-  const look = (region) => region.classList.toggle("more", region.scrollTop + region.clientHeight < region.scrollHeight - 4);
+  const look = (region) => {
+    region.classList.toggle("more", region.scrollTop + region.clientHeight < region.scrollHeight - 4);
+    region.classList.toggle("beyond", region.scrollLeft + region.clientWidth < region.scrollWidth - 4);
+  };
   const sizes = new ResizeObserver((changes) => changes.forEach((change) => look(change.target)));
   everywhere((part) => part.querySelectorAll(".scroll").forEach((region) => {
     region.addEventListener("scroll", () => look(region), { passive: true });

@@ -60,7 +60,7 @@
       layout.shapes.push({ type: "line", xref: `x${tail} domain`, yref: `y${tail}`, x0: 0, x1: 1, y0: 10 ** -decade(), y1: 10 ** -decade(), line: { color: paint("--muted"), width: 1, dash: "dash" } });
       const here = { type: "scatter", xaxis: `x${tail}`, yaxis: `y${tail}`, legend: `legend${tail}` };
       const others = all.filter((curve) => curve.engine !== engine).flatMap(({ points }) => [...points, { cost: null, y: null }]);
-      traces.push({ ...here, mode: "lines", x: others.map(({ cost }) => cost), y: others.map((point) => point.y), line: { color: paint("--muted"), width: 0.8 }, opacity: 0.55, hoverinfo: "skip", showlegend: false });
+      traces.push({ ...here, mode: "lines+markers", x: others.map(({ cost }) => cost), y: others.map((point) => point.y), line: { color: paint("--muted"), width: 0.8 }, marker: { color: paint("--muted"), size: 3 }, opacity: 0.55, hoverinfo: "skip", showlegend: false });
       if (best.length) traces.push({
         ...here, mode: "lines", x: [...best.map(({ cost }) => cost), 10 ** span[1]], y: [...best.map((point) => point.y), best[best.length - 1].y],
         line: { color: paint("--truth"), width: 5, shape: "hv" }, hoverinfo: "skip", showlegend: false,

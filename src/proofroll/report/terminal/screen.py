@@ -1,7 +1,5 @@
 """Filter for a terminal: text of engines and files must not command it."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import re

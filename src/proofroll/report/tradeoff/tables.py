@@ -85,7 +85,7 @@ def tradeoff_parts(study: TradeoffStudy, shown: Sequence[str], *, every_point: b
     """Parts of a trade-off's text: its fronts or all its points, the makeup of errors, and the findings.
 
     Args:
-        study: what was measured.
+        study: the measured trade-off.
         shown: quantities with a column; the last tables are about the first of them.
         every_point: all points are listed, and errors described in sentences too.
     """

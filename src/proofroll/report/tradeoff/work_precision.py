@@ -25,11 +25,7 @@ _LINE = 0.145
 
 
 def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
-    """The diagram as SVG text, one panel per quantity.
-
-    Raises:
-        Missing: matplotlib is not installed.
-    """
+    """The diagram as SVG text, one panel per quantity. Raises Missing if matplotlib is not installed."""
     return svg_text({"font.size": 9}, lambda: _drawn(study, quantities))
 
 

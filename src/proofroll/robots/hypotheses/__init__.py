@@ -50,10 +50,10 @@ class RobotEvidence:
 
     Attributes:
         file: the file.
-        robot: what the file describes, with the causes found so far.
-        reading: what the engine holds.
+        robot: model that the file describes, with the causes found so far.
+        reading: model that the engine holds.
         recompiled: meaning of a changed file, for a format that an engine defines; None where it has none.
-        reread: what the engine holds of a changed file; None where it cannot be asked, or refuses.
+        reread: reads a changed file with the engine; None where it cannot be asked, or refuses.
     """
 
     file: RobotFile
@@ -116,9 +116,9 @@ class RobotHypothesis:
 
     Attributes:
         id: name of the function that makes the robot.
-        name: what the engine does, in a few words.
+        name: behaviour of the engine, in a few words.
         known: engine -> versions in which it was seen; those are tried first.
-        remedy: what a user does about it.
+        remedy: action of a user.
         change: the robot that the engine would hold, or what it holds of a file that means the same and gives no
             occasion; None, or the same robot: the file gives no occasion for it.
     """

@@ -1,7 +1,5 @@
 """Causes in which an importer of MJCF overlooks an attribute, or takes it for another."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Iterable
@@ -80,7 +78,7 @@ def _moments(inertial: Element) -> tuple[str, list[float]] | None:
 def balance_ignored(evidence: RobotEvidence) -> Robot | None:
     """Balanceinertia is ignored: impossible inertias are taken as written.
 
-    To compile them each gets as much more about every axis as makes it possible, which is taken away again.
+    A compiler refuses such an inertia: it is raised about every axis, compiled, and lowered again by the same amount.
     """
     root, more = copy.deepcopy(evidence.file.root), dict[str, float]()
     if not _without(root.iter("compiler"), "balanceinertia"):

@@ -1,7 +1,5 @@
 """Causes that change masses and inertias which the file gives: impossible, small, turned or scaled ones."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Causes that change what acts in joints: armature, damping, friction, springs, couplings."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from typing import Any

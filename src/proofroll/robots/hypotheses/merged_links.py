@@ -1,7 +1,5 @@
 """Causes that misplace the inertia of links which fixed joints hold together."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Causes that misplace bodies or lose them, and gravity."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element

@@ -1,7 +1,5 @@
 """Causes in the mass and inertia that shapes give a body, or do not."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping

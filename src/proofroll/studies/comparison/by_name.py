@@ -1,7 +1,5 @@
 """A comparison from Python: of a file, or of a scene about which no file says anything."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A scene about which no file says anything: what can be asked of it all the same."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

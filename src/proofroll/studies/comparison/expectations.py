@@ -1,7 +1,5 @@
 """Expectations of a comparison, held against its results."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 
 from proofroll.core.comparison import Comparison

@@ -1,7 +1,5 @@
 """Outcome of a comparison: runs with their judgements."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -46,7 +44,7 @@ class ComparedPoint:
     Attributes:
         scene: with its numbers.
         case: of the truth.
-        result: how the truth's run ended.
+        result: end of the truth's run.
         trajectory: of the truth.
     """
 
@@ -67,7 +65,7 @@ class LadderRun:
 
     Attributes:
         value: of the step [s] or tolerance.
-        result: how it ended.
+        result: its end, with message and times.
         errors: largest distance from the truth, between the samples too, by observable; empty without a trajectory.
     """
 
@@ -84,15 +82,15 @@ class Run:
         row: the claim.
         parameters: the point.
         facts: the engine with complete settings, or None if it could not be asked.
-        result: how the run itself ended.
+        result: end of the run itself.
         judgements: one per observable; empty if there is no trajectory.
         contradictions: sentences about what the claim did not expect.
         case: the run's case, or None.
         missing: observables that the claim's tolerances judge and the run does not give.
-        shared: which route of the truth rests on the same equations, as a clause; empty if none does.
+        shared: clause that names the route of the truth with the same equations; empty: there is none.
         diagnosis: causes of a difference that are proven.
         rungs: the other runs of its ladder.
-        trajectory: what it gave, read when it is first asked for; None: nothing.
+        trajectory: its samples, read when they are first asked for; None: there are none.
     """
 
     row: Row
@@ -121,7 +119,7 @@ class Outcome:
     """Outcome of a comparison.
 
     Attributes:
-        comparison: what was asked.
+        comparison: the comparison that was run.
         scene: with its own parameters.
         file: the scene's, for its words.
         runs: with their judgements.

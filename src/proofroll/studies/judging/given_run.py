@@ -22,7 +22,7 @@ from proofroll.running.recording import require_unit
 if TYPE_CHECKING:
     import xarray as xr
 
-Run = Any
+RunInput = Any
 """An ``xarray.Dataset``, the path of a file (netCDF, CSV, ``.npz``), or arrays by name, ``time`` [s] among them."""
 # Other ways to write a unit of the truth, as in files of other programs.
 _SPELT = {
@@ -74,12 +74,8 @@ def _require_unit(name: str, unit: str, wanted: str) -> None:
         raise InputError("run", f"{name} in {unit}", advice)
 
 
-def read_run(run: Run, scene: Scene) -> GivenRun:
-    """Reads a trajectory.
-
-    Raises:
-        InputError: it is none, or of another scene.
-    """
+def read_run(run: RunInput, scene: Scene) -> GivenRun:
+    """Reads a trajectory. Raises InputError if it is none, or of another scene."""
     dataset = _dataset(run)
     made_of = dataset.attrs.get("scene_digest")
     if made_of is not None and made_of != scene.digest:
@@ -152,7 +148,7 @@ def _require_finite_state(run: xr.Dataset, scene: Scene) -> None:
                     raise InputError("run", name, str(error)) from None
 
 
-def _dataset(run: Run) -> xr.Dataset:
+def _dataset(run: RunInput) -> xr.Dataset:
     """The trajectory as a dataset with ``time``."""
     import xarray as xr
 
@@ -179,7 +175,7 @@ def _dataset(run: Run) -> xr.Dataset:
     return xr.Dataset({name: item for name, item in variables.items() if name != "time"}, {"time": variables["time"]})
 
 
-def _from_file(path: Path) -> Run:
+def _from_file(path: Path) -> RunInput:
     """Content of a file: a dataset, or for numpy's own formats arrays by name."""
     from proofroll.files.trajectory_file import read, read_arrays
 

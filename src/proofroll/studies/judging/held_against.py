@@ -47,8 +47,8 @@ def observed(reference: Reference, dataset: xr.Dataset) -> dict[str, FloatArray]
 def between(reference: Reference, name: str, dataset: xr.Dataset) -> tuple[FloatArray, FloatArray] | None:
     """Values of an observable or state of a run off the grid, and its true values there; None: nothing to compare.
 
-    A sampling interval with an event, of the run or of the truth, does not count: within a step of
-    the engine forces may still be those before.
+    Intervals with an event of the run or of the truth are left out: for up to a step of the engine its forces may
+    still be those from before the event.
     """
     own, item = f"{BETWEEN}.{name}", reference.scene.observables.get(name)
     if own not in dataset or own not in reference.dataset:

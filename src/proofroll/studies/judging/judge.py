@@ -22,7 +22,7 @@ from proofroll.core.verdict import Doubt, Judgement, Verdict, judge_curve
 from proofroll.files.scene_file import load_scene
 from proofroll.studies.html_table import gauge, html_table
 from proofroll.studies.judging import held_against
-from proofroll.studies.judging.given_run import GivenRun, Run, read_run
+from proofroll.studies.judging.given_run import GivenRun, RunInput, read_run
 from proofroll.studies.judging.held_against import turned_alike
 from proofroll.studies.judging.reference import Reference
 
@@ -76,7 +76,7 @@ class Judged:
     Attributes:
         scene: its name.
         compared: each quantity that was judged, the farthest from its tolerance first.
-        because: why the tolerances are what they are; empty if not given.
+        because: reason of the tolerances; empty if not given.
         unjudged: variables that were given and are not judged -> why.
     """
 
@@ -128,7 +128,7 @@ class Judged:
 
 
 def judge(
-    run: Run, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
+    run: RunInput, scene: str | Scene, tolerance: Mapping[str, object] | str | float | None = None, *, because: str = ""
 ) -> Judged:
     """Holds a trajectory against the truth of a scene at the trajectory's own times.
 
@@ -142,7 +142,7 @@ def judge(
             one alone is for what decides the scene, or for the only variable. None: 1 % of each main quantity,
             of every force and moment, and of places, velocities, spins and orientations that are given; the time
             of the first slip to the interval between samples. What says that it sticks while it slips never agrees.
-        because: why that is close enough.
+        because: reason for which that is close enough.
 
     Raises:
         InputError: something that was given does not exist or makes no sense.

@@ -88,13 +88,15 @@ class Reference:
         return self.sizes.get(name)
 
     def true(self, name: str, values: FloatArray) -> tuple[FloatArray, float]:
-        """True values of an observable with ``values`` from an engine, and their error bar."""
+        """True values of an observable with ``values`` from an engine, and their error bar; infinite: it has none."""
         item = self.scene.observables[name]
         if item.name == EVENT_ORDER:
             return np.zeros(1), 0.0
         if item.role == Role.EVENT:
             return self.curves[name], max((event.time_high - event.time_low for event in self.events), default=0.0)
-        known = self.curves[name]
+        known = self.curves.get(name)
+        if known is None:  # as a force that is not determinate all the time
+            return np.full_like(values, np.nan), np.inf
         if item.role != Role.RESIDUAL:
             return known, float(self.dataset[name].attrs["error_bar"])
         # Zero for a perfect run: what is left on the truth is what the measurement itself cannot resolve.

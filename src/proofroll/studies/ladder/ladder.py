@@ -41,8 +41,8 @@ class ModelAnswer:
     """Answer of one model.
 
     Attributes:
-        case: what was run; None if its settings make no sense or its engine is missing.
-        result: how that ended.
+        case: the run asked for; None if its settings make no sense or its engine is missing.
+        result: its result.
         values: of the quantity, None if there are none.
         run: its trajectory, if it reached the end.
         timing: wall seconds per simulated second, None if it could not be timed.
@@ -59,10 +59,10 @@ class Ladder:
     """Plans, runs and times; :func:`proofroll.report.ladder.ladder.ladder_content` says what was found.
 
     Attributes:
-        ladder, switches: what is asked.
-        answers: what every model gave, by :func:`key_of`.
+        ladder, switches: models to run and terms to switch.
+        answers: result of every model, by :func:`key_of`.
         truths: by the parameters that a switch puts over the given ones, as text.
-        engines: what every engine tells of itself, or why it cannot.
+        engines: facts of every engine, or the reason why it has none.
 
     Without a ``quantity`` it is what decides the scene, until the time ``until`` [s], by default the usual length, of
     all engines if none are named.

@@ -33,7 +33,7 @@ class LadderModel:
         engine: its name.
         options: put over the preset, formulation and preset among them.
         parameters: of the scene, put over those that were given.
-        asks: what is wanted besides the motion.
+        asks: results wanted besides the motion.
     """
 
     engine: str
@@ -53,9 +53,9 @@ class Rung:
 
     Attributes:
         level: its level.
-        model: what is run; None if there is none.
-        variant: what distinguishes it from the formulation's own, e.g. ``condim=4``; empty for that one.
-        message: why there is none.
+        model: the model to run; None if there is none.
+        variant: its difference from the formulation's own model, e.g. ``condim=4``; empty for that one.
+        message: reason for which there is none.
     """
 
     level: Level
@@ -73,7 +73,7 @@ class Switch:
         kind: ``scene`` or ``engine``.
         model: the model in which it is switched.
         on, off: the model with and without it; None where it cannot be left out.
-        because: what it is for.
+        because: purpose of the term.
     """
 
     term: str
@@ -85,7 +85,7 @@ class Switch:
 
 
 def rungs(engines: Mapping[str, EngineDescription | ProofrollError], requires: frozenset[str]) -> list[Rung]:
-    """The ladder from the least model to the most, each formulation with its best preset that tunes nothing."""
+    """Rungs from the simplest model to the fullest: each formulation, ``matched`` or with its first preset."""
     ladder: list[Rung] = []
     for level in Level:
         before = len(ladder)
@@ -115,9 +115,10 @@ def _with(model: LadderModel, options: Mapping[str, Any]) -> LadderModel:
 def switches(
     ladder: Sequence[Rung], engines: Mapping[str, EngineDescription | ProofrollError], scene: Scene, truth: xr.Dataset
 ) -> list[Switch]:
-    """Every optional term: the scene's in one model of each engine and level, the engine's in each that has it.
+    """Models with and without each optional term.
 
-    A model that refuses the scene has no terms to be switched.
+    Terms of the scene are switched in one model of each engine and level, terms of an engine in each model that has
+    them. Models that refuse the scene are left out.
     """
     switches_of_terms: list[Switch] = []
     models = [
@@ -211,7 +212,7 @@ def need_of_term(
         on: the model with the term, held against the truth that has it.
         off: without it.
         change: of the quantity between the two; None if one of them has no answer.
-        cost: how many times longer it takes with the term; None if that is not known.
+        cost: ratio of the run's times with the term and without; None: not known.
         tolerance: error that is allowed; None: whatever is left anyway.
         bar: error bar of the truth.
         scale: size of the quantity.

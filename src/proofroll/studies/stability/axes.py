@@ -30,7 +30,7 @@ class Axis:
     Attributes:
         name: as the user writes it.
         unit: of its values.
-        meaning: what it does, for a person.
+        meaning: effect of the axis, for a person.
         values: log-spaced as a rule.
         parameters: parameter -> its dependence on the value; the others keep their defaults.
         horizon: the value is the length of the run in natural times.
@@ -62,11 +62,7 @@ class Axis:
 
 
 def chosen(axes: Sequence[Axis], names: Sequence[str]) -> list[Axis]:
-    """The axes of these names; all if there are none.
-
-    Raises:
-        InputError: there is no such axis.
-    """
+    """The axes of these names; all if there are none. Raises InputError if there is no such axis."""
     known = {axis.name: axis for axis in axes}
     for name in names:
         require_known("axis", name, known, "there is no such axis; choose from")

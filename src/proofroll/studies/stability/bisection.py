@@ -1,7 +1,5 @@
 """Finds the coarsest rung of a ladder from which on everything passes, with few and cheap runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from operator import attrgetter

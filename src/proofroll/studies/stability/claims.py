@@ -33,7 +33,7 @@ class Claim:
 
     Attributes:
         engine: name, or ``name[key=value,…]``; every curve with these settings.
-        boundary: which of the two.
+        boundary: ``stable`` or ``accurate``.
         because: why.
         axes: along which; all if empty.
         values: lowest and highest value of the axis; all if empty.
@@ -41,7 +41,7 @@ class Claim:
         same: in natural times the boundary is the same all along each axis.
         number: dimensionless number of the boundary that is claimed to lie in ``between``.
         between: lowest and highest.
-        failure: what is beyond is one of these.
+        failure: kinds of failure allowed beyond it.
         silent: whether the engine is silent about it.
     """
 
@@ -135,9 +135,9 @@ class StabilityFile:
     Attributes:
         name: of the file, without ending.
         title, question: for a person.
-        scene: which scene.
+        scene: name of the scene.
         axes: along which it is taken to its extremes.
-        claims: what is expected.
+        claims: expectations.
         on_request: a report without names has this map only where it is kept.
     """
 

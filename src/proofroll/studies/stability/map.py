@@ -4,8 +4,6 @@ Each point of the map is a search for two boundaries on a ladder of steps or tol
 side, each as fast as its answers come. Every run is a stored case, so an interrupted map resumes where it was.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -76,7 +74,7 @@ class StabilityMap:
 
     Attributes:
         scene: name of the scene.
-        axes, effort: what was asked.
+        axes, effort: question of the map.
         places: the values of the axes.
         points: every engine at every place.
         absent: engine -> why it is not on the map.
@@ -126,7 +124,9 @@ def stability(
     asked = places_of(scene, axes, effort)
     places = [place for place in asked if isinstance(place, Place)]
     measure(scene, places, runner, lambda: tell("the truth", 0))
-    points = [MapPoint(curve, place, _ladder(curve, place)) for curve in curves for place in places]
+    points = [
+        MapPoint(curve, place, place.steps if curve.fixed_step else _TOLERANCES) for curve in curves for place in places
+    ]
     _search(scene, points, effort, runner, tell)
     refused = _refused(points)
     points = [point for point in points if point.curve.engine not in refused]
@@ -152,10 +152,6 @@ def _matched(curves: Sequence[Curve]) -> list[Curve]:
         if key not in kept or curve.facts.settings.get("preset") == "matched":
             kept[key] = curve
     return list(kept.values())
-
-
-def _ladder(curve: Curve, place: Place) -> list[float]:
-    return place.steps if curve.fixed_step else list(_TOLERANCES)
 
 
 def _search(name: str, points: Sequence[MapPoint], effort: Effort, runner: Runner, tell: Progress) -> None:

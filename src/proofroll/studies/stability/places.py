@@ -1,7 +1,5 @@
 """The places of a stability map: the scene at each value of an axis, with its truth and its runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -38,8 +36,8 @@ class Place:
         parameters: of the scene, those that differ from the defaults.
         scene: with them.
         until, every: length and sampling interval of every run [s].
-        yardstick: what runs are measured by, from the truth.
-        problem: why there is no truth here.
+        yardstick: truth and sizes by which runs are measured.
+        problem: reason for which there is no truth here.
     """
 
     axis: str

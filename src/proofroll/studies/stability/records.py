@@ -1,7 +1,5 @@
 """Records of a stability map, for its file, its text, its verdict and its drawings."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -27,11 +25,11 @@ class Boundary:
         reached: something holds, and something beyond it fails.
         numbers: dimensionless numbers of that step, by name.
         beyond: the next step or tolerance, which fails.
-        failure: what happens there.
+        failure: kind of failure there.
         silent: the engine does not report it.
         error: of the deciding observable there, in parts of its range.
         time: when the failure shows [s].
-        message: how the run there ended.
+        message: last words of the run there.
     """
 
     largest: float | None
@@ -55,17 +53,17 @@ class BoundaryPoint:
         until: length of every run [s].
         period: natural time of the scene there [s].
         largest_stable, largest_accurate: of the two boundaries.
-        boundary: which of them is to be shown; ``failure``, ``silent`` and ``message`` are its own.
+        boundary: name of the one to show; ``failure``, ``silent`` and ``message`` are its own.
         sides: both, ``stable`` and ``accurate``.
         least_error: of all stable runs.
         finest: the finest step or tolerance that was run.
         too_slow: the first that was not, for its many steps or for runs that met the limit of time.
         timed_out: a run met that limit.
         runs: how many there were.
-        problem: why there is no truth here.
+        problem: reason for which there is no truth here.
         reproducer: path of a program that shows the failure.
         reproducer_needs: packages that it imports.
-        reproducer_note: why it needs proofroll, or why there is none.
+        reproducer_note: reason for which it needs proofroll, or for which there is none.
     """
 
     engine: str
@@ -133,11 +131,11 @@ class StabilityStudy:
     """A map with counts on top.
 
     Attributes:
-        scene, axes, periods, effort: what was asked.
+        scene, axes, periods, effort: question of the study.
         accurate: part of the range that an accurate run holds.
         runs: how many there were.
-        boundaries: how many points have a failure beyond them.
-        silent: how many of these the engine did not report.
+        boundaries: number of points with a failure beyond them.
+        silent: number of these that the engine did not report.
         refused: points that the engine refused before the run.
         wrong_model: points that were not run, for what the engine built is not the scene.
         failures: kind of failure -> how many points.
@@ -145,13 +143,13 @@ class StabilityStudy:
         meanings: kind of failure -> what it is.
         step_symbols: dimensionless number of a step -> its symbol.
         points: every engine at every place.
-        explanations: which number explains which boundaries.
-        findings: what stands out, as sentences.
+        explanations: numbers that explain boundaries.
+        findings: conclusions, as sentences.
         places: the values of the axes.
         absent: engine -> why it is not on the map.
         hosts: machine of a cluster -> how many of the results it made.
         measured: when, where and with what.
-        claims: what was held against it.
+        claims: judgements of the claims in its file.
     """
 
     study: str = "stability"

@@ -1,7 +1,5 @@
 """Writes a self-contained program for every boundary of a map that shows the failure with the engine alone."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

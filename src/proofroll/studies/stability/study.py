@@ -1,7 +1,5 @@
 """A stability map as it is kept: counts, boundaries, what explains them, and what depends on what it should not."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, replace

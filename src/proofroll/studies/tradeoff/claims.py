@@ -95,7 +95,7 @@ class Cheapest:
     Attributes:
         tolerance: of the quantity.
         engine: any of these, ``name[key=value,…]``.
-        because: why it is.
+        because: reason.
         levels: among which rungs of the ladder; all engines proper if empty.
     """
 
@@ -169,7 +169,7 @@ class TradeoffClaims:
     Attributes:
         name: of the file, without ending.
         title, question: for a person.
-        scene, parameters, until, quantity: what is swept.
+        scene, parameters, until, quantity: question of the sweep.
         over: parameter -> values; the range over which the best points are checked.
         holds, converges, cheapest: the claims; the first two are judged exactly.
     """
@@ -216,11 +216,7 @@ def claims_for(scene: str) -> TradeoffClaims | None:
 
 
 def load_claims(path: str | Path) -> TradeoffClaims:
-    """Reads a file.
-
-    Raises:
-        InputError: it is broken, or is about something else.
-    """
+    """Reads a file. Raises InputError if it is broken, or is about something else."""
     return _claims(Path(path), study_content(Path(path), STUDY))
 
 

@@ -79,7 +79,7 @@ class Question:
         return case_of(self.scene, scene, self.parameters, facts, self.until, every, time_limit=time_limit)
 
     def cases(self, scene: Scene, facts: EngineFacts, every: float) -> tuple[Case, ...]:
-        """Cases of a point: its run, and with an adaptive step that over few samples."""
+        """Cases of a point: its run; of an adaptive step also one with sparse samples."""
         adaptive = facts.resolution not in {None, "dt"}
         return tuple(self.case(scene, facts, each) for each in ((every, self.sparse) if adaptive else (every,)))
 
@@ -137,7 +137,7 @@ class Floor(NamedTuple):
     Attributes:
         best: the most accurate run; those with smaller steps are worse.
         error: of that run.
-        scatter: what the next smaller step changes.
+        scatter: change by the next smaller step.
     """
 
     best: CurvePoint
@@ -238,7 +238,8 @@ def judged(points: Sequence[CurvePoint], references: Mapping[float, Reference], 
 
 def measured(point: CurvePoint, reference: Reference, run: xr.Dataset) -> CurvePoint:
     """The point with its observables and their errors; an event in a wide bracket is as wrong as that is half wide."""
-    curves = held_against.observed(reference, run)
+    given = held_against.observed(reference, run)
+    curves = {name: values for name, values in given.items() if np.isfinite(reference.true(name, values)[1])}
     return replace(
         point,
         curves=curves,

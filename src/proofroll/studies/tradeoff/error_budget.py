@@ -5,8 +5,6 @@ from the truth is at most |x(h) - x(0)| (the time step) + |x(0) - truth| (the mo
 what keeps the fine runs from coming closer to one another is the floor of round-off and solver tolerances.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
@@ -17,7 +15,9 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.convergence import Limit, floor_text, observed_order, richardson, scatter_of, size, tightest
 from proofroll.core.number_format import number
+from proofroll.core.observable import Observable, Role
 from proofroll.core.verdict import round_off_of
+from proofroll.running.case import EngineFacts
 from proofroll.running.timing import CONFIDENCE
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint
 from proofroll.studies.tradeoff.records import CurveBudget
@@ -56,8 +56,10 @@ class Order(NamedTuple):
     finest: float | None = None
 
 
-def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: str, magnitude: float) -> CurveBudget:
-    """The budget of one quantity, with its true values, unit and the size of its numbers, along a curve.
+def budget(
+    curve: Curve, quantity: str, every: float, true: FloatArray, observable: Observable, magnitude: float
+) -> CurveBudget:
+    """The budget of one quantity, with its true values, observable and the size of its numbers, along a curve.
 
     Order and limit come from runs that are sampled at ``every`` [s]. One with a longer step has fewer samples, and only
     the coarsest of them counts, as the coarse end.
@@ -93,7 +95,8 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         elif stalled:  # what lies in the scatter of the finest runs shows no order
             scatter = _ABOVE * max(differences[-2:])
             seen = list(itertools.takewhile(lambda difference: difference > scatter, differences))
-        order = order_of(steps[: len(seen) + 1], seen)
+        moved = max(differences) > round_off_of(curve.facts.precision, magnitude)  # round-off alone has no order
+        order = order_of(steps[: len(seen) + 1], seen) if moved else Order()
     else:
         limit, order = tightest(values), Order()
         # A tolerance that limits nothing any more gives the same run again; one at the floor gives scatter.
@@ -115,7 +118,7 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         order_high=order.high,
         order_from=order.coarsest,
         order_to=order.finest,
-        contradicts_declaration=_contradicted(order, curve.facts.order),
+        contradicts_declaration=_contradicted(order, curve.facts, observable.role),
         floor=floor,
         best_step=single.best.step if single else None,
         coarse=coarse,
@@ -124,12 +127,20 @@ def budget(curve: Curve, quantity: str, every: float, true: FloatArray, unit: st
         fine_step=steps[-1],
         fine_error=error,
     )
-    return replace(budget_of_curve, sentence=_sentence(budget_of_curve, unit, str(curve.facts.resolution)))
+    return replace(budget_of_curve, sentence=_sentence(budget_of_curve, observable.unit, str(curve.facts.resolution)))
 
 
-def _contradicted(order: Order, declared: int | None) -> bool:
-    """True if the declared order lies above the interval of the observed one; to do better contradicts nothing."""
-    return declared is not None and order.low is not None and order.high is not None and declared > order.high + _SLACK
+def _contradicted(order: Order, facts: EngineFacts, role: Role) -> bool:
+    """True if the observed order lies outside those declared, from the one for this scene to the highest.
+
+    What lowers an order, as a joint that begins to slip within a step, need not happen in a run. A declared order is
+    that of the motion: reactions and residuals may have a higher one, as over a transient.
+    """
+    if facts.order is None or order.low is None or order.high is None:
+        return False
+    if facts.order > order.high + _SLACK:
+        return True
+    return role == Role.MOTION and (facts.highest or facts.order) < order.low - _SLACK
 
 
 def order_of(steps: Sequence[float], differences: Sequence[float]) -> Order:

@@ -1,7 +1,5 @@
 """Pareto front: points that no other is both as cheap and as accurate as."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import TypeVar
 

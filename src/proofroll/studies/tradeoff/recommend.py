@@ -1,7 +1,5 @@
 """The cheapest engine, formulation and step that holds a tolerance, from measured points alone."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -53,9 +51,9 @@ class Answer:
     """Advice for a tolerance of a quantity.
 
     Attributes:
-        quantity, unit: what matters.
+        quantity, unit: observable whose error matters, and its unit.
         tolerance: in that unit.
-        margin: how many times smaller an error must be.
+        margin: factor by which an error must be smaller.
         choice: the cheapest point that holds the tolerance with margin, and at every corner of the range.
         ties: others that hold it and whose cost is not distinguishable from the choice's, for their intervals overlap.
         runner_up: the cheapest of another engine or formulation.
@@ -90,7 +88,7 @@ class Recommendation:
     """An answer with its circumstances.
 
     Attributes:
-        answer: what to use.
+        answer: the recommended engine and setting, as a sentence.
         scene, parameters: where.
         budget: wall seconds per simulated second that may be spent, or None.
         affordable: whether the choice is within it.

@@ -1,7 +1,5 @@
 """Records of a trade-off, for its file, its text, its advice and its drawings."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,7 +19,7 @@ class MeasuredCost:
         interval: lowest and highest, with ``confidence``; None where it was measured once.
         rounds: the measurements, in the order of the rounds, which are those of all points: a ratio of two costs can
             be taken round by round.
-        measurements: how many they are.
+        measurements: number of measurements.
     """
 
     seconds_per_second: float | None = None
@@ -44,7 +42,7 @@ class SparseRun:
         every: sampling interval [s].
         error: largest distance from the truth, by observable.
         dense_error: that of the run over many samples.
-        message: how the run ended.
+        message: last words of the run.
     """
 
     every: float
@@ -61,7 +59,7 @@ class Corner:
         parameters: where.
         errors: largest distance from the truth, by observable; empty if the run did not reach the end.
         relative: the same in parts of the observable's scale there.
-        message: how the run ended.
+        message: last words of the run.
     """
 
     parameters: dict[str, FloatOrInf]
@@ -82,7 +80,7 @@ class MeasuredPoint(MeasuredCost):
         id: number of the point in its study.
         engine, curve, level, settings, resolution, step, order, caveat, family, precision: which, and what it says of
             itself.
-        status, message, host: how the run ended, and on which machine of a cluster.
+        status, message, host: end of the run, and the machine of a cluster that made it.
         error: largest distance from the truth, by observable; None: not finite.
         envelope: the largest of that and of the next finer runs.
         sparse: the run over few samples; None with a fixed step.
@@ -151,12 +149,12 @@ class CurveBudget:
         order_from, order_to: coarsest and finest step of the runs that follow that power law [s]; outside them the
             order is not claimed.
         declared: order that the engine declares.
-        contradicts_declaration: whether that lies above the interval of the observed one.
-        floor: how far the finest runs scatter, where refining them no longer helps; None: not reached.
+        contradicts_declaration: whether the observed one lies below it or, of the motion, above what it has at best.
+        floor: scatter of the finest runs, where refining them no longer helps; None: not reached.
         best_step: step of the most accurate run where finer ones are worse, for they round more often in single
             precision [s]; None: there is none.
         truth: error bar of the truth; None: it is not finite.
-        coarse, fine: what dominates at either end.
+        coarse, fine: dominant part of the error at either end.
         coarse_step, fine_step: those ends.
         fine_error: error at the fine end.
         sentence: all this in one.
@@ -197,21 +195,21 @@ class TradeoffStudy:
     """Error against cost.
 
     Attributes:
-        scene, parameters, until, every, quantity: what was swept, and sampled how often [s].
+        scene, parameters, until, every, quantity: question of the sweep; every: interval between samples [s].
         quantities: the observables of the truth.
         points: of all curves, coarse first.
-        dropped: what was not run.
+        dropped: runs that were left out.
         absent: engine -> why it has no curve.
-        budgets: what the errors consist of.
+        budgets: parts of the errors.
         pareto: observable -> numbers of the points that nothing beats, cheapest first.
         pareto_engines: the same without solutions of the scene's own equations.
         truth: its cost.
         over: parameter -> values; the range over which the best points were checked.
-        findings: what stands out, as sentences.
+        findings: conclusions, as sentences.
         brief: whether speeds were measured less often.
         measured: when, where and with what.
         engines: those to which it is restricted; none: all.
-        claims: what was held against it.
+        claims: judgements of the claims in its file.
     """
 
     study: str = "tradeoff"

@@ -1,7 +1,5 @@
 """A trade-off as it is kept: its points, error budgets, fronts and conclusions."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -135,7 +133,7 @@ def _budgets(outcome: Tradeoff) -> list[CurveBudget]:
                 continue
             true = outcome.reference.true(quantity, shown[-1][1])[0]
             if all(values.shape == true.shape for point, values in shown if point.case.every == every):
-                made.append(budget(curve, quantity, every, true, declared.unit, outcome.reference.magnitude(quantity)))
+                made.append(budget(curve, quantity, every, true, declared, outcome.reference.magnitude(quantity)))
     return made
 
 
@@ -194,11 +192,6 @@ def _cost(timing: Timing | None) -> dict[str, Any]:
     }
 
 
-def _beyond(outcome: Tradeoff) -> str:
-    """Reason that a budget gives for what it drops."""
-    return TimeBudget(outcome.budget or 0.0).sentence
-
-
 def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]:
     """Conclusions of the study, as sentences."""
     said = told_hosts(hosts(point.result for point in outcome.points))
@@ -221,13 +214,14 @@ def _conclusions(outcome: Tradeoff, budgets: Sequence[CurveBudget]) -> list[str]
         said.append(f"No tolerance breaks {names}, sampled every {outcome.question.sparse:g} s either.")
     done = [point for point in outcome.points if point.result.status == Status.DONE]
     broken = [point for point in done if not point.errors.get(quantity, np.inf) < BROKEN * scale]
+    reason = TimeBudget(outcome.budget or 0.0).sentence
     beyond = [
         f"{curve.engine} from {max(dropped):g} on"
         for curve in outcome.curves
-        if (dropped := [step for step, why in curve.dropped.items() if why == _beyond(outcome)])
+        if (dropped := [step for step, why in curve.dropped.items() if why == reason])
     ]
     if beyond:
-        said.append(f"Left out, for {_beyond(outcome)}: {', '.join(beyond)}.")
+        said.append(f"Left out, for {reason}: {', '.join(beyond)}.")
     refused = sum(point.result.status == Status.REFUSED for point in outcome.points)
     wrong = sum(point.result.status == Status.WRONG_MODEL for point in outcome.points)
     ended = len(outcome.points) - len(done) - refused - wrong

@@ -1,7 +1,5 @@
 """Every engine, formulation and preset over its usable range of steps or tolerances, on one scene."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any

@@ -4,8 +4,6 @@ Three phases: the sweep, whose runs may go side by side; the check of the best p
 parameters; and the timing, in which one process at a time advances an engine while everything else is idle.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import itertools
@@ -48,7 +46,7 @@ class Tradeoff:
     """Trade-off as found.
 
     Attributes:
-        question: what was swept.
+        question: curves that were swept.
         curves: with their points.
         absent: engine -> why it has no curve.
         references: the truth by sampling interval.
@@ -104,7 +102,7 @@ def tradeoff(
         runner: where the cases run.
         engines: names or ``name[key=value,…]``; all that are installed if empty.
         over: parameter -> values; every combination is a corner of the range.
-        rounds: how often every speed is measured.
+        rounds: number of measurements of every speed.
         brief: measure every speed :data:`BRIEF_ROUNDS` times at most, and that of a long run once; leave out the
             finest steps, but for those of curves that fall with order 2 or more, and most of these, too.
         claimed: engines, ``name[key=value,…]``, whose curves are followed further in a brief study.

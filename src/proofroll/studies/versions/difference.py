@@ -50,7 +50,7 @@ class NumbersApart:
         quantity, unit: of that observable; empty where nothing differs.
         difference: the largest, in its unit.
         relative: the same in parts of its size [1].
-        kind: what that means.
+        kind: meaning of the change.
     """
 
     quantity: str = ""
@@ -65,7 +65,7 @@ class RunInVersion:
     """A case in one of the versions.
 
     Attributes:
-        status, message: how it ended.
+        status, message: its end.
         verdict: of its worst observable.
         declared_order: of the engine with these settings, or None.
         errors: largest error of each observable that is judged.
@@ -101,11 +101,11 @@ class CaseDifference:
     """One case in both versions.
 
     Attributes:
-        comparison, scene, setting, point: which case.
-        old, new: how it went.
-        numbers: how far they are apart; None where one has no trajectory.
+        comparison, scene, setting, point: identity of the case.
+        old, new: outcomes.
+        numbers: differences between both; None where one has no trajectory.
         orders: observed orders that changed.
-        changed: what did of verdicts, ``refused (why) → agrees``.
+        changed: verdicts that changed, ``refused (why) → agrees``.
     """
 
     comparison: str

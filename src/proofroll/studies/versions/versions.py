@@ -1,7 +1,5 @@
 """One engine in two versions: the same cases in both, and what changed."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -86,12 +84,12 @@ class SettingDifference:
 
     Attributes:
         comparison, setting: which.
-        cases: how many points.
+        cases: number of points.
         verdicts: ``old`` and ``new`` -> verdict -> how many cases.
         numbers: of the case whose numbers are farthest apart.
         declared_order: ``old`` and ``new`` -> those of its points, without repetition; none declared is left out.
         orders: observed orders that changed, of all cases.
-        changed: how many cases have another verdict.
+        changed: number of cases with another verdict.
         speed: time of the new version over that of the old one, or None.
     """
 
@@ -132,9 +130,9 @@ class VersionsStudy:
         engine: its name.
         old, new: the versions.
         comparisons: names of what was run; of a robot its file.
-        rows: what changed by comparison and setting.
-        cases: what changed by case.
-        defaults: what changed of the engine's own choices.
+        rows: changes by comparison and setting.
+        cases: changes by case.
+        defaults: changes of the engine's own choices.
         hosts: machine of a cluster -> how many of the results it made.
         robot: of a robot file: its ``file``, ``layers``, and rows ``old`` and ``new``; else None.
         changed: sentences about verdicts that changed.

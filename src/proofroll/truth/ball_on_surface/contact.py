@@ -5,8 +5,6 @@ along the wall it sticks or obeys the law of friction. Integrated by implicit co
 start of a slip nor its end is regularised.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -66,7 +64,7 @@ class ContactRates:
         return System(lambda y: self.rates(y, sticking), lambda y: self._jacobian(y, sticking), self.scale)
 
     def rates(self, y: FloatArray, sticking: bool) -> FloatArray:
-        """ẏ, shape (n, 9)."""
+        """Rates of the states, shape (n, 9)."""
         return np.asarray(self._solve(*self._geometry(y[:, :3]), y[:, 3:6], y[:, 6:], sticking)[0])
 
     def _geometry(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:

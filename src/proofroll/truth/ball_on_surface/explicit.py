@@ -1,7 +1,5 @@
 """Explicit integration (DOP853) step by step, with exact stops: what the polar route integrates with."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

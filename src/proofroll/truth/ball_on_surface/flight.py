@@ -1,7 +1,5 @@
 """Flights and impacts of a ball, until it stays on the wall."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,7 +50,7 @@ class Landed:
     Attributes:
         rest: time from the impact that is the last to be followed to the last of all, since when it stays [s]; it goes
             as far meanwhile as if it stayed.
-        blur: how far off that may be [s], for both routes.
+        blur: uncertainty of that time [s], the same for both routes.
         world: its place [m], velocity [m/s] and spin [rad/s] at the impact that is the last to be followed.
         slip: velocity of its contact point [m/s], shape (3,); None: it rolls.
     """
@@ -123,7 +121,7 @@ def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> Fl
 def flown(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> Leg:
     """Free fall from ``time`` [s] with constant spin until the ball is on the wall again, or to ``until`` [s].
 
-    ``state`` is what the leg has for a state of a ball that touches the wall.
+    ``state`` is the route's own at take-off; it passes through to the leg, flight uses ``world``.
     """
     p, v, w = world
 

@@ -5,8 +5,6 @@ every μ when the first slip comes: when the curve n(t) = |F|/N first reaches μ
 earlier crest reaches, the onset jumps to a later rise: each such crest is an edge of the staircase.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

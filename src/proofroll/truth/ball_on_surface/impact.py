@@ -6,8 +6,6 @@ Particulate Two-Phase Flow, 1993). e_t = 0 stops the contact point, e_t = 1 turn
 37, 1969).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.core.arrays import FloatArray

@@ -1,7 +1,5 @@
 """First slip: its time, its conditioning, and the distance to the next stair edge."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -4,8 +4,6 @@ The orientation R(t) from the ball's axes to the world's obeys Ṙ = [ω]× R, a
 the identity at time 0. Both quadratures take steps between the kinks of the spin and multiply what each step turns.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

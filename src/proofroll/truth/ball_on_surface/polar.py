@@ -6,8 +6,6 @@ friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, s
     d|u|/dt = b · (cos φ, sin φ) - A μk N,      |u| (φ̇ + ė2 · e3) = b · (-sin φ, cos φ).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any

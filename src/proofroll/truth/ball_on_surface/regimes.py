@@ -1,7 +1,5 @@
 """Regimes of the ball in the truth, and the analytic boundaries between them."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 import numpy as np

@@ -8,8 +8,6 @@
 They do not stop where rolling resistance brings a ball to rest: its truth is that of :mod:`truth.stick_slip`.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

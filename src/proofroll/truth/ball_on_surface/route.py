@@ -40,7 +40,7 @@ class Leg:
         start, end: [s].
         sticking: the mode.
         state: at the end; the slip velocity in it is zero unless the ball slips there.
-        why: why it ended.
+        why: reason of its end.
         motion: at times within the leg.
     """
 
@@ -66,8 +66,9 @@ class Route(ABC):
     """One way of integrating the legs, in state variables of its own.
 
     Attributes:
-        name: how the legs are integrated, for a person.
-        impact: what an impact makes of velocity and spin, a function of :mod:`proofroll.truth.ball_on_surface.impact`.
+        name: method that integrates the legs, for a person.
+        impact: law from velocity and spin before an impact to those after it, a function of
+            :mod:`proofroll.truth.ball_on_surface.impact`.
     """
 
     name: ClassVar[str]
@@ -136,13 +137,13 @@ def joined(times: FloatArray, parts: Sequence[tuple[float, Motion]], route: str)
 
 @dataclass(frozen=True)
 class Path:
-    """The whole sequence.
+    """Legs and events of a motion from its start to its end.
 
     Attributes:
         legs: one after another from time 0.
         events: kind and time [s] of each change.
         lands: when a ball that has left the wall is back on it [s], where the path ends; None: not until the end.
-        blurs: how far off events at a time [s] may be that both routes find in one way [s].
+        blurs: uncertainty [s] of events at a time [s] that both routes find by the same method.
     """
 
     legs: list[Leg]

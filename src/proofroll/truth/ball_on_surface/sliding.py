@@ -1,7 +1,5 @@
 """Slip followed by its size and direction, shared by the routes: its beginning, course and end."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import Protocol
 

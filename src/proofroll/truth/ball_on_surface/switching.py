@@ -4,8 +4,6 @@ A :class:`Route` integrates one leg at a time and says why it ended; here is dec
 :func:`proofroll.truth.hybrid.follow` puts the legs together.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import cast
 

@@ -3,8 +3,6 @@
 The equations, their state and their symbols are those of :mod:`proofroll.elements.ball_on_surface.compiled.rolling`.
 """
 
-from __future__ import annotations
-
 import threading
 from dataclasses import dataclass
 from functools import cache

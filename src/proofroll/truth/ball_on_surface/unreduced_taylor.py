@@ -12,8 +12,6 @@ and on a wall that turns along itself, where v + a ω × e1 is the wall's veloci
 Nothing holds the state on the constraints, so that errors show.
 """
 
-from __future__ import annotations
-
 import copy
 import threading
 from collections.abc import Callable
@@ -45,11 +43,7 @@ def available(body: RollingBall) -> bool:
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
-    """The motion at rising times [s].
-
-    Raises:
-        Diverged: the series could not be continued.
-    """
+    """The motion at rising times [s]. Raises Diverged if the series could not be continued."""
     p, v, w = (np.array(part) for part in np.split(states(body, times), 3, axis=1))
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
     return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")

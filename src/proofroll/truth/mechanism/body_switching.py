@@ -1,7 +1,5 @@
 """Route 2 of a mechanism with dry friction, stops or limits of efforts: maximal coordinates, modes by trial."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Sequence
 
@@ -11,9 +9,9 @@ from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import NotUnique, Refused
 from proofroll.elements.mechanism.drives import MODES
 from proofroll.elements.mechanism.rotations import Array
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, SwitchedJoint
+from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, Mode, SwitchedJoint
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, turned
 from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.mechanism.stretches import StretchLaw
@@ -54,16 +52,16 @@ class SwitchedBodies(JointStretches):
 
     def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
         still = [own in HOLDING or k == which for k, own in enumerate(leg.mode[: len(self.joints)])]
-        return state, *self._decided(state, still)
+        return state, *self._decided(state, still, which)
 
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, _: float) -> tuple[Array, Mode, float, float]:
         last, joint, delay = state, self.joints[which], 0.0
         speed = abs(float(self._along(last)[1][which]))
         state, margin = self._struck(last, leg.mode, which, joint.restitution)
         if self._settles(which, speed, joint.restitution):
-            free = self.equations.switched(state[:-1], self.switched(leg.mode))
-            pull = abs(float(self._accelerations(free, state)[which]))
-            delay = self._bouncing(speed * joint.restitution, pull, joint.restitution)
+            laws = (self.equations.switched(state[:-1], self.switched(m)) for m in (turned(leg.mode, which), leg.mode))
+            pull, falling = (abs(float(self._accelerations(law, state)[which])) for law in laws)
+            delay = self._bouncing(speed * joint.restitution, pull, joint.restitution, falling)
             state, margin = self._struck(last, leg.mode, which, 0.0)
         rates = self._along(state)[1]
         still = [
@@ -112,12 +110,13 @@ class SwitchedBodies(JointStretches):
         rows = self.equations.equations.rate_rows(state[:-1].tolist(), self._numbers)
         return np.array([sum(c * acceleration[k] for k, c in r.coefficients.items()) + r.bias for r in rows], float)
 
-    def _decided(self, state: Array, still: Sequence[bool]) -> tuple[Mode, float]:
+    def _decided(self, state: Array, still: Sequence[bool], turns: int | None = None) -> tuple[Mode, float]:
         """The candidate that keeps all its inequalities, and how far it is from breaking one, relative.
 
         Args:
             state: with joints at rest where ``still`` says so.
             still: of each switched joint, besides those that begin at rest.
+            turns: joint that friction has stopped: it is at no stop, however little it has risen from one.
 
         Raises:
             Refused: none does, or there are too many.
@@ -127,7 +126,7 @@ class SwitchedBodies(JointStretches):
         modes = zip(self.motors, self._wanted(state), strict=True)
         efforts = tuple(motor.mode_of(wanted) for motor, wanted in modes)
         choices = [
-            list(_candidates(joint, float(q[k]))) if still[k] or v[k] == 0 else [joint.moving(float(v[k]))]
+            list(_candidates(joint, float(q[k]), k == turns)) if still[k] or v[k] == 0 else [joint.moving(float(v[k]))]
             for k, joint in enumerate(self.joints)
         ]
         open_ = [k for k, choice in enumerate(choices) if len(choice) > 1]
@@ -140,7 +139,7 @@ class SwitchedBodies(JointStretches):
             mode = joints + efforts
             equations = self.equations.switched(state[:-1], self.switched(mode))
             if equations.rank < self.equations.rank + sum(own in HOLDING for own in mode):
-                raise Refused("joints that hold lock more than can move: their forces are not determinate")
+                raise Refused(REDUNDANT)
             force, acceleration = self.holding(equations, state, mode), self._accelerations(equations, state)
             kept = min(self._kept(k, mode[k], float(force[k]), float(acceleration[k]), state) for k in open_)
             best = max(best, (kept, mode))
@@ -201,10 +200,12 @@ class SwitchedBodies(JointStretches):
         return best[1], max(best[0], 0.0)
 
 
-def _candidates(joint: SwitchedJoint, q: float) -> Iterator[str]:
+def _candidates(joint: SwitchedJoint, q: float, turns: bool) -> Iterator[str]:
     """Modes that a joint at rest may take."""
     near = SLACK * max(1.0, abs(joint.low) if np.isfinite(joint.low) else 0.0)
-    if q <= joint.low + near:
+    if turns:
+        yield from ("stick", "forward", "backward")
+    elif q <= joint.low + near:
         yield from ("low", joint.moving(1.0))
     elif q >= joint.high - near:
         yield from ("high", joint.moving(-1.0))

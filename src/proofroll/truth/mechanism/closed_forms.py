@@ -4,8 +4,6 @@ Sources: E. T. Whittaker, Analytical Dynamics, 4th ed., sections 44 (pendulum) a
 E. M. Lifshitz, Mechanics, 3rd ed., section 37 (free body).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -29,7 +27,7 @@ class ClosedForm:
     """A motion, or a part of it, in closed form.
 
     Attributes:
-        title: what it is.
+        title: name of the motion.
         motion: coordinates (times, nq) and velocities (times, nv) of the tree at times, s; None where only a part of
             the motion is known.
         part: the known part at times, s.

@@ -1,7 +1,5 @@
 """Route 2 of a mechanism whose bodies touch: each body alone, modes by trial of all that contacts may do."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 

@@ -1,7 +1,5 @@
 """Equations of route 2 of bodies that touch: each body alone, one linear system of motion, joints and contacts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

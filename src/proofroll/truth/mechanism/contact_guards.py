@@ -1,7 +1,5 @@
 """Guards that end a stretch of contacts, for both routes: values that are negative while a mode lasts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """Stretches of a mechanism whose bodies touch: what its two routes share, which is no equation and no decision."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Route 1 of a mechanism whose bodies touch: joint coordinates, modes by Coulomb's law at all contacts at once."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +8,6 @@ from proofroll.core.errors import NotUnique
 from proofroll.elements.mechanism.contacts.acting import Acting, ContactMode
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
-from proofroll.elements.mechanism.contacts.start import Scale
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import Stretch, Transition
@@ -27,7 +24,7 @@ class ContactTree(ContactStretches):
 
     def begin(self) -> Transition[ContactMode]:
         """See the protocol."""
-        mode, margin = self.dynamics.begin(Scale(1.0, 1.0))  # natural units
+        mode, margin = self.dynamics.begin()
         state = self.dynamics.eliminated(np.concatenate([*self.dynamics.mechanism.start(), [0.0]]), mode)
         return Transition(state, mode, (), margin)
 

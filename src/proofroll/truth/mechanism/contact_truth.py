@@ -1,7 +1,5 @@
 """The truth of a mechanism whose bodies touch, by two routes that share the finder of guards and the shapes."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.elements.mechanism.contacts.acting import kinds

@@ -3,8 +3,6 @@
 What they share is no equation and no decision.
 """
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -70,6 +68,12 @@ class JointStretches(Stretches[Mode]):
         changed = [item for item in changes(self.joints, leg.mode, decided) if item[1] != joint.name]
         happened = ("settle" if settles else "impact", joint.name), *changed
         return Transition(state, decided, happened, np.inf if settles else margin, delay)
+
+
+def turned(mode: Mode, which: int) -> Mode:
+    """The mode with one joint on its way back."""
+    back = {"forward": "backward", "backward": "forward"}
+    return tuple(back.get(own, own) if k == which else own for k, own in enumerate(mode))
 
 
 def guards_of(joints: tuple[SwitchedJoint, ...], mode: Mode) -> list[tuple[int, str]]:

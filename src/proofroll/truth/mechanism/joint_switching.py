@@ -1,7 +1,5 @@
 """Route 1 of a mechanism with dry friction, stops or limits of efforts: joint coordinates, modes by complementarity."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
@@ -9,7 +7,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, held_by
 from proofroll.truth.hybrid import Stretch, Transition
-from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of
+from proofroll.truth.mechanism.joint_stretches import JointStretches, guard_values, noise_of, turned
 from proofroll.truth.mechanism.stretches import StretchLaw
 
 
@@ -59,9 +57,12 @@ class SwitchedTree(JointStretches):
         v[:], margin = self.equations.struck(q, v, which)
         delay, rebound = 0.0, abs(float(v[joint.velocity]))
         if self._settles(which, speed, joint.restitution):
-            pull = abs(float(self.equations.solve(q, v, leg.mode, time=leg.end).acceleration[joint.velocity]))
+            pull, falling = (
+                abs(float(self.equations.solve(q, v, mode, time=leg.end).acceleration[joint.velocity]))
+                for mode in (turned(leg.mode, which), leg.mode)
+            )
             v[joint.velocity] = 0.0
-            delay = self._bouncing(rebound, pull, joint.restitution)
+            delay = self._bouncing(rebound, pull, joint.restitution, falling)
         decided, after = self.equations.decided(q, v, leg.end)
         return state, decided, min(margin, after), delay
 

@@ -3,8 +3,6 @@
 A body that can only move in a plane has three coordinates, any other seven; nothing here knows joint coordinates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -206,11 +206,7 @@ class MaximalCoordinates:
         self._compiled: dict[bool, MaximalTaylor] = {}
 
     def taylor(self, long_double: bool = False) -> MaximalTaylor:
-        """The compiled integrator; the first call compiles, seconds.
-
-        Raises:
-            Missing: heyoka is not installed.
-        """
+        """The compiled integrator; the first call compiles, seconds. Raises Missing if heyoka is not installed."""
         if long_double not in self._compiled:
             self._compiled[long_double] = MaximalTaylor(self.lean.equations, self.lean.independent_rows(), long_double)
         return self._compiled[long_double]

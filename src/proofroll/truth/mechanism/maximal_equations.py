@@ -3,8 +3,6 @@
 They are written once in plain additions and multiplications, so that numbers, long doubles and symbols pass through.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

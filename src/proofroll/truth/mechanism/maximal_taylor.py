@@ -4,8 +4,6 @@ The multipliers are solved for in symbols: C M⁻¹ Cᵀ = L D Lᵀ, sparse, eli
 rows that do not depend on each other; they are chosen once, at the start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

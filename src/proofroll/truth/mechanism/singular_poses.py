@@ -1,7 +1,5 @@
 """Poses on the way at which the rows of loops lose rank: there the motion may branch, and no error control passes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,6 @@
 """Stretches of a mechanism in one mode, as all of its routes integrate them: by DOP853 to the first guard."""
 
-from __future__ import annotations
-
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Generic, NamedTuple, TypeVar
@@ -48,15 +47,17 @@ class Stretches(ABC, Generic[ModeT]):
         """Equations of a stretch that begins at a state."""
 
     @staticmethod
-    def _bouncing(rebound: float, pull: float, restitution: float) -> float:
-        """Time until the rebounds after one of this speed are over.
+    def _bouncing(rebound: float, pull: float, restitution: float, falling: float | None = None) -> float:
+        """Time until the rebounds after one of this speed are over; friction makes ``falling`` less than the ``pull``.
 
         Raises:
-            Refused: nothing pulls them back.
+            Refused: nothing pulls back.
         """
+        falling = pull if falling is None else max(falling, 0.0)
         if not pull > 0:
             raise Refused("a rebound is slower than routes follow, and nothing pulls it back")
-        return 2 * rebound / (pull * (1 - restitution))
+        slower = math.sqrt(falling / pull)  # speed of the next impact over that of the rebound
+        return (1 + slower * pull / falling if falling else 1) * rebound / (pull * (1 - restitution * slower))
 
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
         """See the protocol."""

@@ -1,7 +1,5 @@
 """The truth of a mechanism that switches (friction, stops, limits), by two routes that share the finder of guards."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The truth of a mechanism that switches, from the paths of two routes: where they part, events, error bars."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -16,7 +14,7 @@ from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.mechanism.natural_units import Units
-from proofroll.truth.mechanism.two_routes import FACTOR, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
+from proofroll.truth.mechanism.two_routes import FACTOR, JUDGED, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
 
 # Of each step of the two routes, in natural units. With one tolerance their steps, and errors with them, are nearly
 # the same, which a difference does not show: three free bodies of twelve were 1.7 times their bars off.
@@ -54,12 +52,12 @@ def two_route_motion(
     """The motion with its error bars.
 
     Args:
-        mechanism: what moves.
+        mechanism: bodies and joints.
         paths: of both routes, in their own units.
         one: record of the first, which is taken to be true, in SI units as all that follows.
         two: of the second, matched to it.
         routes: their names.
-        reason: why the question is ill-posed from the horizon on, if it is.
+        reason: cause for which the question is ill-posed from the horizon on; empty: it is not.
         units: those of the paths.
         kinds: part of a mode that both routes agree on.
         pressed: forces of contacts by both routes, (times, contacts, 3).
@@ -70,10 +68,10 @@ def two_route_motion(
     if pressed is not None:
         fields["pressed"], others["pressed"] = pressed
     placed = masked.placed(mechanism)
-    bars, differences, least = {}, {}, round_off(fields, placed)
+    bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
-        bars[field] = np.maximum.accumulate(FACTOR * difference + least[field])
+        bars[field] = np.maximum.accumulate(FACTOR * difference + least[field]) + step[field]
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
@@ -81,6 +79,15 @@ def two_route_motion(
     happened = tuple(event for event in _events(*paths, units.time) if event.time < horizon)
     force = None if pressed is None else pressed[0]
     return TwoRouteMotion(masked, bars, differences, horizon, [], determinate, routes, None, happened, reason, force)
+
+
+def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, float]:
+    """Error that the tolerance of one step allows in each field: routes agree to less than that by chance alone."""
+    ones = {name: np.ones_like(getattr(record, name)[:1]) for name in JUDGED}
+    natural = units.record(mechanism, replace(record, time=record.time[:1], residual=record.residual[:1], **ones))
+    sizes = {name: float(largest(getattr(natural, name))[0]) for name in ones}
+    sizes |= {"points": units.length, "energy": units.force * units.length, "pressed": units.force}
+    return {name: TOLERANCES[0] * size for name, size in sizes.items()}
 
 
 def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:

@@ -6,8 +6,6 @@ bar. Where a start moved by :data:`NUDGE` leads farther away than :data:`CHAOS`,
 the horizon.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -47,11 +45,11 @@ class TwoRouteMotion:
         differences: largest difference between the two routes, by field, up to the horizon.
         horizon: s; inf where it lies beyond the last time.
         branches: times, s, at which the motion, known in closed form, passes singular poses of its loops.
-        determinate: which components of the wrenches are, (joints + loops, 6).
-        routes: what was computed, the one taken first.
+        determinate: mask of determinate components of the wrenches, (joints + loops, 6).
+        routes: computed motions, the one taken first.
         checked_by: a closed form that knows a part of the motion, and its largest difference from the truth.
-        events: what switched on the way.
-        reason: why the question is ill-posed from the horizon on.
+        events: switches on the way.
+        reason: cause for which the question is ill-posed from the horizon on.
         pressed: forces of contacts on their first bodies [N], (times, contacts, 3), NaN where they are not determinate;
             None: there are no contacts.
     """
@@ -173,11 +171,7 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float
 
 
 def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
-    """Two routes that part without chaos have taken different branches.
-
-    Raises:
-        Diverged: they have.
-    """
+    """Raises Diverged if two routes part without chaos, for then they have taken different branches."""
     parted = np.flatnonzero((_apart(one, precise) > BRANCH) & ~chaotic)
     if len(parted):
         raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")

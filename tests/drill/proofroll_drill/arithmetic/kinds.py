@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -80,7 +81,7 @@ def took_effect(kind: Arithmetic, folder: Path) -> str:
         [kind.python, "-c", _PROBE], env=kind.variables(folder), capture_output=True, text=True, check=False
     )
     if done.returncode:
-        last = (done.stderr.strip().splitlines() or [f"its process ended with {done.returncode}"])[-1]
+        last = (done.stderr.strip().splitlines() or [f"its process ended by {_signal(done.returncode)}"])[-1]
         return f"this machine cannot: {last}"
     found = json.loads(done.stdout)
     asked = kind.environment.get("OPENBLAS_CORETYPE")
@@ -90,6 +91,11 @@ def took_effect(kind: Arithmetic, folder: Path) -> str:
         return f"this OpenBLAS has no kernels for {asked}"
     left = set(kind.environment.get("NPY_DISABLE_CPU_FEATURES", "").split()) & set(found["features"])
     return f"numpy still uses {', '.join(sorted(left))}" if left else ""
+
+
+def _signal(code: int) -> str:
+    """Exit status in words: on a processor without the instructions it is SIGILL."""
+    return signal.Signals(-code).name if code < 0 else f"exit status {code}"
 
 
 def make_ready(kind: Arithmetic) -> None:

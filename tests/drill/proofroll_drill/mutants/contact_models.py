@@ -98,15 +98,15 @@ class FrictionOff(ContactMutant):
         return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=0.0))
 
 
-class FrictionOnePercent(ContactMutant):
-    """A hundredth more friction."""
+class FrictionTwoPercent(ContactMutant):
+    """Two hundredths more friction."""
 
-    fault = "friction of contacts 1 % off"
-    named = ("friction of all contacts is 1.01",)
+    fault = "friction of contacts 2 % off"
+    named = ("friction of all contacts is 1.02",)
 
     def other(self, mechanism: Mechanism) -> Mechanism:
-        """A hundredth more of each pair."""
-        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.01 * pair.friction))
+        """Two hundredths more of each pair."""
+        return of_pairs(mechanism, lambda pair: dataclasses.replace(pair, friction=1.02 * pair.friction))
 
 
 class Pyramid(ContactDynamics):

@@ -35,8 +35,8 @@ def test_of_two_fitted_numbers_that_explain_the_same_neither_is_told() -> None:
 
 
 def test_what_a_method_does_by_itself_takes_the_proof_from_others() -> None:
-    """A factor within a hundredth of one accuses nobody, and what needs more free numbers does not take its place."""
-    coarse = dataclasses.replace(FITTED, id="z", says="")
+    """A number within a hundredth of the scene's accuses nobody, and what needs more does not take its place."""
+    coarse = dataclasses.replace(FITTED, id="z", change=9e-3)
     assert _told(coarse, dataclasses.replace(FITTED, fitted=3)) == []
 
 

@@ -146,6 +146,10 @@ def test_efforts_go_through_the_gear_and_the_limit_is_at_the_joint(more: dict[st
             "actuators.0.target = 'kick': there is no such parameter",
         ),
         (
+            '[[actuators]]\nname = "a"\njoint = "j"\nkind = "torque"\ntarget = "= sin(2*pi*T)"',
+            "actuators.0.target = 'T': there is no such parameter; choose from t",
+        ),
+        (
             '[[couplings]]\nname = "g"\njoint_a = "j"\njoint_b = "j"\nratio = 1',
             "couplings.g.joint_b = 'j': a coupling connects",
         ),

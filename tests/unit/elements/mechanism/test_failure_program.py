@@ -45,7 +45,12 @@ def written(engine: str, options: dict[str, Any]) -> str:
 @pytest.mark.parametrize(
     ("engine", "options", "needs"),
     [
-        ("mujoco", {"formulation": "joints", "preset": "default", "dt": 0.05}, {"mujoco", "numpy"}),
+        pytest.param(
+            "mujoco",
+            {"formulation": "joints", "preset": "default", "dt": 0.05},
+            {"mujoco", "numpy"},
+            marks=pytest.mark.drill,
+        ),
         ("exudyn", {"formulation": "redundant", "preset": "default", "dt": 0.05}, {"exudyn", "numpy"}),
         ("pinocchio", {"formulation": "null_space", "preset": "default", "dt": 0.1}, {"numpy", "pinocchio", "scipy"}),
     ],

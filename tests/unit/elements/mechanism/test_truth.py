@@ -25,6 +25,7 @@ def andrews(scene):
     return scene("andrews_squeezer"), find_truth(scene("andrews_squeezer"), np.array([0.0, 0.03]), 1e-12)
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 def test_andrews_truth_has_the_agreed_digits(andrews):
     """Coordinates agreed by three independent programs to 3e-13 lie within twice that."""
@@ -42,6 +43,7 @@ def test_andrews_truth_has_the_agreed_digits(andrews):
             assert truth.record.q[-1, at][0] == pytest.approx(expected[joint.name], abs=1e-12)
 
 
+@pytest.mark.drill
 def test_published_digits_are_good_to_a_nanoradian_only(andrews):
     """They differ from the truth by 1.1e-9 and 1.4e-9 rad, fifty times its error bar and more."""
     mechanism, truth = andrews
@@ -56,6 +58,7 @@ def test_published_digits_are_good_to_a_nanoradian_only(andrews):
     assert truth.bars["q"][-1] < 2e-11
 
 
+@pytest.mark.drill
 @pytest.mark.arithmetic
 def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
     """The nutation of a top by elliptic functions lies within the bar that two routes gave."""
@@ -68,6 +71,7 @@ def test_error_bar_covers_a_closed_form_that_had_no_part_in_it(scene):
     assert truth.bars["q_WB"][-1] < 1e-11
 
 
+@pytest.mark.drill
 def test_chaos_has_a_horizon(scene):
     """Doubles and long doubles part near 9 s; from then on the error bar says so."""
     pytest.importorskip("heyoka")
@@ -103,6 +107,7 @@ def test_growth_is_the_same_by_another_arithmetic(scene, monkeypatch):
     assert by_steps == pytest.approx(by_series, rel=1e-4)
 
 
+@pytest.mark.drill
 def test_singular_poses_are_passed_by_the_closed_form(scene):
     """Where error control stalls, the closed form is the truth and equal steps of another route its witness."""
     truth = find_truth(scene("four_bar", windows=1), np.array([0.0, 1.0]))
@@ -110,6 +115,7 @@ def test_singular_poses_are_passed_by_the_closed_form(scene):
     assert truth.bars["points"][-1] < 1e-8
 
 
+@pytest.mark.drill
 def test_singular_poses_without_a_closed_form_are_refused(scene):
     """The reason and the time are said."""
     with pytest.raises(Refused, match=r"at t = 0.382.*; end before it \(near t = 0.382 s the rows of the loops lose"):
@@ -130,6 +136,7 @@ def test_a_joint_that_reaches_its_limit_is_refused(scene):
             assert find_truth(mechanism, times).horizon == np.inf
 
 
+@pytest.mark.drill
 def test_a_joint_that_swings_to_its_very_limit_stays_within(scene):
     """A pendulum from rest at its limit comes back to it, by round-off above or below: that does not decide."""
     pytest.importorskip("heyoka")
@@ -139,6 +146,7 @@ def test_a_joint_that_swings_to_its_very_limit_stays_within(scene):
         assert find_truth(mechanism, np.linspace(0, 1.0, 3)).horizon == np.inf
 
 
+@pytest.mark.drill
 def test_routes_on_different_branches_are_no_truth(scene, monkeypatch):
     """Should one route change its branch without a word, the difference is not taken for an error bar."""
     pytest.importorskip("heyoka")
@@ -168,6 +176,7 @@ def test_indeterminate_reactions_are_not_given(scene):
     assert (np.isnan(wrench) == [False, False, True, True, True, False]).all()
 
 
+@pytest.mark.drill
 def test_a_heavy_slider_drives_its_crank_through_the_dead_point(scene):
     """At a million times the crank's mass its speed peaks for a short moment, and no route takes that for a stall."""
     heavy = scene("slider_crank", slider_mass=4e5)
@@ -215,6 +224,7 @@ def test_bodies_without_inertia_are_carried_by_others(monkeypatch):
     assert np.abs(still).max() < 1e-12  # nothing pulls at a tool without mass
 
 
+@pytest.mark.drill
 def test_moving_bodies_without_inertia_are_moved_by_what_they_carry():
     """Massless bodies and points between joints: both routes agree on the motion and on every wrench."""
     bodies = (

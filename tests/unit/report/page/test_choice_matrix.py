@@ -177,3 +177,13 @@ def whole() -> ChoiceMatrix:
     chain = [replace(item, study="chain", scene="chain") for item in ARM]
     beta = line(engine="beta", row=3, error=1e-9, cost=0.5)
     return choice_matrix([*ARM, *chain, beta, line(study="ball", group="ball rolling")], STUDIES)
+
+
+def test_a_scene_that_was_left_out_says_nothing_against_those_that_ran() -> None:
+    """A run for which the time did not suffice leaves its group to the scenes that ran; alone it is not judged."""
+    gone = line(study="chain", scene="chain", status="left out", message="no time", verdict="not-judged", error=None)
+    assert at([*ARM, gone], 4)[:2] == at(ARM, 4)[:2]
+    other = replace(gone, engine="beta", status="done", verdict="agrees", error=1e-6, cost=1.0)
+    assert at([*ARM, gone, other], 4)[:2] == at(ARM, 4)[:2], "also where another engine ran it"
+    assert "alpha joints for trees" in choice_matrix([*ARM, gone, other], STUDIES).answer(1e-4, False)
+    assert at([gone], 4).state == Verdict.NOT_JUDGED

@@ -348,6 +348,7 @@ def test_a_failure_that_was_expected_and_does_not_come(tmp_path: Path) -> None:
     assert said.startswith("alpha at speed=4 agrees, expected: failed")
 
 
+@pytest.mark.drill
 def test_at_a_stair_edge_nobody_is_judged_by_the_time_of_slip(tmp_path: Path) -> None:
     """At a stair edge what hangs on the time of slip is ill-posed, agreement included; energy and gap are judged."""
     bounds = {

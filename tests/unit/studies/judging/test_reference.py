@@ -5,14 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
+import xarray as xr
 
 from proofroll.core.engine_abilities import SharesEquations
 from proofroll.core.truth import truth
+from proofroll.core.verdict import Verdict, judge_curve
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.engines.reduced import Reduced
 from proofroll.files.scene_file import load_scene
+from proofroll.running.case import Result, Status
 from proofroll.running.identity import resolve
+from proofroll.studies.judging import held_against
 from proofroll.studies.judging.reference import Reference
+from proofroll.studies.tradeoff.curve import CurvePoint, measured
 from proofroll.truth.ball_on_surface.polar import Polar
 from proofroll.truth.ball_on_surface.rolling import reduced
 from proofroll.truth.ball_on_surface.taylor import SlidingTaylor
@@ -40,6 +46,27 @@ def test_round_off_is_that_of_the_largest_number() -> None:
     assert reference(z=[0.1]).magnitude("z") == 0.2
     assert reference(first_slip=[1.7]).magnitude("first_slip") == 1.7
     assert reference().magnitude("event_order") == 0.0
+
+
+def test_nothing_is_held_against_what_the_truth_does_not_tell() -> None:
+    """Forces that are not determinate all the time are no curve of the truth: engines that tell them are not judged."""
+    held, told = Reference(load_scene("falling_rod"), None, {}, {}), np.ones((3, 2, 3))  # type: ignore[arg-type]
+    true, bar = held.true("contact_forces", told)
+    judgement = judge_curve(
+        "contact_forces", "N", told, true, truth_error_bar=bar, tolerance=1.0, scale=1.0, limit=None
+    )
+    assert judgement.verdict is Verdict.NOT_JUDGED
+    assert judgement.reason == "not judged: the truth does not tell it here"
+
+
+def test_a_trade_off_leaves_out_what_the_truth_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that tells forces beyond the truth's has errors of the rest alone."""
+    places = xr.Dataset({"positions": ("time", np.zeros(2), {"error_bar": 0.0})}, {"time": [0.0, 1.0]})
+    held = Reference(load_scene("falling_rod"), places, {"positions": np.zeros(2)}, {})
+    given = {"positions": np.full(2, 0.5), "contact_forces": np.ones(2)}
+    monkeypatch.setattr(held_against, "observed", lambda *_: given)
+    point = CurvePoint(None, Result(Status.DONE, ""))  # type: ignore[arg-type]
+    assert measured(point, held, places).errors == {"positions": 0.5}
 
 
 def against(formulation: str, **parameters: float) -> str:

@@ -20,7 +20,7 @@ from proofroll.core.errors import InputError
 from proofroll.files.json_data import plain, record
 from proofroll.files.scene_file import load_scene
 from proofroll.report.stability.map import legend, letters, svg
-from proofroll.report.stability.tables import boundary_table, headline, silent_lines
+from proofroll.report.stability.tables import _beyond, boundary_table, headline, silent_lines
 from proofroll.running.case import Status
 from proofroll.running.runner import Runner
 from proofroll.running.store import Store
@@ -157,6 +157,14 @@ def test_reports_of_a_map(small: Any) -> None:
     assert len(set(letters(study).values())) == len(letters(study))
 
 
+def test_what_is_beyond_counts_its_own_silent_failures() -> None:
+    """A failure that is reported does not borrow the mark of another that is silent."""
+    points = [SimpleNamespace(failure="gave up", silent=False), SimpleNamespace(failure="lost phase", silent=True)]
+    assert _beyond(points) == "lost phase 1!"  # type: ignore[arg-type]
+    assert _beyond([*points, points[0]]) == "gave up"  # type: ignore[list-item]
+    assert _beyond([SimpleNamespace(failure="", silent=False)]) == ""  # type: ignore[list-item]
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [
@@ -202,6 +210,7 @@ def programs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, BoundaryPoin
     return {point.engine: point for point in written.points}
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize("engine", ["mujoco", "exudyn", "pinocchio"])
 def test_a_program_shows_the_failure_without_us(programs: dict[str, BoundaryPoint], engine: str) -> None:
     """The program of a boundary runs where proofroll and the other engines cannot be imported, and exits with 1."""
@@ -215,6 +224,7 @@ def test_a_program_shows_the_failure_without_us(programs: dict[str, BoundaryPoin
     assert ": shown" in run.stdout
 
 
+@pytest.mark.drill
 def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     """Where an engine has no program of its own, the program asks proofroll, says why, and exits with 1."""
     axis = Axis("V0", "m/s", "initial speed", [4.0], {"speed": AxisTerm()})
@@ -232,6 +242,7 @@ def test_what_is_ours_is_shown_through_proofroll(tmp_path: Path) -> None:
     assert ": shown" in run.stdout
 
 
+@pytest.mark.drill
 def test_a_program_does_not_cry_wolf(programs: dict[str, BoundaryPoint]) -> None:
     """The same program with a far smaller step says that nothing is shown."""
     point = programs["exudyn"]

@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from proofroll.core.observable import Observable, Role
 from proofroll.files.json_data import plain, record
 from proofroll.running.case import Case, EngineFacts, Result, Status
 from proofroll.studies.tradeoff.curve import Curve, CurvePoint
@@ -19,21 +20,35 @@ STEPS = (0.05, 0.025, 0.01, 0.005, 0.002, 0.001)
 
 
 def made(
-    *, order: int, model: float = 0.0, floor: float = 0.0, declared: int = 2, resolution: str = "dt", bar: float = 1e-13
+    *,
+    order: int,
+    model: float = 0.0,
+    floor: float = 0.0,
+    declared: int = 2,
+    highest: int | None = None,
+    resolution: str = "dt",
+    bar: float = 1e-13,
+    factor: float = 1.0,
+    role: Role = Role.MOTION,
 ) -> CurveBudget:
     """The budget of runs with errors of known parts."""
     facts = EngineFacts(
-        "made", "1", "0", {"dt": 0.1, "rtol": 0.1}, resolution, declared if resolution == "dt" else None
+        "made", "1", "0", {"dt": 0.1, "rtol": 0.1}, resolution, declared if resolution == "dt" else None, highest
     )
     scatter = np.random.default_rng(1)
     curve = Curve("made", facts, None)
     for step in STEPS:
         own = EngineFacts(facts.name, "1", "0", {resolution: step}, resolution, facts.order)
-        values = TRUE + step**order * np.cos(T) + model * T + floor * scatter.uniform(-1, 1, T.size)
+        values = TRUE + factor * step**order * np.cos(T) + model * T + floor * scatter.uniform(-1, 1, T.size)
         error = float(np.max(np.abs(values - TRUE)))
         case = Case("scene", {}, "0", own, 2.0, 0.05)
         curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": bar}))
-    return budget(curve, "z", 0.05, TRUE, "m", 1.0)
+    return budget(curve, "z", 0.05, TRUE, observed(role), 1.0)
+
+
+def observed(role: Role = Role.MOTION) -> Observable:
+    """The observable of the curves, in metres."""
+    return Observable("z", "m", "made", role)
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -46,9 +61,25 @@ def test_order_with_its_interval(order: int) -> None:
     assert found.order_low <= order <= found.order_high
     assert not found.contradicts_declaration
     assert made(order=order, declared=order + 1).contradicts_declaration
-    assert not made(order=order, declared=order - 1).contradicts_declaration
+    assert made(order=order, declared=order - 1).contradicts_declaration
+    assert not made(order=order, declared=order - 1, highest=order).contradicts_declaration
+    assert made(order=order, declared=order - 2, highest=order - 1).contradicts_declaration
     assert found.coarse == found.fine == TIME_STEP
     assert found.floor is None
+
+
+@pytest.mark.parametrize("role", [Role.REACTION, Role.RESIDUAL])
+def test_a_higher_order_contradicts_by_the_motion_alone(role: Role) -> None:
+    """Forces and residuals that converge faster than the motion contradict no declaration; slower ones do."""
+    assert not made(order=2, declared=1, role=role).contradicts_declaration
+    assert made(order=1, declared=2, role=role).contradicts_declaration
+
+
+def test_round_off_has_no_order() -> None:
+    """Runs that differ by round-off alone, as a coordinate that never moves, contradict no declaration."""
+    found = made(order=1, factor=1e-13)
+    assert found.order is None
+    assert not found.contradicts_declaration
 
 
 def test_model_form_is_what_small_steps_leave() -> None:
@@ -77,10 +108,10 @@ def test_the_coarse_end_is_that_of_the_whole_curve(start: int) -> None:
         error = float(np.max(np.abs(values - np.sin(3 * t))))
         case = Case("scene", {}, "0", own, 2.0, every)
         curve.points.append(CurvePoint(case, Result(Status.DONE, "done"), {"z": values}, {"z": error}, {"z": 1e-13}))
-    found = budget(curve, "z", 0.05, TRUE[start:], "m", 1.0)
+    found = budget(curve, "z", 0.05, TRUE[start:], observed(), 1.0)
     assert (found.coarse_step, found.coarse, found.fine) == (0.4, TIME_STEP, MODEL_FORM)
     curve.points[0].curves["z"] = curve.points[0].curves["z"][:-1]
-    assert budget(curve, "z", 0.05, TRUE[start:], "m", 1.0).coarse_step == STEPS[0]
+    assert budget(curve, "z", 0.05, TRUE[start:], observed(), 1.0).coarse_step == STEPS[0]
 
 
 def test_no_model_form_where_there_is_none() -> None:
@@ -124,7 +155,7 @@ def test_an_adaptive_curve_has_no_order() -> None:
 def test_too_few_runs() -> None:
     """From fewer than three runs nothing is concluded."""
     facts = EngineFacts("made", "1", "0", {"dt": 0.1}, "dt", 2)
-    found = budget(Curve("made", facts, None), "z", 0.05, TRUE, "m", 1.0)
+    found = budget(Curve("made", facts, None), "z", 0.05, TRUE, observed(), 1.0)
     assert found.model_form is None
     assert "oo few runs" in found.sentence
 

@@ -37,6 +37,7 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Curve], f
     return {curve.engine: curve for curve in curves}, references[QUESTION.every].sizes["z"]
 
 
+@pytest.mark.drill
 def test_a_curve_over_steps_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
     """The coarsest step is extended until the run is broken, the finest while the error still falls."""
     curves, scale = swept
@@ -49,6 +50,7 @@ def test_a_curve_over_steps_begins_where_it_breaks(swept: tuple[dict[str, Curve]
     assert points[-1].errors["z"] < 1e-4 * scale
 
 
+@pytest.mark.drill
 def test_a_curve_over_tolerances(swept: tuple[dict[str, Curve], float]) -> None:
     """An adaptive formulation is swept over tolerances down to the preset's own."""
     curve = swept[0]["projection[formulation=rotating_frame,preset=matched]"]
@@ -59,6 +61,7 @@ def test_a_curve_over_tolerances(swept: tuple[dict[str, Curve], float]) -> None:
     assert curve.points[0].dense.keys() >= {"z", "gamma", "N"}
 
 
+@pytest.mark.drill
 def test_a_curve_over_tolerances_begins_where_it_breaks(swept: tuple[dict[str, Curve], float]) -> None:
     """Tolerances are loosened until the run is broken, or until something else limits its steps; no clock has a say."""
     curves, scale = swept
@@ -140,6 +143,7 @@ def test_a_curve_ends_where_the_truth_or_round_off_shows_no_more(bar: float, err
     assert found == [[], [QUESTION.step(1 / 500)]]
 
 
+@pytest.mark.drill
 def test_the_truth_is_known_wherever_a_run_is_sampled(swept: tuple[dict[str, Curve], float]) -> None:
     """Samples that engines have off the grid have their true values, and no other sampling interval has any."""
     cases = [point.case for curve in swept[0].values() for point in curve.points]
@@ -157,6 +161,7 @@ def test_a_curve_has_each_tolerance_once() -> None:
     assert len(set(tolerances)) == len(tolerances)
 
 
+@pytest.mark.drill
 def test_nothing_of_a_curve_is_lost(swept: tuple[dict[str, Curve], float]) -> None:
     """Every point has a result, and those that reached the end have an error for every observable."""
     for curve in swept[0].values():

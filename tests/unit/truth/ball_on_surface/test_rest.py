@@ -93,6 +93,7 @@ def test_less_and_less_to_and_fro() -> None:
     assert float(found["down"][-1]) == pytest.approx(way, abs=1e-9)
 
 
+@pytest.mark.drill
 def test_too_much_to_and_fro_is_refused() -> None:
     """Where the reversals shrink so slowly that they would cost minutes, one sentence says so."""
     scene = load_scene("inclined_plane", tilt=0, rolling_resistance=0.025, mu_static=0.3)

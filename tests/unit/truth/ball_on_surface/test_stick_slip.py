@@ -89,6 +89,7 @@ def test_state_at_the_events_of_the_paper() -> None:
     assert float(dataset.z_rate[1]) == pytest.approx(0.23922279, abs=1e-8)
 
 
+@pytest.mark.drill
 def test_start_of_slip_does_not_matter() -> None:
     """No event and no end point moves when what takes the place of a start of slip varies over a decade or more."""
     scene = cylinder(**PAPER)

@@ -27,6 +27,7 @@ from proofroll.elements.mechanism.signal import Formula
 from proofroll.files.scene_file import load_scene
 from proofroll.truth.mechanism.switched_truth import truth_of
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion
+from proofroll_drill.published import true_values
 
 DIGITS = 1e-10  # s, m: of the laboratory's numbers, which have twelve
 TIGHT = 1e-10  # of what two routes leave of a second or two, where 1e-12 is seen
@@ -60,11 +61,13 @@ def times_of(found: TwoRouteMotion, *expected: float) -> None:
 @pytest.mark.drill
 def test_a_sled_turns_about_a_foot_and_rests() -> None:
     """The right foot stops and becomes the pivot, then all rest where the laboratory found it; loads are known."""
-    found = motion("sled", [0.0, 0.557674084, 0.65])
+    (true,) = true_values("sled")
+    stick, rest = true["events"]
+    found = motion("sled", [0.0, stick, true["at"]])
     assert happened(found) == [("stick", "right"), ("rest", "left"), ("rest", "back")]
-    times_of(found, 0.557674084, 0.61801593376, 0.61801593376)
+    times_of(found, stick, rest, rest)
     assert found.record.p_WB[1, 0, :2] == pytest.approx([0.454957557588, 0.050239714905], abs=1e-9)  # time: 9 digits
-    assert found.record.p_WB[2, 0, :2] == pytest.approx([0.458107051786, 0.04850394988], abs=DIGITS)
+    assert found.record.p_WB[2, 0, :2] == pytest.approx(true["values"]["p_WB"][:2], abs=DIGITS)
     w, _, _, z = found.record.q_WB[2, 0]
     assert 2 * np.arctan2(z, w) == pytest.approx(1.665066449554, abs=DIGITS)
     assert found.pressed is not None
@@ -77,49 +80,56 @@ def test_a_sled_turns_about_a_foot_and_rests() -> None:
 @pytest.mark.drill
 def test_a_sled_on_a_slope_turns_about_a_foot_and_rests() -> None:
     """Where the slope unloads a foot, times and place of rest are the laboratory's, too."""
-    found = motion("sled_on_slope", [0.0, 0.95])
+    (true,) = true_values("sled_on_slope")
+    stick, rest = true["events"]
+    found = motion("sled_on_slope", [0.0, true["at"]])
     assert happened(found) == [("stick", "right"), ("rest", "left"), ("rest", "back")]
-    times_of(found, 0.778538681103, 0.898021026008, 0.898021026008)
-    assert found.record.p_WB[1, 0, :2] == pytest.approx([0.3727448404, 0.308618949299], abs=DIGITS)
+    times_of(found, stick, rest, rest)
+    assert found.record.p_WB[1, 0, :2] == pytest.approx(true["values"]["p_WB"][:2], abs=DIGITS)
 
 
 @pytest.mark.drill
 def test_a_sphere_with_its_mass_off_its_centre_slides_and_rolls() -> None:
     """It rolls from the laboratory's time on, and is where that found it; so is the force."""
-    found = motion("eccentric_sphere", [0.0, 2.0])
+    (true,) = true_values("eccentric_sphere")
+    found = motion("eccentric_sphere", [0.0, true["at"]])
     assert happened(found) == [("stick", "contact")]
-    times_of(found, 0.507392746797)
+    times_of(found, *true["events"])
     com = np.array(mechanism_of("eccentric_sphere").bodies[0].com)
     placed = found.record.placed(mechanism_of("eccentric_sphere")).point("sphere", com.tolist())
     assert placed[1, :2] == pytest.approx([0.609266765872, -0.876992530196], abs=DIGITS)
     assert found.pressed is not None
-    assert found.pressed[1, 0] == pytest.approx([-0.709884177522, 0.54154801339, 10.182040041162], abs=DIGITS)
+    assert found.pressed[1, 0] == pytest.approx([*true["values"].values()], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_falling_rod_sticks_slips_back_and_forward() -> None:
     """Its foot sticks, slips against the fall, and turns, at the laboratory's times."""
     found = motion("falling_rod", [0.0, 0.9])
     assert happened(found) == [("slip", "contact"), ("turn", "contact")]
-    times_of(found, 0.572316015251, 0.798506009982)
+    times_of(found, *true_values("falling_rod")[0]["events"])
 
 
+@pytest.mark.drill
 def test_a_rod_of_ten_micrometres_falls_as_one_of_a_metre_does() -> None:
     """Lengths scale a motion under gravity, and times by their root: no length of a metre is taken for granted."""
     found = motion("falling_rod", [0.0, 0.9 * np.sqrt(1e-5)], half=0.5e-5, foot=0.02e-5)
     assert happened(found) == [("slip", "contact"), ("turn", "contact")]
     times = np.array([event.time for event in found.events]) / np.sqrt(1e-5)
-    assert times == pytest.approx([0.572316015251, 0.798506009982], abs=DIGITS)
+    assert times == pytest.approx(true_values("falling_rod")[0]["events"], abs=DIGITS)
 
 
+@pytest.mark.drill
 def test_a_ladder_leaves_its_wall() -> None:
     """With friction it leaves at the laboratory's time."""
     found = motion("ladder", [0.0, 1.0])
     assert happened(found) == [("lift_off", "top")]
-    times_of(found, 0.916021339175)
+    times_of(found, *true_values("ladder")[0]["events"])
     assert found.pressed is not None
     assert found.pressed[1, 1].tolist() == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.drill
 def test_a_smooth_ladder_leaves_its_wall_at_two_thirds() -> None:
     """Without friction the sine of its angle is then two thirds of that at the start."""
     found = motion("ladder", [0.0, 0.499337468618], floor_friction=0.0, wall_friction=0.0)
@@ -128,11 +138,13 @@ def test_a_smooth_ladder_leaves_its_wall_at_two_thirds() -> None:
     assert np.sin(angle) == pytest.approx(2 / 3 * np.sin(1.2), abs=1e-9)
 
 
+@pytest.mark.drill
 def test_a_block_rocks_with_housners_ratio() -> None:
     """Each impact leaves 1 - 1.5 sin² of the block's angle of its speed, and the pivot lifts off."""
     found = motion("rocking_block", [0.0, 0.209019729138, 0.20901972914, 0.6])
     assert happened(found) == [("impact", "left"), ("lift_off", "right"), ("impact", "right"), ("lift_off", "left")]
-    times_of(found, 0.209019729139, 0.209019729139, 0.496197806038, 0.496197806038)
+    first, second, *_ = true_values("rocking_block")[0]["events"]
+    times_of(found, first, first, second, second)
     before, after = found.record.w_WB[1:3, 0, 1]
     assert after / before == pytest.approx(0.793103448276, abs=1e-9)
 
@@ -140,31 +152,29 @@ def test_a_block_rocks_with_housners_ratio() -> None:
 @pytest.mark.drill
 def test_a_spinning_ball_bounces() -> None:
     """Two impacts slide and the third sticks: the closed form of a thrown ball."""
-    found = motion("spinning_bounce", [0.0, 1.5])
+    (true,) = true_values("spinning_bounce")
+    found = motion("spinning_bounce", [0.0, true["at"]])
     assert happened(found) == [("impact", "contact")] * 3
-    times_of(found, 0.319275428407, 0.830116113858, 1.238788662219)
-    assert found.record.p_WB[1, 0] == pytest.approx([0.509272146943, 0.126622625715, 0.134211784211], abs=DIGITS)
+    times_of(found, *true["events"])
+    assert found.record.p_WB[1, 0] == pytest.approx(true["values"]["p_WB"], abs=DIGITS)
     assert found.record.w_WB[1, 0] == pytest.approx([0, -2.857142857143, 15], abs=DIGITS)
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
-    ("friction", "v1", "w1"),
+    ("case", "w1"),
     [
-        (0.1, [0.953280499599, 0.652941904749, 0.335761070770], [3.826906440106, -16.309174821204, 25.276725182747]),
-        pytest.param(
-            0.5,
-            [0.839862857143, 0.511113142857, 0.253103238095],
-            [1.910857142857, -10.280838095238, 17.562057142857],
-            marks=pytest.mark.drill,
-        ),
+        (0, [3.826906440106, -16.309174821204, 25.276725182747]),
+        pytest.param(1, [1.910857142857, -10.280838095238, 17.562057142857], marks=pytest.mark.drill),
     ],
 )
-def test_two_spheres_hit(friction: float, v1: list[float], w1: list[float]) -> None:
+def test_two_spheres_hit(case: int, w1: list[float]) -> None:
     """What sliding and sticking friction make of an impact off the centre."""
-    found = motion("two_spheres", [0.0, 0.15], friction=friction)
+    true = true_values("two_spheres")[case]
+    found = motion("two_spheres", [0.0, true["at"]], **true.get("parameters", {}))
     assert happened(found) == [("impact", "contact")]
-    times_of(found, 0.1)
-    assert found.record.v_WB[1, 0] == pytest.approx(v1, abs=DIGITS)
+    times_of(found, *true["events"])
+    assert found.record.v_WB[1, 0] == pytest.approx(true["values"]["v_WB"], abs=DIGITS)
     assert found.record.w_WB[1, 0] == pytest.approx(w1, abs=DIGITS)
 
 
@@ -186,6 +196,7 @@ def as_bodies(name: str, friction: float, tilt: float, **parameters: float) -> t
     return Mechanism((body,), (joint,), geometries=shapes, pairs=(pair,)), gap
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(
     ("name", "friction", "tilt", "until", "parameters"),
     [
@@ -222,6 +233,7 @@ def test_a_ball_moves_as_its_own_truth_says(
         assert theirs.time_low <= event.time_high + 1e-12
 
 
+@pytest.mark.drill
 def test_infinitely_many_impacts_end_when_their_sum_says() -> None:
     """A ball that bounces to a fifth of its speed settles after one and a half times the time of its fall."""
     mechanism, _ = as_bodies("bouncing_ball", 0.1, 0.0, height=0.05, restitution=0.2)
@@ -272,6 +284,7 @@ def test_friction_of_a_joint_and_of_a_contact_stop_a_foot() -> None:
     assert np.isinf(found.horizon)
 
 
+@pytest.mark.drill
 def test_a_foot_that_slides_rebounds_from_a_stop() -> None:
     """A stop returns half of the speed, and friction at the foot turns with it."""
     found = truth_of(dragged(limits=(-1.0, 0.1), restitution=0.5), np.array([0.0, 0.05, 0.3]))
@@ -338,6 +351,7 @@ def test_a_finger_that_meets_its_stop_lets_the_ball_go() -> None:
         assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
 
 
+@pytest.mark.drill
 def test_a_table_and_the_ball_on_it_keep_their_moment_of_momentum() -> None:
     """A ball that rolls on a free turntable drives it, and what one gains about the axle the other loses."""
     found = motion("free_turntable", [0.0, 0.2])
@@ -453,6 +467,7 @@ def dragged(*, sole: float = 0.2, pull: float = 0.0, **rail: Any) -> Mechanism:
     )
 
 
+@pytest.mark.drill
 def test_a_driven_foot_slides_as_newton_says() -> None:
     """A force that grows in time up to its limit moves a foot against friction by a cubic, then a parabola of time."""
     push = Actuator("push", "rail", "torque", target=Formula("20*t"), limit=4.0)
@@ -465,6 +480,7 @@ def test_a_driven_foot_slides_as_newton_says() -> None:
     assert max(float(bar[-1]) for bar in found.bars.values()) < TIGHT
 
 
+@pytest.mark.drill
 def test_a_finger_pushes_a_ball_and_lets_go() -> None:
     """A servo at its limit pushes a ball over a floor; the tip slips on it, and the bars stay narrow."""
     found = motion("flick", [0.0, 0.07])

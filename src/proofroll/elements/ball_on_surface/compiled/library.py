@@ -1,7 +1,5 @@
 """heyoka, where it is installed."""
 
-from __future__ import annotations
-
 from importlib import metadata, util
 
 import numpy as np

@@ -11,8 +11,6 @@ the wall takes (the rotational block of D is square), S = (1/m + a²/J) 1. Sourc
 Syst. 12(6), 2006, 543-553, sections 2.1-2.4.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Literal
@@ -44,7 +42,7 @@ class Structure:
         curved: on a cylinder, else on a plane.
         resistance: with rolling resistance.
         frame: F = F0 + cos γ Fc + sin γ Fs, columns e1, e2, e3 in the world: entries of F0, Fc, Fs; on a plane F0.
-        gravity: which components of gravity in the world are not zero.
+        gravity: components of gravity in the world that are not zero.
     """
 
     formulation: Formulation

@@ -11,8 +11,6 @@ the slip velocity u obeys u̇ = A F + b, whether the ball slips (F = -μk N u/|u
 The truth's Taylor route and the engine ``reduced`` both rest on these expressions: only routes that do not, check them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache

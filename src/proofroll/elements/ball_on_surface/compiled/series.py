@@ -1,7 +1,5 @@
 """A compiled Taylor integrator that is read between the ends of its steps."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable
 from typing import Any
@@ -48,11 +46,7 @@ class Series:
         self._before = self.x
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s].
-
-        Raises:
-            Diverged: the state is not finite, or fails the check.
-        """
+        """Moves to time t [s]. Raises Diverged if the state is not finite, or fails the check."""
         if t <= self.t:
             return
         series = self._integrator

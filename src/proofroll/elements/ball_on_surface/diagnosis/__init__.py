@@ -1,7 +1,5 @@
 """Diagnosis of a ball: wrong reports of a right motion, and wrong motions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from proofroll.core.diagnosis.fitting import any_gravity

@@ -1,7 +1,5 @@
 """Hypotheses that rolling resistance or friction follow another law than the scene's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Hypotheses that a number of the scene is another in the engine, or that a load acts which the scene has not."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Callable, Iterator
@@ -10,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import known_factor, possible, said_factor, telling
+from proofroll.core.diagnosis.fitting import change_by, known_factor, possible, said_factor
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.diagnosis.equations import Law, has_resistance, is_bounded, residuals_of
 from proofroll.elements.ball_on_surface.model import RollingBall
@@ -64,8 +62,8 @@ def number(
             factor, fitted = _snapped(held.fit(law, 1.0))
             if possible(factor, signed):
                 said = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
-                says = f"the engine moves a ball with {what} {said}" if telling(factor) else ""
-                yield held.cause(name, says, law(factor), remedy, fitted)
+                says = f"the engine moves a ball with {what} {said}"
+                yield held.cause(name, says, law(factor), remedy, fitted, change_by(factor))
 
     return test
 
@@ -92,7 +90,7 @@ def damping(what: str, velocity: float, spin: float) -> Hypothesis:
             if rate > 0:
                 says = f"{what} damped at a rate of {rate:.4g} per second"
                 remedy = "find the engine's own damping, drag or sleeping, and switch it off"
-                yield held.cause("damping", says, law(rate), remedy, 1)
+                yield held.cause("damping", says, law(rate), remedy, 1, rate * evidence.element.natural_time)
 
     return test
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.core.arrays import FloatArray, cross
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, apart, hypothesis
-from proofroll.core.diagnosis.clocks import said_delay
+from proofroll.core.diagnosis.clocks import in_steps, said_delay
 from proofroll.core.diagnosis.fitting import fitted
 from proofroll.core.diagnosis.lines import differing
 from proofroll.core.diagnosis.samples import (
@@ -120,7 +120,8 @@ def starts_late(evidence: Evidence) -> Iterator[Cause]:
     bend = start.acceleration[0] * ahead**2 / 2 if start is not None else 0.0
     before, after = float(np.max(np.abs(off))), float(np.max(np.abs(off - v * ahead - bend)))
     says = f"the start is {said_delay(-ahead, evidence.step)}: the ball has moved before time 0"
-    yield Cause("late", says, "position at time 0", "m", before, after, "sample before the first step", 1)
+    remedy, change = "sample before the first step", in_steps(ahead, evidence.step)
+    yield Cause("late", says, "position at time 0", "m", before, after, remedy, 1, change=change)
 
 
 @hypothesis("contact point", "the contact point is at p + a e1, its velocity v + a w x e1, both known from the truth")
@@ -172,7 +173,8 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
     moment = said_delay(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
     after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
-    yield Cause("stale normal", says, "force", "N", apart(said, true), after, remedy, 1)
+    change = in_steps(delay, evidence.step)
+    yield Cause("stale normal", says, "force", "N", apart(said, true), after, remedy, 1, change=change)
 
 
 @hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")

@@ -52,7 +52,7 @@ class Declared:
         raise NotImplementedError
 
     def point(self, u1: Any, u2: Any) -> tuple[Any, Any, Any]:
-        """Components of the place in the world with the coordinates u [m]."""
+        """World coordinates of the point u of the surface [m]."""
         raise NotImplementedError
 
     @property

@@ -1,7 +1,5 @@
 """Mode of a contact between two changes: open, slip or stick."""
 
-from __future__ import annotations
-
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -88,7 +86,7 @@ def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array,
         kind: see :class:`Acting`.
         frame: its normal and two directions along the surface, as columns.
         heading: of its slip, along these two; of any size.
-        G: what forces along the columns do to accelerations along them, (3, 3); it tells whether there is a line.
+        G: accelerations along the columns by unit forces along them, (3, 3); it tells whether there is a line.
     """
     if kind == "open":
         return OPEN

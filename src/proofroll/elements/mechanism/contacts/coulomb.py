@@ -6,8 +6,6 @@ are speeds, with what the law of impact returns. A friction without a normal has
 surface alone, where its force moves anything.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 

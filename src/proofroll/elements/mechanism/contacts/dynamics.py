@@ -4,8 +4,6 @@ Between two changes each contact is ``open``, it ``slip``s (one row, friction ag
 (three rows). What comes next follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +16,7 @@ from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMo
 from proofroll.elements.mechanism.contacts.coulomb import sure
 from proofroll.elements.mechanism.contacts.geometry import BodyContact
 from proofroll.elements.mechanism.contacts.joint_laws import JointContact, joint_contacts, mode_of_joints
-from proofroll.elements.mechanism.contacts.start import Scale, closed_and_still, scale_of, touches
+from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale, touches
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates, Solution
 from proofroll.elements.mechanism.kinematics import BodyMotion
@@ -54,7 +52,7 @@ class ContactSolution:
     """Accelerations and forces in a mode.
 
     Attributes:
-        state: what they are of.
+        state: bodies and contacts that the forces belong to.
         acceleration: v̇, (nv).
         force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
         determinate: whether each component of these is, (contacts, 3).
@@ -204,10 +202,10 @@ class ContactDynamics:
         K = np.concatenate(rows)
         return _held(state.W, K, K @ v)
 
-    def begin(self, scale: Scale | None = None) -> tuple[ContactMode, float]:
-        """Mode at the start, and how far it is from another one, relative; ``scale``: None: the mechanism's own."""
+    def begin(self) -> tuple[ContactMode, float]:
+        """Mode at the start, and how far it is from another one, relative."""
         q, v = self.mechanism.start()
-        scale = scale or scale_of(self.mechanism)
+        scale = natural_scale(self.mechanism)
         turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != "prismatic"
                  for c in self.contacts]  # fmt: skip
         lengths = np.where(turns, 1.0, scale.length)

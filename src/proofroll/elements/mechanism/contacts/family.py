@@ -1,7 +1,5 @@
 """Families of contact: the laws that engines solve where bodies touch, and the words for one with its numbers."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 from proofroll.elements.ball_on_surface.model import BallCapability

@@ -160,11 +160,7 @@ class BodyContact:
 
 
 def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[BodyContact, ...]:
-    """The contacts of all pairs, in their order.
-
-    Raises:
-        InputError: a pair that cannot touch, or is listed twice.
-    """
+    """The contacts of all pairs, in their order. Raises InputError if one cannot touch, or is listed twice."""
     known = {geometry.name: geometry for geometry in geometries}
     found: list[BodyContact] = []
     listed: dict[frozenset[str], str] = {}

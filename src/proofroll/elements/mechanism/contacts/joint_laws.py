@@ -4,8 +4,6 @@ A stop presses along its coordinate as a smooth surface does along its normal. D
 along a line, or rubs there with a force that nothing else changes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

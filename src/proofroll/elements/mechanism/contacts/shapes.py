@@ -3,8 +3,6 @@
 All is in the frame of the body that a shape is fixed to.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

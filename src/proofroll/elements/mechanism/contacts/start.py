@@ -1,7 +1,5 @@
 """The start of contacts: which touch, which slide, and what no start may have."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -81,14 +79,6 @@ def _largest(values: ArrayLike) -> float:
     return float(np.max(np.abs(values), initial=0.0))
 
 
-def scale_of(mechanism: Mechanism, motion: BodyMotion | None = None) -> Scale:
-    """Scale of a mechanism, by its extent, its gravity and its first velocities."""
-    motion = motion or Tree(mechanism).at(*mechanism.start())
-    length = extent(mechanism, motion) or 1.0
-    speeds = float(np.abs(motion.v_WB).max()) / length, float(np.abs(motion.w_WB).max())
-    return Scale(length, max(float(np.sqrt(np.linalg.norm(mechanism.gravity) / length)), *speeds))
-
-
 def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float) -> tuple[list[bool], list[bool]]:
     """True for each contact that is closed at the start and stays so for a moment, and for those of them that stand.
 
@@ -110,15 +100,11 @@ def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float
 
 
 def check_contacts(mechanism: Mechanism) -> None:
-    """Nothing overlaps at the start, and nothing strikes.
-
-    Raises:
-        InputError: something does.
-    """
+    """Raises InputError if something overlaps or strikes at the start."""
     if not mechanism.contacts:
         return
     motion = Tree(mechanism).at(*mechanism.start())
-    scale = scale_of(mechanism, motion)
+    scale = natural_scale(mechanism)
     for contact, each in zip(mechanism.contacts, touches(mechanism, motion), strict=True):
         between = f"{contact.body_a} and {contact.body_b}"
         if each.gap < -scale.gap:

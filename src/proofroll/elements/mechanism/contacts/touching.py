@@ -1,7 +1,5 @@
 """Contact of two bodies: gap, normal, the place of contact, and the rates of these."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -32,7 +30,7 @@ class Touching(NamedTuple):
         normal: unit vector from b to a; a force along it pushes a away.
         normal_rate: its time derivative [1/s].
         place: where they touch or would, on the shape that is no plane, on a of two spheres [m].
-        place_rate: how fast that place moves, over both bodies [m/s].
+        place_rate: velocity of that place, over both bodies [m/s].
         slide: velocity of the material of a there against that of b [m/s]; along the normal it is the gap's rate.
     """
 

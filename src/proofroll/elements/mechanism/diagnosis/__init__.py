@@ -1,7 +1,5 @@
 """Diagnosis of a mechanism: wrong reports of a right motion, and wrong motions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

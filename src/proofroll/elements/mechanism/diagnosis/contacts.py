@@ -1,7 +1,5 @@
 """Hypotheses of contacts: another coefficient, a contact left out, another law of friction."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 from collections.abc import Iterator, Sequence
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, hypothesis
-from proofroll.core.diagnosis.fitting import once, said_factor
+from proofroll.core.diagnosis.fitting import change_by, once, said_factor
 from proofroll.core.diagnosis.samples import both
 from proofroll.core.diagnosis.vectors import Reported
 from proofroll.core.errors import Refused
@@ -141,7 +139,8 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
             says = f"friction of {name} is {'off' if off else said_factor(factor)}"
             after = float(np.abs(T - (0.0 if off else factor) * full).max())
             proof = "friction of what slides", "N", float(np.abs(T - full).max()), after
-            yield contact_cause("friction", says, *proof, "give each pair its own coefficient", 0 if off else 1)
+            remedy, change = "give each pair its own coefficient", change_by(factor)
+            yield contact_cause("friction", says, *proof, remedy, 0 if off else 1, change=change)
 
 
 @hypothesis("contact left out", "a contact never presses, and its shapes overlap where the truth presses them apart")
@@ -287,10 +286,10 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
     pairs = mechanism.pairs
     before = off(pairs)
 
-    def cause(says: str, after: float, remedy: str, fitted: int = 0) -> Cause:
+    def cause(says: str, after: float, remedy: str, fitted: int = 0, change: float = np.inf) -> Cause:
         name = "acceleration at time 0"
         proof = name, "m/s^2", before, after
-        return contact_cause("contacts at time 0", says, *proof, remedy, fitted, explains=found.size)
+        return contact_cause("contacts at time 0", says, *proof, remedy, fitted, explains=found.size, change=change)
 
     def scaled(factor: float) -> tuple[Any, ...]:
         return tuple(replace(pair, friction=factor * pair.friction) for pair in pairs)
@@ -317,6 +316,7 @@ def at_start(evidence: Evidence) -> Iterator[Cause]:
         float(fit.fun),
         "give each pair its own coefficient",
         1,
+        change_by(float(fit.x)),
     )
 
 

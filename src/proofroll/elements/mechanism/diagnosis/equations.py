@@ -34,7 +34,7 @@ _DEPENDENT = 1e-7
 _GONE = 1e-9
 _TURNS = 0.1
 _CONSISTENT = 1e-3
-_AT_REST = 1e-9  # rad/s, m/s
+_AT_REST = 1e-9  # of the largest rate of a coordinate
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ class Change:
     """Numbers with which an engine may move a mechanism, where they are not its own.
 
     Attributes:
-        mechanism: what moves.
+        mechanism: bodies and joints.
         mass, com, inertia: of the bodies; None: the mechanism's.
         gravity: [m/s²].
         damping, stiffness, torque, armature: factors on those of the joints, or, ``added``, further ones by velocity.
@@ -258,10 +258,11 @@ def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
     found: list[tuple[object, ...]] = []
     joints = switched_joints(mechanism)
     q, v = placed.of_tree() if joints or mechanism.actuators else (np.zeros((len(placed.time), mechanism.nq)),) * 2
+    still = _AT_REST * np.max(np.abs(v), axis=0, initial=0.0)
     for t, places, rates in zip(placed.time.tolist(), q, v, strict=True):
         rest = tuple(
             (
-                np.sign(rates[j.velocity]) if abs(rates[j.velocity]) > _AT_REST else 0.0,
+                np.sign(rates[j.velocity]) if abs(rates[j.velocity]) > still[j.velocity] else 0.0,
                 j.low < places[j.coordinate] < j.high,
             )
             for j in joints

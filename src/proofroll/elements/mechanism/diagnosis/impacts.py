@@ -1,7 +1,5 @@
 """Hypotheses of impacts: they come late, or with the restitution of another pair."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 
@@ -9,11 +7,11 @@ import numpy as np
 
 from proofroll.core.diagnosis import CLOSES, Cause, Evidence, hypothesis
 from proofroll.core.diagnosis.clocks import said_delay
-from proofroll.core.diagnosis.fitting import said_factor
+from proofroll.core.diagnosis.fitting import change_by, said_factor
 from proofroll.elements.mechanism.diagnosis.contacts import SeenContact, contact_cause, touch_of
 
 _DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
-_REAL = 1e-9  # imaginary part of a real root [s]
+_REAL = 1e-9  # imaginary part of a real root, in intervals of samples
 # A gap with a cubic part misses its parabola by m one interval T back, by 5 m one interval ahead, its rate by 12 m / T.
 _OFF, _OFF_RATE = 5.0, 12.0
 
@@ -54,7 +52,8 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
         says = f"restitution of all pairs is {said_factor(factor)}"
         after = float(np.max(np.abs(seen - factor * own) + seen_bars))
         proof = "restitution", "1", before, after
-        yield contact_cause("restitution", says, *proof, "look at what the engine makes of it", 1, explains=len(met))
+        remedy, change = "look at what the engine makes of it", change_by(factor)
+        yield contact_cause("restitution", says, *proof, remedy, 1, explains=len(met), change=change)
 
 
 def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, float]]:
@@ -73,8 +72,9 @@ def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, floa
             misfit = abs(gap[at] + rate[at] * since + a * since**2 / 2 - gap[other])
             off, off_rate = off + _OFF * misfit, off_rate + _OFF_RATE * misfit / abs(since)
         before, after = flights
-        closes = [r.real for r in before.roots if abs(r.imag) < _REAL and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
-        meets = [r.real for r in (before - after).roots if abs(r.imag) < _REAL and t[k] <= r.real <= t[k + 1]]
+        real = _REAL * (t[k + 1] - t[k])
+        closes = [r.real for r in before.roots if abs(r.imag) < real and t[k] <= r.real <= 2 * t[k + 1] - t[k]]
+        meets = [r.real for r in (before - after).roots if abs(r.imag) < real and t[k] <= r.real <= t[k + 1]]
         if closes and meets:
             when = min(meets, key=lambda at: abs(at - min(closes)))
             fell, rose = before.deriv()(when), after.deriv()(when)

@@ -1,14 +1,12 @@
 """Hypotheses that an engine has other gains, gears and limits of actuators, other couplings, or other stops."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, above_round_off, hypothesis
-from proofroll.core.diagnosis.fitting import possible, said_factor, telling
+from proofroll.core.diagnosis.fitting import change_by, possible, said_factor
 from proofroll.core.diagnosis.samples import both
 from proofroll.elements.mechanism.diagnosis.equations import Change, is_motion, of_start, placed_of
 from proofroll.elements.mechanism.diagnosis.residuals import COVERED, best, residuals_of
@@ -91,10 +89,9 @@ def of_actuators(evidence: Evidence) -> Iterator[Cause]:
             if what in {"the limits", "the gears"} and count:  # the equations are not linear in these
                 factor = held.fit(lambda x, law=law: Change(mechanism, effort=law(x)), 1.0)  # type: ignore[misc]  # bound now
             if possible(factor, signed=what != "the limits"):
-                says = (
-                    f"the engine moves it with {what} of the actuators {said_factor(factor)}" if telling(factor) else ""
-                )
-                yield held.cause(f"actuators: {what}", says, Change(mechanism, effort=law(factor)), remedy, count)
+                says = f"the engine moves it with {what} of the actuators {said_factor(factor)}"
+                model = Change(mechanism, effort=law(factor))
+                yield held.cause(f"actuators: {what}", says, model, remedy, count, change_by(factor))
 
 
 def _geared(actuators: tuple[Actuator, ...]) -> bool:
@@ -126,7 +123,8 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
         says = f"the coupling {coupling.name} has the ratio {ratio:.6g}, not {own:.6g}"
         remedy = "the scene's ratio is that of joint_b's rate to joint_a's"
         what = f"rate of {coupling.joint_b} by its coupling", "1/s^2" if alone else "1/s", before, after
-        yield Cause(f"ratio of {coupling.name}", says, *what, remedy, int(not alone), _COVERS)
+        change = change_by(ratio / own)
+        yield Cause(f"ratio of {coupling.name}", says, *what, remedy, int(not alone), _COVERS, change=change)
 
 
 @hypothesis(
@@ -162,7 +160,8 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
             says = f"the joint {joint.name} {does} at {limit + shift:.6g}, not at its stop at {limit:.6g}"
             remedy = "look at the place of the stop, at the joint's zero, and at how far the stop gives way"
             what = f"{joint.name} at its stop", "rad, m", float(np.max(np.abs(off)))
-            yield Cause(f"stop of {joint.name}", says, *what, float(np.max(np.abs(off - shift))), remedy, 1, _COVERS)
+            after, change = float(np.max(np.abs(off - shift))), abs(shift) / size
+            yield Cause(f"stop of {joint.name}", says, *what, after, remedy, 1, _COVERS, change=change)
 
 
 def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:

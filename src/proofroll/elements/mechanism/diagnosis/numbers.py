@@ -1,7 +1,5 @@
 """Hypotheses that numbers of bodies, joints or springs are others in the engine: of all of a kind, or of one."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 from proofroll.core.diagnosis import Cause, Evidence, Hypothesis, hypothesis
-from proofroll.core.diagnosis.fitting import Residuals, beyond_method, possible, said_factor, telling
+from proofroll.core.diagnosis.fitting import Residuals, change_by, possible, said_factor
 from proofroll.elements.mechanism.diagnosis.equations import Change
 from proofroll.elements.mechanism.diagnosis.residuals import best, residuals_of
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
@@ -36,8 +34,8 @@ def factor_of_all(
         for held in residuals_of(evidence) if has(mechanism) else ():
             factor, fitted = best(held, lambda x: change(mechanism, x))
             if possible(factor, signed):
-                says = f"the engine moves it with {what} {said_factor(factor)}" if telling(factor) else ""
-                yield held.cause(name, says, change(mechanism, factor), remedy, fitted)
+                says = f"the engine moves it with {what} {said_factor(factor)}"
+                yield held.cause(name, says, change(mechanism, factor), remedy, fitted, change_by(factor))
 
     return test
 
@@ -135,8 +133,8 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
                 if not possible(factor, False):
                     continue
                 says = f"the engine moves the body {body.name} with its {what} {said_factor(factor)}"
-                says, remedy = says if telling(factor) else "", f"give {body.name} its {what} once"
-                yield held.cause(f"{what} of {body.name}", says, change(factor), remedy, number)
+                model, remedy = change(factor), f"give {body.name} its {what} once"
+                yield held.cause(f"{what} of {body.name}", says, model, remedy, number, change_by(factor))
         yield from _reordered(held, mechanism, inertia)
         if np.any(com):
             yield from _about_origin(held, mechanism, mass, com, inertia)
@@ -182,8 +180,8 @@ def _about_origin(
 def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Damping or armature in one joint or in all, that the scene does not have.
 
-    Coarse steps have them, too: an armature, or a damping times the natural time, within a hundredth of the inertia
-    that the joint moves at the start.
+    Coarse steps have them, too: an armature, or a damping times the natural time, counts against the inertia that the
+    joint moves at the start.
     """
     mechanism = evidence.element.mechanism
     equations = JointCoordinates(mechanism)
@@ -206,9 +204,9 @@ def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
                 value = -float(slope @ at) / square
                 if np.any(own[has] + value * which < 0):
                     continue
-                told = f"{where} has {what} of {value:.4g} more than the scene gives it"
+                says = f"{where} has {what} of {value:.4g} more than the scene gives it"
                 size = value * {"armature": 1.0, "damping": evidence.element.natural_time}[has]
-                says = told if beyond_method(size, float(np.min(inertia[which > 0]))) else ""
                 remedy = f"set {has} of the joints yourself, also where it is zero"
                 change = Change(mechanism, **{key: value * which})
-                yield held.cause(f"{what} in {where}", says, change, remedy, 1)
+                part = abs(size) / float(np.min(inertia[which > 0]))
+                yield held.cause(f"{what} in {where}", says, change, remedy, 1, part)

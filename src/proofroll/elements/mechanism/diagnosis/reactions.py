@@ -3,8 +3,6 @@
 In a loop not every component is determined; the others are left out, by components in the world.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

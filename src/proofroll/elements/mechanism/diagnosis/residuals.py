@@ -1,7 +1,5 @@
 """Residuals of other models of a mechanism: against its certificate, if that differs, and the states of its run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Hypotheses that an engine gives a joint another axis, or loses terms between bodies, or rows of loops."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -51,7 +49,8 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
             says = f"the joint {joint.name} turns about ({_shown(own)}) of its parent, not about ({_shown(axis)})"
             covered = ("p_WB", "v_WB", "w_WB", "q_WB", "motion", "force", "torque")
             what = (f"turning of {joint.name} across its axis", "rad/s", before, after)
-            yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered)
+            change = float(np.linalg.norm(own - axis))
+            yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, change=change)
 
 
 def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis: FloatArray) -> bool:
@@ -121,7 +120,8 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
         largest = float(np.max(before))
         what = ("first motion and reactions, in tolerances,", "1", largest, left * largest)
         covered = ("motion", *COVERED)
-        yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, explains=int(np.sum(seen)))
+        explains, change = int(np.sum(seen)), float(np.linalg.norm(own - axis))
+        yield Cause(f"axis of {joint.name}", says, *what, _REMEDY, 2, covered, explains=explains, change=change)
 
 
 def _first(element: Any) -> dict[str, FloatArray]:

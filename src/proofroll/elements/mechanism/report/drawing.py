@@ -1,7 +1,5 @@
 """A mechanism at its start, drawn from its own data: bodies, joints with their laws, loops, springs, tracked points."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 

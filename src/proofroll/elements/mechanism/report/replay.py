@@ -1,7 +1,5 @@
 """Mechanisms in the replay: bodies as rods, their joints, springs and tracked points, and what the joints transmit."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import math

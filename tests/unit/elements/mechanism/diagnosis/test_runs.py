@@ -28,6 +28,7 @@ def _told(scene: Scene, run: object, true: object, settled: frozenset[str] = fro
     return [cause.says for cause in diagnose(evidence, hypotheses_of(element))]
 
 
+@pytest.mark.drill
 def test_one_step_early_is_told_of_few_samples() -> None:
     """Eleven samples of a loop that ends a step early tell the step, and no limit of a speed."""
     scene, times = load_scene("four_bar"), np.arange(11) * 0.03
@@ -36,6 +37,7 @@ def test_one_step_early_is_told_of_few_samples() -> None:
     assert said.startswith("every sample is one step (0.002 s) early")
 
 
+@pytest.mark.drill
 @pytest.mark.parametrize(("limit", "named"), [(0.0, True), (-0.5, False)])
 def test_a_stop_is_accused_only_where_the_true_joint_turns_back_at_it(limit: float, named: bool) -> None:
     """A joint that turns back a centimetre too low has another stop, unless something else turns the true one back."""
@@ -56,6 +58,37 @@ def _with_stop(at: float) -> Scene:
 def _fallen_on(at: float) -> xr.Dataset:
     """The truth of it, past the second impact."""
     return truth(_with_stop(at), np.arange(0.0, 1.0, 0.02))
+
+
+def _tilted(angle: float) -> Scene:
+    """A pendulum whose axis is turned by an angle [rad]."""
+    scene = load_scene("pendulum")
+    mechanism = scene.elements[0].mechanism  # type: ignore[attr-defined]  # it is one
+    (joint,) = mechanism.joints
+    axis = Rotation.from_rotvec([0.0, angle, angle]).apply(joint.axis)
+    return replace(scene, elements=(MechanismElement(replace(mechanism, joints=(replace(joint, axis=tuple(axis)),))),))
+
+
+@cache
+def _numbers(what: str, change: float) -> tuple[Scene, xr.Dataset]:
+    """A scene with one number changed by a part of itself, and the beginning of its truth."""
+    if what == "stop":
+        return _with_stop(-change), _fallen_on(-change)
+    scene = _tilted(change) if what == "axis" else load_scene("gear_pair", ratio=-0.5 * (1 + change))
+    return scene, truth(scene, np.arange(0, 0.3, 0.015))
+
+
+@pytest.mark.parametrize(("change", "accuses"), [(3e-3, False), (3e-2, True)])
+@pytest.mark.parametrize(("what", "name"), [("stop", "stops"), ("axis", "joint axis"), ("ratio", "couplings")])
+def test_a_number_within_a_hundredth_of_the_scenes_accuses_nobody(
+    what: str, name: str, change: float, accuses: bool
+) -> None:
+    """Places of stops, axes and ratios of couplings that a method's error moves as well are no causes."""
+    scene, true = _numbers(what, 0.0)
+    (element,), run = scene.elements, _numbers(what, change)[1]
+    (held,) = (item for item in hypotheses_of(element) if item.id == name)
+    (cause,) = (cause for cause in held.test(Evidence(element, [], run, true, 2e-3)) if cause.proven)
+    assert cause.accuses == accuses
 
 
 @cache
