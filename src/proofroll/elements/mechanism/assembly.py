@@ -14,6 +14,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
 CLOSED = 1e-12  # of the size of a mechanism, rad, of its speeds: what round-off leaves of a loop that closes
+_AWAY = 8 * np.finfo(float).eps  # of the distance from the world's origin: round-off of places there
 _ROUNDS = 50  # Newton's steps; from a fair guess it needs five
 _STILL = 1e-12  # least eigenvalue of a mass matrix with ones on its diagonal: below it, round-off decides
 _PART = 1e-6  # of the largest velocity in a motion: less is round-off
@@ -85,11 +86,12 @@ def check_start(mechanism: Mechanism) -> None:
     tree = Tree(mechanism)
     q, v = mechanism.start()
     motion = tree.at(q, v)
-    rows, size = _finite(tree.loop_rows(motion)), extent(mechanism, motion)
+    rows, away = _finite(tree.loop_rows(motion)), float(_AWAY * np.abs(motion.p_WB).max())
+    near = CLOSED * extent(mechanism, motion) + away
     for spring in mechanism.springs:
         ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
         one, two = (tree.point(motion, body, np.array(place))[0] for body, place in ends)
-        if np.linalg.norm(two - one) <= CLOSED * size:
+        if np.linalg.norm(two - one) <= near:
             advice = "its ends are at one place at the start, so that it has no direction; move one"
             raise InputError(f"springs.{spring.name}", f"{spring.body_a} to {spring.body_b}", advice)
     for number, loop in enumerate(mechanism.loops):
@@ -101,15 +103,15 @@ def check_start(mechanism: Mechanism) -> None:
         A, B = motion.R_WB[a] @ loop.frame_a, motion.R_WB[b] @ loop.frame_b
         locked = FACTS[loop.kind].translations
         distance = float(np.linalg.norm(apart if len(locked) == 3 else A[:, list(locked)].T @ apart))
-        if distance > CLOSED * size:
+        if distance > near:
             raise InputError(field, between, f"does not close: its points are {distance:.3g} m apart; {ADVICE}")
         angle = float(np.abs(rows.residual[mine]).max(initial=0.0))
         turned = len(FACTS[loop.kind].rotations) == 3 and np.trace(A.T @ B) < 1
         if angle > CLOSED or turned:
             turn = "half a turn" if turned else f"{angle:.3g} rad"
             raise InputError(field, between, f"does not close: its axes are {turn} apart; {ADVICE}")
-        rate, speed = _opening(rows.C[mine], v)
-        if rate > CLOSED * speed:
+        rate, least_rate = _opening(rows.C[mine], v, away)
+        if rate > least_rate:
             advice = f"v0 opens the loop at {rate:.3g} m/s (or rad/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
     for number, coupling in enumerate(mechanism.couplings, len(mechanism.loops)):
@@ -117,8 +119,8 @@ def check_start(mechanism: Mechanism) -> None:
         apart, sizes = rows.residual[rows.loop == number], np.abs([coupling.offset, *q])
         if abs(apart[0]) > CLOSED * max(1.0, sizes.max()):
             raise InputError(field, between, f"q0 of {coupling.joint_b} is {apart[0]:.3g} rad (or m) off; {ADVICE}")
-        rate, speed = _opening(rows.C[rows.loop == number], v)
-        if rate > CLOSED * speed:
+        rate, least_rate = _opening(rows.C[rows.loop == number], v, 0.0)
+        if rate > least_rate:
             advice = f"v0 opens the coupling at {rate:.3g} rad/s (or m/s); {ADVICE.replace('q0', 'v0', 1)}"
             raise InputError(field, between, advice)
     _check_inertia(mechanism, JointCoordinates(mechanism, 0).inertial(motion)[1])
@@ -126,7 +128,7 @@ def check_start(mechanism: Mechanism) -> None:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
 
 
-def _opening(C: Array, v: Array) -> tuple[float, float]:
-    """Rate at which rows open, and that at which the fastest coordinate alone would open them [m/s, rad/s]."""
+def _opening(C: Array, v: Array, away: float) -> tuple[float, float]:
+    """Rate at which rows open, and what round-off leaves of it in rows of places known to ``away`` [m/s, rad/s]."""
     fastest = np.abs(v).max(initial=0.0)
-    return float(np.abs(C @ v).max(initial=0.0)), float(np.abs(C).max(initial=0.0) * fastest)
+    return float(np.abs(C @ v).max(initial=0.0)), float((CLOSED * np.abs(C).max(initial=0.0) + away) * fastest)

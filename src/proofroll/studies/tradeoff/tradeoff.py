@@ -46,7 +46,7 @@ class Tradeoff:
     """Trade-off as found.
 
     Attributes:
-        question: curves that were swept.
+        question: scene, duration and quantity of the curves that were swept.
         curves: with their points.
         absent: engine -> why it has no curve.
         references: the truth by sampling interval.

@@ -14,14 +14,12 @@ from proofroll.elements.ball_on_surface.dataset import columns
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.ball_on_surface.motion import BallMotion
+from proofroll.truth import SAFETY
 from proofroll.truth.ball_on_surface.orientation import Quadrature, orientation
 
 if TYPE_CHECKING:
     import xarray as xr
 
-# The difference of two routes is a sample of their errors, not a bound: held against a third solution, 17 of 80 random
-# cases were further from it than the routes were from each other, by up to 2.25 times.
-SAFETY = 3.0
 # A route's own round-off: values carry a relative error of some machine epsilons even where the routes agree.
 ROUND_OFF = 4 * np.finfo(float).eps
 # What is a small difference of large numbers, and of which.
@@ -51,7 +49,7 @@ def dataset_of(
 def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
     """Gives each variable of ``result`` the attribute ``error_bar`` in its own unit.
 
-    It is :data:`SAFETY` times the largest difference to ``check``, of the second route, plus ``floor``: what both may
+    It is ``SAFETY`` times the largest difference to ``check``, of the second route, plus ``floor``: what both may
     have in common, relative to the size of the variable [1].
 
     Raises:

@@ -14,8 +14,9 @@ from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.mechanics import always_pressed, natural_speed
 from proofroll.elements.ball_on_surface.model import RollingBall
+from proofroll.truth import SAFETY
 from proofroll.truth.ball_on_surface import taylor
-from proofroll.truth.ball_on_surface.error_bars import SAFETY, dataset_of, put_error_bars
+from proofroll.truth.ball_on_surface.error_bars import dataset_of, put_error_bars
 from proofroll.truth.ball_on_surface.implicit import Implicit
 from proofroll.truth.ball_on_surface.orientation import MATRICES, QUATERNIONS, Quadrature
 from proofroll.truth.ball_on_surface.polar import Polar

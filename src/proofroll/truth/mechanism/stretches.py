@@ -53,11 +53,10 @@ class Stretches(ABC, Generic[ModeT]):
         Raises:
             Refused: nothing pulls back.
         """
-        falling = pull if falling is None else max(falling, 0.0)
         if not pull > 0:
             raise Refused("a rebound is slower than routes follow, and nothing pulls it back")
-        slower = math.sqrt(falling / pull)  # speed of the next impact over that of the rebound
-        return (1 + slower * pull / falling if falling else 1) * rebound / (pull * (1 - restitution * slower))
+        slower = 1.0 if falling is None else math.sqrt(falling / pull)  # speed of the next impact over the rebound's
+        return (1 + (1 / slower if slower else 0.0)) * rebound / (pull * (1 - restitution * slower))
 
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:
         """See the protocol."""

@@ -12,9 +12,10 @@ from proofroll.elements.mechanism.analysis import analysed
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth import SAFETY
 from proofroll.truth.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.mechanism.natural_units import Units
-from proofroll.truth.mechanism.two_routes import FACTOR, JUDGED, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
+from proofroll.truth.mechanism.two_routes import JUDGED, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
 
 # Of each step of the two routes, in natural units. With one tolerance their steps, and errors with them, are nearly
 # the same, which a difference does not show: three free bodies of twelve were 1.7 times their bars off.
@@ -71,7 +72,7 @@ def two_route_motion(
     bars, differences, least, step = {}, {}, round_off(fields, placed), _of_a_step(mechanism, masked, units)
     for field, values in fields.items():
         difference = largest(np.where(np.isnan(values), np.nan, others[field]) - values)
-        bars[field] = np.maximum.accumulate(FACTOR * difference + least[field]) + step[field]
+        bars[field] = np.maximum.accumulate(SAFETY * difference + least[field]) + step[field]
         differences[field] = float(difference[one.time < parted].max(initial=0.0))
     reach = np.maximum(units.length, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + ROUND_OFF * reach)
@@ -121,6 +122,6 @@ def _events(one: Path, two: Path, unit: float) -> Sequence[Event]:
     """The changes of both routes, each with a bracket that holds both times and their round-off; ``unit`` [s]."""
     found = []
     for a, b in zip(one.happenings, two.happenings, strict=False):  # beyond where they part there may be more of one
-        time, wide = unit * float(a.time), unit * (FACTOR * abs(a.time - b.time) + ROUND_OFF * a.time)
+        time, wide = unit * float(a.time), unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * a.time)
         found.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
     return tuple(found)

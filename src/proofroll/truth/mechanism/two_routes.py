@@ -20,11 +20,11 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.record import Record, gathered
 from proofroll.elements.mechanism.rotations import Array
+from proofroll.truth import SAFETY
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.singular_poses import branching, singular_poses, singular_poses_of
 
-FACTOR = 3.0  # of safety: the routes' difference estimates the error, it does not bound it
 CHAOS = 1e-9  # m, 1 (of quaternions): where motions that nobody can tell apart at the start differ by more
 NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: no scene file can say less
 BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only long after the horizon
@@ -110,7 +110,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     for field, values in fields.items():
         others = [np.where(np.isnan(values), np.nan, other[field]) for other in rest]
         difference = np.maximum(largest(others[0] - values), largest(others[0] - others[2]))
-        bar = FACTOR * difference + largest(others[1] - others[2]) + least[field]
+        bar = SAFETY * difference + largest(others[1] - others[2]) + least[field]
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
     # nothing is open in truth: all that is seen is error, and round-off of places and of cosines

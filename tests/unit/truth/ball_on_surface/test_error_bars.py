@@ -7,7 +7,8 @@ import pytest
 import xarray as xr
 
 from proofroll.core.errors import Diverged
-from proofroll.truth.ball_on_surface.error_bars import SAFETY, put_error_bars
+from proofroll.truth import SAFETY
+from proofroll.truth.ball_on_surface.error_bars import put_error_bars
 
 
 def dataset(**values: list[float]) -> xr.Dataset:

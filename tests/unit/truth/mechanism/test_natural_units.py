@@ -11,7 +11,7 @@ import pytest
 from proofroll.core.errors import InputError, Refused
 from proofroll.core.quantity import powers_of
 from proofroll.core.validation import units_of_kind
-from proofroll.elements.mechanism.assembly import check_start
+from proofroll.elements.mechanism.assembly import assembled, check_start
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.contacts.geometry import Geometry
 from proofroll.elements.mechanism.drives import Actuator, Coupling
@@ -188,6 +188,20 @@ def test_loops_and_shapes_have_lengths_too() -> None:
     sled = Units(0.5, 1.0, 1.0).mechanism(mechanism_of("sled"))
     assert sled.geometries[1].radius == 2 * 0.02
     assert own.joints[1].limits is None
+
+
+@pytest.mark.parametrize("turn", np.linspace(0.0, 0.4, 9))
+def test_a_small_mechanism_far_from_the_origin_closes(turn: float) -> None:
+    """Loops of 0.1 mm that close 10 m from the world's origin are accepted: round-off of such places is larger."""
+    base, far = larger(mechanism_of("four_bar"), (1e-4, 1.0, 1e-2)), np.array([10.1, 3.3, 0.0])
+    joints = [
+        replace(
+            joint, position=tuple(far + joint.position) if joint.parent == "world" else joint.position, dependent=k > 0
+        )
+        for k, joint in enumerate(base.joints)
+    ]
+    joints[0] = replace(joints[0], q0=(joints[0].q0[0] + turn,), dependent=False)
+    check_start(assembled(replace(base, joints=tuple(joints))))
 
 
 def test_natural_units_follow_the_scene() -> None:
