@@ -16,11 +16,23 @@ from proofroll.studies.tradeoff.recommend import recommend
 from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 from proofroll.studies.tradeoff.requirements import Requirements
 
+# What a sign of the matrix means.
+CHOICE_MEANINGS = {
+    "agrees": "held",
+    "incomplete": "motion not told whole",
+    "converges": "finer steps come closer",
+    "differs": "another limit or none",
+    "not-judged": "not judged",
+    "refused": "refused",
+    "failed": "no result",
+}
+
 
 def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     """One line per formulation, one column per group of scenes, from the standing in each of its scenes.
 
-    All scenes held: the sign alone; some: how many; none: the sign of the best standing.
+    All scenes held: the sign alone; some: how many of how many; none: the sign of the best standing. The style sheet
+    knows the table by its container, and makes it as narrow as a phone.
     """
     order = [str(item) for item in Verdict]
     rows = dict.fromkeys(name for rows in groups.values() for name in rows)
@@ -31,14 +43,14 @@ def choice_table(groups: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
             states = group.get(name, [])
             held = sum(state == Verdict.AGREES for state in states)
             sign = SYMBOLS[min(states, key=order.index)] if states else ""
-            cells.append(f"{sign} {held} of {len(states)}" if 0 < held < len(states) else sign)
+            cells.append(f"{sign} {held}/{len(states)}" if 0 < held < len(states) else sign)
         lines.append(f"| {name} | " + " | ".join(cells) + " |")
     scenes = max((len(states) for rows in groups.values() for states in rows.values()), default=0)
-    many = "; of several scenes in how many" if scenes > 1 else ""
-    said = f"Motion to 1e-4 of the path with some setting and step that was run: {SYMBOLS[Verdict.AGREES]} held{many}"
-    rest = f"{SYMBOLS[Verdict.CONVERGES]} finer steps come closer, {SYMBOLS[Verdict.DIFFERS]} another limit or none"
-    last = f"{SYMBOLS[Verdict.REFUSED]} refused, {SYMBOLS[Verdict.FAILED]} no result; empty: not run."
-    return "\n".join(lines) + f"\n\n{said}, {rest}, {last}\n"
+    held_in = " (4/7: in 4 of 7 scenes)" if scenes > 1 else ""
+    shown = [word for word in CHOICE_MEANINGS if any(SYMBOLS[word] in line for line in lines)]
+    said = ", ".join(f"{SYMBOLS[word]} {CHOICE_MEANINGS[word]}{held_in if word == 'agrees' else ''}" for word in shown)
+    table = "\n".join(["```{container} matrix", *lines, "```"])
+    return f"{table}\n\nMotion to 1e-4 of the path with some setting and step that was run: {said}; empty: not run.\n"
 
 
 def verdict_table(content: ReportedComparison) -> str:

@@ -165,7 +165,9 @@ def test_the_first_page_shows_the_matrix_of_the_gallery(monkeypatch: pytest.Monk
         assert "{include} gallery/matrix.inc" in (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     two = {"trees": {"alpha": ["agrees", "differs"], "beta": ["converges"]}, "loops": {"alpha": ["agrees"]}}
     lines = gallery.choice_table(two).splitlines()
-    assert lines[2:4] == ["| alpha | ✓ 1 of 2 | ✓ |", "| beta | ≈ |  |"]
+    assert lines[3:5] == ["| alpha | ✓ 1/2 | ✓ |", "| beta | ≈ |  |"]
+    for sign in set(re.findall(r"[^\w\s|/:-]", written.partition("```\n\n")[0].partition("|---")[2])):
+        assert f"{sign} " in written.partition("```\n\n")[2], sign
 
 
 def test_the_nightly_workflow_parses_and_runs_what_there_is() -> None:
