@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -38,17 +38,26 @@ class Visit:
         self.page.locator("#unfold").click()
         self.wait("!document.querySelector('[data-fold], details:not([open])')")
 
-    def wait(self, condition: str) -> None:
+    def wait(self, condition: str, again: Callable[[], object] | None = None) -> None:
         """Until an expression is true.
+
+        Args:
+            condition: the expression.
+            again: what a reader does each second until then, where the page may be too busy to notice it once.
 
         Raises:
             AssertionError: it does not become so.
         """
         # Playwright's own way needs ``eval`` in the page, which the page's policy forbids.
-        end = time.monotonic() + 120
-        while not self.page.evaluate(condition):
+        end, tries = time.monotonic() + 120, 0
+        while True:
+            if again is not None and tries % 100 == 0:
+                again()
+            if self.page.evaluate(condition):
+                return
             assert time.monotonic() < end, f"never: {condition}"
             self.page.wait_for_timeout(10)
+            tries += 1
 
     def draw(self, which: str = "figure", *, patience: float = 120.0) -> list[str]:
         """Scrolls to figures and waits for their pictures.
@@ -98,6 +107,7 @@ class Browser:
             page = idle.pop()
         else:
             context = self.program.new_context(**{"offline": True, "service_workers": "block"} | options)
+            context.set_default_timeout(120_000)  # [ms]: a busy machine must not meet it
             context.add_init_script(path=SCRIPT)
             if before:
                 context.add_init_script(before)

@@ -64,7 +64,7 @@ def test_keys_do_what_the_mouse_does(seen: Visit) -> None:
     link.press("Enter")
     evidence = seen.page.locator(link.get_attribute("href"))
     seen.wait(f"document.getElementById('{evidence.get_attribute('id')}').open")
-    assert evidence.locator("table").first.is_visible()
+    evidence.locator("table").first.wait_for()  # built once the browser has told that its fold opened
     evidence.locator("summary").press("Enter")
     assert not evidence.locator("table").first.is_visible()
     button = seen.page.locator(".legend [data-row]").first

@@ -25,6 +25,11 @@ HARM = """() => {
   const handlers = [...document.querySelectorAll("*")].filter(acts).length;
   return [window.poisoned ?? [], count("img, b.poison, textarea, [autofocus]"), count("script"), handlers];
 }"""
+# A handler of an attribute is told of the focus: when a browser gives it by itself, if at all, is not the page's doing.
+FELT = """(
+  document.querySelectorAll("[onfocus]").forEach((element) => element.dispatchEvent(new FocusEvent("focus"))),
+  window.poisoned !== undefined
+)"""
 # The replay's words are poisoned in a test of its own: among its data are pictures and a program.
 TEXT = """() => {
   const body = document.body.cloneNode(true);
@@ -96,7 +101,7 @@ def test_poison_would_be_felt(poisoned_page: Path, poison: Poison, tmp_path: Pat
         file = tmp_path / "page.html"
         file.write_text(text.replace(mark, mark.replace(written, title), 1), encoding="utf-8")
         with visit(file) as seen:
-            seen.wait("window.poisoned !== undefined")  # an attribute acts once it has the focus
+            seen.wait(FELT)
             ran, elements, *_ = seen.page.evaluate(HARM)
             assert set(ran) == {int(poison.doses["An invented comparison"])}
             assert elements >= 1
