@@ -279,6 +279,18 @@ def test_bounds_near_what_is_seen_are_listed(monkeypatch: pytest.MonkeyPatch) ->
     assert (ratio, part) == (pytest.approx(0.5, abs=1e-3), pytest.approx(1e-9))
 
 
+def test_bounds_by_less_than_are_listed(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A number just below a small bound is listed with the line of its assertion; counts and distant ones are not."""
+    monkeypatch.setattr(near_bounds, "seen", {})
+    held = ("4.5e-08 < 1e-07\n  where ...", "np.float64(3e-9) > 1e-09", "1e-12 < 1e-9", "2 <= 3", "error < bound")
+    for line, explanation in enumerate(held):
+        near_bounds.pytest_assertion_pass(request.node, line, explanation)
+    assert [(place[-2:], pytest.approx(ratio)) for place, ratio, _ in near_bounds.near()] == [
+        (":0", 0.45),
+        (":1", 1 / 3),
+    ]
+
+
 def test_every_comparison_is_in_the_matrix() -> None:
     """Every comparison of this repository, of the folders below, and of articles is in the matrix."""
     found = {Path(name).stem for name in comparison_files()}

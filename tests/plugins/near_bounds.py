@@ -1,11 +1,13 @@
-"""List of bounds by ``pytest.approx`` and ``assert_allclose`` that are within a factor of ten of what is seen.
+"""List of bounds by ``approx``, ``assert_allclose`` and ``<`` that are within a factor of ten of what is seen.
 
 ``python -m pytest -p near_bounds tests/unit/truth`` prints them at the end, the nearest first: on another processor a
-bound near round-off may be crossed (see "Drill" in CONTRIBUTING.md).
+bound near round-off may be crossed (see "Drill" in CONTRIBUTING.md). Bounds by ``<`` need
+``-o enable_assertion_pass_hook=true`` and tests that are compiled anew.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from typing import Any
@@ -16,6 +18,8 @@ import pytest
 _NEAR = 0.1
 # Bounds wider than this part of the value are of a method, not of round-off.
 _ROUND_OFF = 1e-6
+_NUMBER = r"(?<![\w.])(?:np\.float64\()?([-+]?\d+\.?\d*(?:e[-+]?\d+)?)\)?"
+_ORDERED = re.compile(rf"{_NUMBER} (?:<=?|(>=?)) {_NUMBER}")
 _Approx: Any = type(pytest.approx(1.0))  # what it makes of each number
 seen: dict[str, tuple[float, float]] = {}  # by place: difference over bound, and bound over value
 
@@ -54,6 +58,17 @@ def _noted_allclose(actual: Any, desired: Any, rtol: float = 1e-7, atol: float =
 
 
 _equal, _allclose = _Approx.__eq__, np.testing.assert_allclose
+
+
+def pytest_assertion_pass(item: pytest.Item, lineno: int, expl: str) -> None:
+    """Takes ``seen < bound`` with numbers to the list, as parts of 1."""
+    found = _ORDERED.search(expl.partition("\n")[0])
+    if found:
+        one, other = abs(float(found[1])), abs(float(found[3]))
+        small, bound = (other, one) if found[2] else (one, other)
+        if 0 < bound < _ROUND_OFF:
+            place = f"{item.location[0]}:{lineno}"
+            seen[place] = max(seen.get(place, (0.0, 0.0)), (small / bound, bound))
 
 
 @pytest.hookimpl(wrapper=True)
