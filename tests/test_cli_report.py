@@ -228,8 +228,8 @@ def test_a_page_after_the_first_comparison(
     assert [run["parameters"] for run in content["comparisons"][0]["runs"]] == [{"speed": 4.0}]
     assert content["left_out"] == ["balls/third"]
     assert "<summary>Comparisons that this report leaves out: 1</summary>" in first
-    assert "<code>proofroll report balls/third</code> runs them" in whole(first)
-    assert "Comparisons left out: 1. proofroll report balls/third runs them." in " ".join(said.split())
+    assert "Their names: <code>balls/third</code>." in whole(first)
+    assert "left out: 1 (balls 1). proofroll report --budget 3600 runs all" in " ".join(said.split())
 
 
 def test_a_budget_is_spent_briefly_first_and_grows(

@@ -58,12 +58,14 @@ def test_the_slider_chooses_the_tolerance(seen: Visit, matrix: ChoiceMatrix) -> 
         seen.wait(f"document.getElementById('choice').dataset.at === '{decade - DECADES.start}'")
         assert seen.page.evaluate(SHOWN) == expected(matrix, decade, False)
         assert seen.page.locator("#answer").inner_text() == matrix.answer(10.0**-decade, False)
+        assert seen.page.locator("#also").inner_text() == matrix.with_forces(10.0**-decade)
         words = seen.page.locator("#words li").all_inner_texts()
         assert words == [item.sentence for item in advice(matrix, 10.0**-decade, False)]
         assert slider.get_attribute("aria-valuetext") == f"1e-{decade}"
     seen.page.get_by_label("forces count, too").check()
     seen.wait(f"document.getElementById('choice').dataset.at === '{2 * len(DECADES) - 1}'")
     assert seen.page.evaluate(SHOWN) == expected(matrix, DECADES.stop - 1, True)
+    assert seen.page.locator("#also").inner_text() == "", "the answer itself says it"
 
 
 def test_a_row_unfolds_to_its_settings(seen: Visit) -> None:

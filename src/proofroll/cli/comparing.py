@@ -202,6 +202,7 @@ class _Comparing:
         self._keys = list(dict.fromkeys(case.key for item in plans for case in item.cases))
         self._truths = {case.key for item in plans for case in item.truths.values()}
         self._start, self._reused = time.monotonic(), runner.reused
+        self._budget = limit.left if limit else 0.0
 
     def judge(self, at: int) -> None:
         """Judges a comparison by what has been run of it so far."""
@@ -273,7 +274,9 @@ class _Comparing:
         # What is stored is counted as reused before it is judged.
         many, ran = len(self.plans), max(0, len(self.results) - (self.runner.reused - self._reused))
         left = (time.monotonic() - self._start) / ran * (len(self._keys) - len(self.results)) if ran else 0.0
-        left = min(left, self.limit.left / self.runner.jobs) if self.limit else left
+        if self.limit and (used := self._budget - self.limit.left) > 0:
+            # On a machine that does other things, too, processor time passes slower.
+            left = min(left, self.limit.left * (time.monotonic() - self._start) / used)
         of = f"{min(len(self.ended) + 1, many)} of {many} comparisons, " if many > 1 else ""
         self.tell(f"{of}{f'about {written(left, 1)} s left, ' if ran else ''}{case.engine.name}")
 

@@ -257,7 +257,6 @@ def _shown(content: ReportContent, out: Path) -> Iterator[Table | str]:
     yield from change_lines(content.against)
     if content.beyond_budget:
         yield content.beyond_budget
-    if content.left_out:
-        names = " ".join(content.left_out)
-        yield f"Comparisons left out: {len(content.left_out)}. proofroll report {names} runs them."
+    if content.left_out_words:
+        yield content.left_out_words
     yield f"The report is in {out / 'report.html'}, the same content in {out / 'report.json'}."

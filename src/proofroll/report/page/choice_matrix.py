@@ -23,6 +23,8 @@ FIRST_TOLERANCE = 10.0**-FIRST
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
 NEEDS = ("motion to {0} of the path", "motion to {0} of the path and forces to {0} of the largest")
 UNIT = "in seconds of computing per second of motion"
+WITH_FORCES = "With forces to {0} of the largest, too"
+SAME = "the same for"
 NOTHING = "nothing that was run and timed holds it for"
 UNJUDGED = "no scene that was run is judged by that"
 NOT_RUN = "none"
@@ -158,8 +160,26 @@ class ChoiceMatrix:
             return f"To hold {asked}: {nothing or (UNJUDGED if groups else 'nothing was run')}."
         return f"The cheapest to hold {asked}, {UNIT}: {', '.join(held)}{f'; {nothing}' if nothing else ''}."
 
+    def with_forces(self, tolerance: float) -> str:
+        """Sentence beside the answer about motion: what changes with forces; empty: they are judged nowhere."""
+        groups = [column for column in self.columns if column.whole and column.group in self.judged_groups[True]]
+        other: list[str] = []
+        same: list[str] = []
+        without: list[str] = []
+        for column in groups:
+            motion, both = (self.ranked(column, tolerance, forces) for forces in (False, True))
+            if not both:
+                without.append(column.group)
+            elif motion and self._phrase(column, *motion[0]) == self._phrase(column, *both[0]):
+                same.append(column.group)
+            else:
+                other.append(self._phrase(column, *both[0]))
+        rest = [f"{words} {', '.join(names)}" for words, names in ((SAME, same), (NOTHING, without)) if names]
+        said = [", ".join(other), *rest] if other else rest
+        return f"{WITH_FORCES.format(number(tolerance))}: {'; '.join(said)}." if groups else ""
+
     def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
-        return f"{self.rows[place].name} for {column.group} ({cell.text})"
+        return f"{cell.name or self.rows[place].name} for {column.group} ({cell.text})"
 
     @cached_property
     def judged_groups(self) -> tuple[list[str], list[str]]:

@@ -19,9 +19,10 @@ from proofroll.report import labels
 from proofroll.report.comparison import tables, verdict_matrix
 from proofroll.report.comparison.spread import ALONE
 from proofroll.report.kinds import ReportKind, report_kinds
+from proofroll.report.page import choice_matrix
 from proofroll.report.page.advice import NOTHING as NOT_HELD
 from proofroll.report.page.advice import advice, words
-from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE, NEEDS, NOTHING, UNIT, UNJUDGED
+from proofroll.report.page.choice_matrix import DECADES, FIRST, FIRST_TOLERANCE
 from proofroll.report.pages import environment, folded, packed, rendered
 from proofroll.report.parts import Part, part_kinds
 from proofroll.report.styles import OUTLINES, styles
@@ -131,10 +132,12 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
         "first_decade": FIRST,
         "first_tolerance": FIRST_TOLERANCE,
         "answer_words": {
-            "needs": NEEDS,
-            "unit": UNIT,
-            "nothing": NOTHING,
-            "unjudged": UNJUDGED,
+            "needs": choice_matrix.NEEDS,
+            "with_forces": choice_matrix.WITH_FORCES,
+            "same": choice_matrix.SAME,
+            "unit": choice_matrix.UNIT,
+            "nothing": choice_matrix.NOTHING,
+            "unjudged": choice_matrix.UNJUDGED,
             "lacking": NOT_HELD,
             "tolerances": [number_format.number(10.0**-decade) for decade in DECADES],
         },

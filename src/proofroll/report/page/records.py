@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import platform
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -149,6 +150,16 @@ class ReportContent:
         """Sentence on the cases that a budget of processor time did not suffice for; empty if there are none."""
         left = sum(len(item.beyond_budget) for item in self.comparisons)
         return f"Runs left out for lack of processor time: {left}. The same command goes on with them." if left else ""
+
+    @property
+    def left_out_words(self) -> str:
+        """Sentences on the comparisons that a report of all studies leaves out; empty if there are none."""
+        if not self.left_out:
+            return ""
+        folders = Counter(name.partition("/")[0] for name in self.left_out)
+        many = f"{len(self.left_out)} ({', '.join(f'{folder} {count}' for folder, count in folders.items())})"
+        ways = f"--only loops,contact those of some kinds of scenes; proofroll report {self.left_out[0]} one"
+        return f"Comparisons left out: {many}. proofroll report --budget 3600 runs all, each briefly first; {ways}."
 
     @cached_property
     def precision(self) -> dict[str, WorkPrecision]:

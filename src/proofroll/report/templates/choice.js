@@ -26,15 +26,23 @@
     cell.append(link);
   }
   const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
+  const { needs, unit, nothing, unjudged, tolerances, with_forces, same, lacking: unheld } = {{ answer_words|tojson }};
   // The cheapest of the engines that are chosen, as `ChoiceMatrix.answer` says it of all.
   function sentence(best, { groups, judged }) {
-    const { needs, unit, nothing, unjudged, tolerances } = {{ answer_words|tojson }};
     const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
     const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
     const lacking = without.length ? `${nothing} ${without.join(", ")}` : "";
     const asked = needs[+forces.checked].replaceAll("{0}", tolerances[Number(slider.value) - first]);
     const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.some(Boolean) ? unjudged : "nothing was run")}.`;
     return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
+  }
+  // What forces change, as `ChoiceMatrix.with_forces` says it.
+  function also(motion, both, { groups, judged }) {
+    const asked = groups.map((group, j) => ({ group, before: motion[j]?.[1], now: both[j]?.[1] })).filter(({ group }) => group && judged[1].includes(group));
+    const listed = (words, test) => { const found = asked.filter(test).map(({ group }) => group); return found.length ? `${words} ${found.join(", ")}` : ""; };
+    const other = asked.filter(({ before, now }) => now && now !== before).map(({ now }) => now).join(", ");
+    const said = [other, listed(same, ({ before, now }) => now && now === before), listed(nothing, ({ now }) => !now)];
+    return asked.length ? `${with_forces.replace("{0}", tolerances[Number(slider.value) - first])}: ${said.filter(Boolean).join("; ")}.` : "";
   }
   // Advice for each column of the engines that are chosen, as `of_column` gives it of all, without what forces change.
   function advised({ said, heads, engines }) {
@@ -46,7 +54,7 @@
       if (!own.length) return engines[j].length ? `${head} none of the chosen engines was run.` : said[j];
       const [[, least, name, text]] = own;
       const others = own.slice(least === null ? 0 : 1).map(([, cost, other]) => cost === null ? other : `${other} costs ${times(Number((cost / least).toPrecision(2)))}`);
-      return `${head} ${[least === null ? {{ answer_words.lacking|tojson }} : `take ${name} (${text} s/s)`, ...others].join("; ")}.`;
+      return `${head} ${[least === null ? unheld : `take ${name} (${text} s/s)`, ...others].join("; ")}.`;
     }), `This is of ${chosen(true).join(", ") || "no engine"} alone. What serves all scenes, and what forces change, is said of all engines together.`];
   }
   async function show() {
@@ -54,9 +62,11 @@
     told.textContent = `1e-${slider.value}`;
     slider.setAttribute("aria-valuetext", told.textContent);
     const data = JSON.parse(await unpack("choices"));
-    const best = data.ranks[place].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
+    const cheapest = (asked) => data.ranks[asked].map((ranked) => ranked.find(([at]) => !rows[at].classList.contains("off")));
+    const best = cheapest(place);
     rows.forEach((row, i) => data.grid[i].forEach((numbers, j) => fill(row.cells[j + 1], data.cells[numbers[place]], best[j]?.[0] === i)));
     answer.textContent = sentence(best, data);
+    document.getElementById("also").textContent = forces.checked ? "" : also(best, cheapest(place + count), data);
     const words = advised(JSON.parse(await unpack("all-words"))[place]);
     document.querySelectorAll("#words li").forEach((line, i) => { line.textContent = words[i]; });
     table.dataset.at = place;
@@ -72,9 +82,14 @@
   }
   everywhere(hide);
   form.addEventListener("submit", (event) => event.preventDefault());
-  // A few scenes are shown by their names at once, where the screen has room for them.
+  // Scenes are shown by their names at once where the screen has room for them, those of small groups first.
   addEventListener("load", () => {
-    if (table.tHead.rows[0].cells.length < 9 && innerWidth > 800) table.querySelectorAll("button[data-group]").forEach((button) => button.click());
+    if (innerWidth <= 800) return;
+    const scenes = (button) => button.title.split(", ").length;
+    for (const button of [...table.querySelectorAll("button[data-group]")].sort((one, other) => scenes(one) - scenes(other))) {
+      button.click();
+      if (table.offsetWidth > table.parentElement.clientWidth) button.click();
+    }
   });
 
   table.addEventListener("click", (event) => {

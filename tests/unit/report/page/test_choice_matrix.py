@@ -136,10 +136,22 @@ def test_the_answer_names_the_cheapest_engine_of_each_group() -> None:
     found = choice_matrix([*ARM, beta, own, ball], STUDIES)
     assert found.answer(1e-3, False) == (
         "The cheapest to hold motion to 1e-3 of the path, in seconds of computing per second of motion: "
-        "alpha joints for trees (0.01); nothing that was run and timed holds it for ball rolling."
+        "alpha joints default at dt 1e-3 s for trees (0.01); nothing that was run and timed holds it for ball rolling."
     )
-    assert "beta joints for trees (0.5)" in found.answer(1e-8, False)
+    assert "beta joints default at dt 1e-3 s for trees (0.5)" in found.answer(1e-8, False)
     assert "motion to 1e-3 of the path and forces to 1e-3 of the largest" in found.answer(1e-3, True)
+
+
+def test_beside_the_answer_stands_what_forces_change(whole: ChoiceMatrix) -> None:
+    """A group whose cheapest run stays the same, one that takes another run, one that nothing holds; each once."""
+    same = choice_matrix([line(error=1e-6), replace(FORCE, error=1e-9)], STUDIES).with_forces(1e-4)
+    assert same == "With forces to 1e-4 of the largest, too: the same for trees."
+    changed = choice_matrix(ARM, STUDIES)
+    assert changed.with_forces(1e-8).endswith("too: nothing that was run and timed holds it for trees.")
+    finer = changed.ranked(changed.columns[0], 1e-2, True)[0][1]
+    assert changed.with_forces(1e-2).endswith(f"too: {finer.name} for trees ({finer.text}).")
+    assert choice_matrix([LINE], STUDIES).with_forces(1e-4) == "", "no forces are judged"
+    assert "ball rolling" not in whole.with_forces(1e-4), "no forces are judged there"
 
 
 def test_the_cheapest_of_each_column_is_framed() -> None:
@@ -185,5 +197,6 @@ def test_a_scene_that_was_left_out_says_nothing_against_those_that_ran() -> None
     assert at([*ARM, gone], 4)[:2] == at(ARM, 4)[:2]
     other = replace(gone, engine="beta", status="done", verdict="agrees", error=1e-6, cost=1.0)
     assert at([*ARM, gone, other], 4)[:2] == at(ARM, 4)[:2], "also where another engine ran it"
-    assert "alpha joints for trees" in choice_matrix([*ARM, gone, other], STUDIES).answer(1e-4, False)
+    said = choice_matrix([*ARM, gone, other], STUDIES).answer(1e-4, False)
+    assert "alpha joints default at dt 2.5e-4 s for trees" in said
     assert at([gone], 4).state == Verdict.NOT_JUDGED
