@@ -3,8 +3,10 @@
 import dataclasses
 import os
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,7 @@ from proofroll.core.plugins import EngineSpec, parse_engine, place_of, plain_nam
 from proofroll.files.toml import read_toml
 from proofroll.robots import reading
 from proofroll.robots.body_recursion import body_recursion
+from proofroll.robots.defining import Compiler
 from proofroll.robots.hypotheses import hypotheses
 from proofroll.robots.importer_row import judged, with_the_copy
 from proofroll.robots.layers import LAYERS, RobotTruth
@@ -27,7 +30,7 @@ from proofroll.robots.states import RobotStates, random_states
 from proofroll.robots.two_formulations import poses
 from proofroll.robots.urdf import BASE_JOINT
 from proofroll.running.asking import lent_workers
-from proofroll.running.process import WorkerDied
+from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
 
 
@@ -72,77 +75,120 @@ def check(
         file = opened(path, base, root, time_limit, lent)
         written = reading.write(file, folder)
         robot, compiler = meaning(file, written, time_limit, lent)
-        by = f"the model that {' '.join(compiler)} compiles" if compiler else "our own reading of the file"
         if not robot.moving:
             raise InputError("file", path, "nothing in it moves" + _fixed_hint(file))
-        sampled = random_states(robot, states, seed)
-        truth = RobotTruth.of(robot, sampled)
-        bar = bar_of(truth)
-        children = {joint.name: joint.child for joint in robot.moving}
-        request = Request(
-            written, file.kind, base, BASE_JOINT, {}, children, sampled, truth.torques, robot.gravity, robot
-        )
+        truth = RobotTruth.of(robot, random_states(robot, states, seed))
+        checked = _Checked(path, file, written, base, truth, bar_of(truth), compiler, folder, time_limit, lent)
 
-        def row(spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
-            def ask(given: Path) -> reading.ReaderAnswer:
-                with lent.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
-                    return reading.ask(
-                        worker,
-                        spec.name,
-                        dataclasses.replace(request, path=given, options=options),
-                        Path(place),
-                        time_limit,
-                    )
-
+        def row(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
             try:
-                answer = ask(written)
+                importer = checked.row(*item)
             except Missing as error:
                 if engines:
                     raise
-                return ImporterRow(engine=str(spec), status="missing", message=str(error))
-            except WorkerDied as error:
-                return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
-            try:
-                importer = judged(file, truth, bar, spec, answer, lent, ask)
-            except Exception as error:  # one engine's odd answer must not end the rows of the others
-                said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
-                return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
-            # It defines the format, and its meaning here is that of another version of it.
-            if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
-                importer = dataclasses.replace(importer, says=f"{importer.says}; held against {by}".removeprefix("; "))
-            return importer
-
-        def as_written(spec: EngineSpec, options: dict[str, bool], importer: ImporterRow) -> str | None:
-            if not file.contained or importer.version is None:
-                return None
-            own = dataclasses.replace(request, options=options)
-            try:
-                with lent.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=folder) as place:
-                    given = reading.ask_as_written(worker, spec.name, own, path, Path(place), time_limit)
-            except WorkerDied as error:
-                return f"its process ended ({error})"
-            return None if given is None else with_the_copy(given, importer)
-
-        def told(item: tuple[EngineSpec, dict[str, bool]]) -> ImporterRow:
-            importer = row(*item)
-            importer = dataclasses.replace(importer, accepted=all(cause.id in accepted for cause in importer.causes))
-            importer = dataclasses.replace(importer, as_written=as_written(*item, importer))
+                importer = ImporterRow(engine=str(item[0]), status="missing", message=str(error))
             if progress is not None:
                 progress(importer.engine)
-            return importer
+            return dataclasses.replace(importer, accepted=all(cause.id in accepted for cause in importer.causes))
 
         with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-            rows = list(pool.map(told, asked))
+            rows = list(pool.map(row, asked))
     return RobotCheck(
         file=str(path),
         kind=file.kind,
         base=base if file.kind == "urdf" else "as in the file",
         lint=[*file.remarks, *lint(file, robot)],
-        truth=UsedTruth(by, bar, states, seed, robot.dofs),
+        truth=UsedTruth(checked.source, checked.bar, states, seed, robot.dofs),
         layers=LAYERS,
         engines=rows,
         robot=drawn(truth),
     )
+
+
+@dataclass(frozen=True)
+class _Checked:
+    """A file that engines are asked about.
+
+    Attributes:
+        path, file: of the user, and what it says.
+        written: the copy that engines read.
+        base: support of the root of a URDF.
+        truth: the file's meaning at random states.
+        bar: error bar of the truth, relative.
+        compiler: the program that defines the format, if it gave the meaning.
+        folder: for files of engines.
+        time_limit: for each answer [s].
+        workers: processes in which engines read.
+    """
+
+    path: Path
+    file: RobotFile
+    written: Path
+    base: str
+    truth: RobotTruth
+    bar: float
+    compiler: Compiler | None
+    folder: Path
+    time_limit: float
+    workers: Workers
+
+    @property
+    def source(self) -> str:
+        """Origin of the meaning, as a clause."""
+        return f"the model that {' '.join(self.compiler)} compiles" if self.compiler else "our own reading of the file"
+
+    def row(self, spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
+        """The row of an engine, whatever becomes of the engine.
+
+        Raises:
+            Missing: it is not installed.
+        """
+
+        def ask(given: Path) -> reading.ReaderAnswer:
+            with self._lent(spec) as (worker, place):
+                request = self._request(options, given)
+                return reading.ask(worker, spec.name, request, place, self.time_limit)
+
+        try:
+            answer = ask(self.written)
+        except WorkerDied as error:
+            return ImporterRow(engine=str(spec), status=str(error.status), message=str(error))
+        try:
+            importer = judged(self.file, self.truth, self.bar, spec, answer, self.workers, ask)
+        except Exception as error:  # one engine's odd answer must not end the rows of the others
+            said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
+            return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
+        # It defines the format, and its meaning here is that of another version of it.
+        compiler = self.compiler
+        if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
+            says = f"{importer.says}; held against {self.source}".removeprefix("; ")
+            importer = dataclasses.replace(importer, says=says)
+        return dataclasses.replace(importer, as_written=self._as_written(spec, options, importer))
+
+    def _as_written(self, spec: EngineSpec, options: dict[str, bool], importer: ImporterRow) -> str | None:
+        """Difference of what an engine reads from the user's own file, not from the copy."""
+        if not self.file.contained or importer.version is None:
+            return None
+        try:
+            with self._lent(spec) as (worker, place):
+                own = self._request(options, self.written)
+                given = reading.ask_as_written(worker, spec.name, own, self.path, place, self.time_limit)
+        except WorkerDied as error:
+            return f"its process ended ({error})"
+        return None if given is None else with_the_copy(given, importer)
+
+    @contextmanager
+    def _lent(self, spec: EngineSpec) -> Iterator[tuple[Worker, Path]]:
+        with self.workers.lend(spec.name) as worker, tempfile.TemporaryDirectory(dir=self.folder) as place:
+            yield worker, Path(place)
+
+    def _request(self, options: dict[str, bool], given: Path) -> Request:
+        robot, truth = self.truth.robot, self.truth
+        children = {joint.name: joint.child for joint in robot.moving}
+        return Request(
+            given, self.file.kind, self.base, BASE_JOINT, options, children, truth.states, truth.torques,
+            robot.gravity, robot,
+        )  # fmt: skip
 
 
 def _accepted(path: Path, given: Sequence[str]) -> set[str]:
