@@ -48,8 +48,7 @@ def test_a_rattleback_reverses_its_spin() -> None:
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", ENDS)
+@pytest.mark.parametrize(("name", "seed"), [(name, place % 3) for place, name in enumerate(ENDS)])
 def test_two_routes_agree_over_held_out_parameters(name: str, seed: int) -> None:
     """Another mass, friction, speed and size each: both routes see the same events, and differ by round-off alone."""
     mechanism = load_scene(name, **held_out(name, seed)).elements[0].mechanism  # type: ignore[attr-defined]
@@ -80,7 +79,7 @@ def bounced(height: float, radius: float, mu: float, e: float, g: float, until: 
 
 
 @pytest.mark.drill
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, 3])  # one that bounces little, and one much
 def test_a_thrown_ball_lies_where_formulas_say(seed: int) -> None:
     """Over held-out parameters a ball that bounces is, within its own bars, where flights and impacts put it."""
     numbers = held_out("spinning_bounce", seed) | {"restitution": 0.55 + 0.1 * seed}

@@ -256,6 +256,8 @@ def test_growing_round_off_takes_nothing_from_the_best_step() -> None:
         pytest.param(check, id=check.name, marks=pytest.mark.drill if "[rk4" in check.name else ())
         for check in checks(Single)
         if "entry_point" not in check.name
+        # what is built hangs on no formulation
+        if "[rk4" not in check.name or not check.name.startswith(("builds", "certificate"))
     ],
 )
 def test_single_precision_conforms(check: Callable[[], None]) -> None:
