@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,18 +14,26 @@ LIMIT = 1.5
 # Of so many the line tells.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
+_TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
 _TOOK = "processor_seconds"
 
 
 def _of_children(process: str) -> float:
     """Processor time of the processes that a process has begun and not waited for, and of theirs [s]; Linux alone."""
-    spent = 0.0
-    with suppress(OSError):  # one that ends meanwhile is counted by who waits for it
-        for children in Path(f"/proc/{process}/task").glob("*/children"):
-            for child in children.read_text().split():
-                fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
-                spent += sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK") + _of_children(child)
+    spent, children = 0.0, ""
+    with suppress(OSError):  # a thread or a process that ends meanwhile: who waits for it counts it
+        for thread in os.listdir(f"/proc/{process}/task"):
+            children += _read(f"/proc/{process}/task/{thread}/children")
+    for child in children.split():
+        with suppress(OSError):
+            fields = _read(f"/proc/{child}/stat").rpartition(")")[2].split()
+            spent += sum(map(int, fields[11:15])) / _TICKS + _of_children(child)
     return spent
+
+
+def _read(file: str) -> str:
+    with open(file) as lines:
+        return lines.read()
 
 
 def _spent() -> float:
@@ -39,15 +46,15 @@ def _spent() -> float:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Notes when a test begins, with the fixtures that it is the first to need."""
-    item.stash[_BEGAN] = _spent()
+    """Notes when a test begins, with the fixtures that it is the first to need: where the one before it ended."""
+    item.stash[_BEGAN] = item.session.stash.get(_BEGAN, None) or _spent()
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
     """Notes what it took."""
     result = yield
-    now = _spent()
+    now = item.session.stash[_BEGAN] = _spent()
     item.user_properties.append((_TOOK, now - item.stash.get(_BEGAN, now)))  # who is skipped never began
     return result
 
