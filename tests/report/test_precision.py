@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -37,6 +38,31 @@ def test_each_engine_has_a_panel_with_the_others_in_grey(seen: Visit) -> None:
         assert words in told
     assert seen.page.evaluate(f"{PICTURE}.data.filter((trace) => trace.name === 'choice').length") == 1
     assert seen.messages == []
+
+
+@pytest.mark.drill
+def test_a_mouse_points_and_zooms(seen: Visit) -> None:
+    """No legend lies on a panel; a point says what it is; a drag zooms all panels, and a double click returns."""
+    part = seen.page.locator("[data-precision=c0]")
+    panels = [item.bounding_box() for item in part.locator(".nsewdrag").all()]
+    legends = [item.bounding_box() for item in part.locator(".infolayer > [class^=legend]").all()]
+    assert len(legends) == len(panels) == 2
+    below = [legend["y"] >= panel["y"] + panel["height"] for legend in legends for panel in panels]
+    assert all(below), (legends, panels)
+    point = part.locator(".points path.point").last.bounding_box()
+    seen.page.mouse.move(point["x"] + point["width"] / 2, point["y"] + point["height"] / 2)
+    seen.wait("document.querySelector('[data-precision=c0] .hoverlayer').textContent.includes('of the size')")
+    spans = f"JSON.stringify([{PICTURE}.layout.xaxis.range, {PICTURE}.layout.xaxis2.range])"
+    whole, left = seen.page.evaluate(spans), panels[0]
+    seen.page.mouse.move(left["x"] + 40, left["y"] + 40)
+    seen.page.mouse.down()
+    seen.page.mouse.move(left["x"] + left["width"] / 2, left["y"] + left["height"] / 2, steps=4)
+    seen.page.mouse.up()
+    seen.wait(f"{spans} !== {whole!r}")
+    first, second = json.loads(seen.page.evaluate(spans))
+    assert first == second
+    seen.page.mouse.dblclick(left["x"] + 60, left["y"] + 60)
+    seen.wait(f"{spans} === {whole!r}")
 
 
 @pytest.mark.drill

@@ -3,6 +3,7 @@
 (() => {
   const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"], SYMBOLS = {{ outlines|list|tojson }};
   const LARGEST = 1, LEAST = 1e-17;  // errors beyond the quantity's size are cut there
+  const PANEL = 215, TICKS = 38, ENTRY = 19, HEAD = 22;  // heights of a panel and of what is around it [CSS px]
   const drawn = new Map();  // part of the page -> its plotly element
   const slider = document.getElementById("tolerance"), form = document.getElementById("choose");
   const { paint } = plots, literal = picture.literal;
@@ -36,13 +37,17 @@
     const all = curves(study, quantity), engines = [...new Set(study.curves.map(({ engine }) => engine))];
     const shown = engines.filter((engine) => all.some((curve) => curve.engine === engine));
     const columns = Math.max(1, Math.min(shown.length, Math.floor(width / 330))), rows = Math.ceil(shown.length / columns) || 1;
+    // Each row of panels has its settings below, where they lie over no point: as many lines as its longest list.
+    const entries = shown.map((engine) => all.filter((curve) => curve.engine === engine).length);
+    const blocks = [...Array(rows).keys()].map((row) => PANEL + TICKS + ENTRY * Math.max(...entries.slice(row * columns, (row + 1) * columns), 0) + (row < rows - 1 && HEAD));
+    const total = blocks.reduce((sum, block) => sum + block, 0);
     const points = all.flatMap(({ points }) => points), costs = points.map(({ cost }) => cost);
     const span = [Math.log10(Math.min(...costs)) - 0.3, Math.log10(Math.max(...costs)) + 0.3];
     const least = Math.min(...points.map(({ y }) => y), 10 ** -decade());
     const best = front(all.filter(({ own }) => !own).flatMap(({ points }) => points));
     const choice = best.find(({ error }) => error <= 10 ** -decade());
     const layout = {
-      height: 270 * rows + 30, width, margin: { l: 52, r: 8, t: 22, b: 40 }, hovermode: "closest", showlegend: true,
+      height: total + HEAD + 8, width, margin: { l: 52, r: 8, t: HEAD, b: 8 }, hovermode: "closest", showlegend: true,
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", dragmode: matchMedia("(pointer: coarse)").matches ? false : "zoom",
       font: { family: paint("--sans"), size: 11, color: paint("--ink") }, annotations: [], shapes: [],
       hoverlabel: { bgcolor: paint("--paper"), bordercolor: paint("--muted"), font: { color: paint("--ink") }, align: "left" },
@@ -50,12 +55,12 @@
     const traces = [];
     shown.forEach((engine, at) => {
       const tail = at ? String(at + 1) : "", column = at % columns, row = Math.floor(at / columns);
-      const gap = 0.12 / columns, wide = (1 - gap * (columns - 1)) / columns, high = (1 - (rows - 1) * (0.24 / rows)) / rows;
-      const x = [column * (wide + gap), column * (wide + gap) + wide], top = 1 - row * (high + 0.24 / rows), y = [top - high, top];
+      const gap = 0.12 / columns, wide = (1 - gap * (columns - 1)) / columns;
+      const x = [column * (wide + gap), column * (wide + gap) + wide], top = 1 - blocks.slice(0, row).reduce((sum, block) => sum + block, 0) / total, y = [top - PANEL / total, top];
       const axis = { type: "log", gridcolor: paint("--rule"), linecolor: paint("--rule"), zeroline: false, ticks: "", exponentformat: "power" };
       layout[`xaxis${tail}`] = { ...axis, domain: x, anchor: `y${tail}`, range: span, ...(at && { matches: "x" }), title: { text: "cost [s/s]", standoff: 4 }, ...(span[1] - span[0] > 1.5 && { dtick: Math.ceil((span[1] - span[0]) / 6) }) };
       layout[`yaxis${tail}`] = { ...axis, domain: y, anchor: `x${tail}`, range: [Math.log10(least) - 0.4, 0.35], ...(at && { matches: "y" }), nticks: 8, ...(!column && { title: { text: "error", standoff: 4 } }) };
-      layout[`legend${tail}`] = { x: x[1], y: y[1], xanchor: "right", yanchor: "top", bgcolor: "rgba(0,0,0,0)", font: { size: 9.5 }, tracegroupgap: 0 };
+      layout[`legend${tail}`] = { x: x[0], y: y[0] - TICKS / total, xanchor: "left", yanchor: "top", bgcolor: "rgba(0,0,0,0)", font: { size: 9.5 }, tracegroupgap: 0 };
       layout.annotations.push({ text: `<b>${literal(engine)}</b>`, showarrow: false, xref: "paper", yref: "paper", x: x[0], y: y[1], xanchor: "left", yanchor: "bottom" });
       layout.shapes.push({ type: "line", xref: `x${tail} domain`, yref: `y${tail}`, x0: 0, x1: 1, y0: 10 ** -decade(), y1: 10 ** -decade(), line: { color: paint("--muted"), width: 1, dash: "dash" } });
       const here = { type: "scatter", xaxis: `x${tail}`, yaxis: `y${tail}`, legend: `legend${tail}` };
