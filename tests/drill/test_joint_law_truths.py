@@ -222,7 +222,7 @@ SCENES: dict[str, tuple[Callable[[Mapping[str, float]], Motion], float, Callable
     "gear_pair": (gear, 1.0, lambda seed: {"ratio": -(10.0 ** (seed - 1))}),
     "arm_pd": (arm, 0.6, lambda seed: {"armature": 0.1 * seed}),
     "arm_rotor": (arm, 0.4, lambda seed: {"elbow": 0.4 * seed}),
-    "flyball_governor": (governor, 5e-3, lambda _: {}),
+    "flyball_governor": (governor, 0.12, lambda _: {}),
 }  # fmt: skip
 
 

@@ -20,6 +20,7 @@ _STAGES = 13
 _NEWTON = 9  # iterations after which a step is taken again with half its length
 _GOOD = 1e-4  # a guess that is as near as this keeps its Jacobians
 _NOISE = 3e-16  # size of the last coefficients, relative to the scale, that is only round-off
+_SEEN = 1e-13  # size of coefficients that round-off does not hide
 _ROUND_OFF = 1e-15  # Newton corrections, relative to the scale, that are only noise
 
 
@@ -122,6 +123,20 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
             break
         before = change
     return Step(time, length, np.vstack([state, guess]), np.inf)
+
+
+def by_states(step: Step, scale: FloatArray) -> tuple[float, float]:
+    """Error of a step from its states instead of their rates, whose round-off stiff dampers magnify.
+
+    Returns:
+        The error, and what it is without round-off, by the decay of the coefficients above it, relative to the scale.
+    """
+    if not np.isfinite(step.error):
+        return np.inf, np.inf
+    sizes = np.max(np.abs(_TO_LEGENDRE @ step.values[1:] / scale), axis=-1)
+    known = 2 + int(np.flatnonzero(sizes[2:] > _SEEN)[-1]) if np.any(sizes[2:] > _SEEN) else 1
+    decay = (sizes[known] / sizes[1]) ** (1 / (known - 1)) if known > 1 else 0.0
+    return float(np.max(sizes[-2:])), float(sizes[1] * decay ** (_STAGES - 3))
 
 
 def next_length(step: Step, tolerance: float) -> float:

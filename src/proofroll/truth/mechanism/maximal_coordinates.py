@@ -27,7 +27,7 @@ from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations, Switched
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 
-_BESIDE = 1e-9  # m, rad, and part of velocities: between round-off and what a growth of 1e7 makes large
+BESIDE = 1e-9  # m, rad, and part of velocities: between round-off and what a growth of 1e7 makes large
 RANK = 1e-8  # see analysis.RANK; this route finds its own rank
 
 
@@ -242,12 +242,12 @@ class MaximalCoordinates:
         """
         lean = self.lean
         start = lean.equations.start()
-        starts = (start, lean.beside(start, _BESIDE))
+        starts = (start, lean.beside(start, BESIDE))
         try:
             one, other = (self.taylor().run(times, each) for each in starts)
         except Missing:
-            one, other = (self._dop853(each, times, _BESIDE * 1e-4) for each in starts)
-        apart: Array = np.abs(other - one)[:, : lean.equations.nx].max(axis=1) / _BESIDE
+            one, other = (self._dop853(each, times, BESIDE * 1e-4) for each in starts)
+        apart: Array = np.abs(other - one)[:, : lean.equations.nx].max(axis=1) / BESIDE
         return apart
 
     def _dop853(self, start: Array, times: Array, tolerance: float) -> Array:

@@ -4,7 +4,7 @@ The multipliers are solved for in symbols: C M⁻¹ Cᵀ = L D Lᵀ, sparse, eli
 rows that do not depend on each other; they are chosen once, at the start.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,10 +37,7 @@ class MaximalTaylor:
         if heyoka is None:
             raise Missing("Taylor series need heyoka: pip install 'proofroll[fast]'")
         self._number = np.longdouble if long_double else float
-        state = [heyoka.make_vars(f"s{place}") for place in range(len(equations.start()))]
-        functions = {name: getattr(heyoka, name) for name in FUNCTIONS}
-        found = equations.at(state, functions, time=heyoka.time)
-        rates = [*found.rate, *accelerations(equations, found, [found.rows[k] for k in rows]), *found.angle_rate]
+        state, rates = _in_symbols(equations, rows, heyoka.time)
         self._start = np.array([self._number(value) for value in equations.start()])
         self._integrator = heyoka.taylor_adaptive(
             [(name, _expression(value, self._number)) for name, value in zip(state, rates, strict=True)],
@@ -66,6 +63,27 @@ class MaximalTaylor:
         if len(states) < len(times) or not np.isfinite(np.asarray(states, dtype=float)).all():
             raise Diverged(f"Taylor series stopped at t = {float(integrator.time):.6g} s ({outcome})")
         return np.asarray(states)
+
+
+def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable[[Array], Array]:
+    """Rates of many states at once, each with its time behind it, (states, n + 1) -> (states, n).
+
+    Raises:
+        Missing: heyoka is not installed.
+    """
+    if heyoka is None:
+        raise Missing("compiled equations need heyoka: pip install 'proofroll[fast]'")
+    time = heyoka.make_vars("t")
+    state, rates = _in_symbols(equations, rows, time)
+    function = heyoka.cfunc([_expression(value, float) for value in rates], [*state, time], compact_mode=True)
+    return lambda states: np.asarray(function(np.ascontiguousarray(states.T)).T)
+
+
+def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> tuple[list[Any], list[Scalar]]:
+    """Variables of a state, and its rates as expressions of them."""
+    state = [heyoka.make_vars(f"s{place}") for place in range(len(equations.start()))]
+    found = equations.at(state, {name: getattr(heyoka, name) for name in FUNCTIONS}, time=time)
+    return state, [*found.rate, *accelerations(equations, found, [found.rows[k] for k in rows]), *found.angle_rate]
 
 
 def accelerations(

@@ -1,9 +1,9 @@
 """The truth of a mechanism's motion: two routes that share no kinematics, their difference as an error bar.
 
 Routes: joint coordinates (DOP853 with projection), maximal coordinates (Taylor series in doubles and in long doubles;
-DOP853 without heyoka), and closed forms where there are any. The best of them is the truth, the others are its error
-bar. Where a start moved by :data:`NUDGE` leads farther away than :data:`CHAOS`, the question is ill-posed; that time is
-the horizon.
+DOP853 without heyoka), both by implicit collocation where dampers are stiff, and closed forms where there are any. The
+best of them is the truth, the others are its error bar. Where a start moved by :data:`NUDGE` leads farther away than
+:data:`CHAOS`, the question is ill-posed; that time is the horizon.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from proofroll.core.errors import Diverged, Missing, Refused
 from proofroll.core.events import Event
 from proofroll.elements.mechanism.analysis import analysed
+from proofroll.elements.mechanism.complementarity import refuse_switching
 from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
@@ -24,6 +25,7 @@ from proofroll.truth import SAFETY
 from proofroll.truth.mechanism.closed_forms import ClosedForm, closed_form
 from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.singular_poses import branching, singular_poses, singular_poses_of
+from proofroll.truth.mechanism.stiff_routes import run_stiff, stiff
 
 CHAOS = 1e-9  # m, 1 (of quaternions): where motions that nobody can tell apart at the start differ by more
 NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: no scene file can say less
@@ -84,13 +86,9 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     try:
         second = MaximalCoordinates(mechanism)
         check_start(first, second)
-        one = first.run(times, tolerance)
-        two, precise, name = _second(second, times, tolerance)
-        # route 1 alone counts turns; all others are put on its
-        two, precise = matched(mechanism, one, two), matched(mechanism, one, precise)
-        chaotic = second.growth(times) * NUDGE > CHAOS
+        one, two, precise, growth, routes = _runs(first, second, times, tolerance)
+        chaotic = growth * NUDGE > CHAOS
         _check_branch(one, precise, chaotic)
-        routes: tuple[str, ...] = (name, "joint coordinates, DOP853")
         best = precise if exact is None else matched(mechanism, one, exact)
     except Diverged as stopped:
         if exact is None:
@@ -121,6 +119,23 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         checked = (form.title, float(largest(form.part(times) - form.same(best)).max()))
     branches = [] if exact is None or form is None else singular_poses_of(form, first, float(times[-1]))
     return TwoRouteMotion(masked, bars, differences, horizon, branches, found.determinate, routes, checked)
+
+
+def _runs(
+    first: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float
+) -> tuple[Record, Record, Record, Array, tuple[str, ...]]:
+    """Three records, the best one last, growth of a small difference, and the names of routes."""
+    mechanism = first.mechanism
+    refuse_switching(mechanism)
+    if stiff(first, float(times[-1])):
+        found = run_stiff(mechanism, first.rank, times)
+        names = "joint coordinates, implicit collocation", "maximal coordinates, implicit collocation"
+        return matched(mechanism, found.precise, found.other), found.coarse, found.precise, found.growth, names
+    one = first.run(times, tolerance)
+    two, precise, name = _second(second, times, tolerance)
+    # route 1 alone counts turns; all others are put on its
+    two, precise = matched(mechanism, one, two), matched(mechanism, one, precise)
+    return one, two, precise, second.growth(times), (name, "joint coordinates, DOP853")
 
 
 def judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
