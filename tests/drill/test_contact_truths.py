@@ -13,12 +13,12 @@ KNOWN = 1e-9
 # Scene and end [s], as far as a few seconds reach; and how often an event is seen until then, where the scene has any.
 ENDS = {
     "two_spheres": (0.15, 1), "falling_rod": (0.27, 2), "rocking_block": (0.6, 4), "ladder": (1.06, 1),
-    "sled": (0.3, 0), "eccentric_sphere": (0.08, 1), "free_turntable": (0.2, 0), "tilted_disc": (0.15, 0),
+    "sled": (0.4, 3), "eccentric_sphere": (0.08, 1), "free_turntable": (0.2, 0), "tilted_disc": (0.15, 0),
     "sled_on_slope": (0.12, 1), "rattleback": (0.1, 0),
 }  # fmt: skip
-# Starts and sizes in which the events come soon. None for the level sled,
-# whose truth ends before a foot stops at some slower starts.
+# Starts and sizes in which the events come soon; so slow, most level sleds come to rest with all feet at once.
 SOON = {
+    "sled": {"speed": 0.6, "cross_speed": 0.12, "spin": 2.4},
     "falling_rod": {"half": 0.05, "foot": 0.002},
     "eccentric_sphere": {"speed": 0.15, "cross_speed": 0.04, "spin": 2.0},
     "sled_on_slope": {"speed": 0.05, "cross_speed": 0.1, "spin": 0.8},

@@ -17,7 +17,7 @@ from proofroll.truth.mechanism.two_paths import moment
 # In natural units (natural_units.py): speeds below which nothing moves, and accelerations below which nothing will.
 # Both routes stop there, so that they integrate no round-off of a state at rest.
 AT_REST, STANDS = 1e-13, 1e-9
-STOPPED = 1e-11  # what is left of a slip that has come to rest, in a straight line from what is faint
+STOPPED = 1e-11  # what is left of a slip that has come to rest
 # Part of a normal force's answer without friction below which Painlevé's measure is taken to come to zero.
 _LEAST_RESPONSE = 1e-3
 _DIGITS = 1e-14  # of the size of the mechanism: round-off of a gap that has just opened
@@ -105,10 +105,8 @@ def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:
     return np.array([_DIGITS * size if guard.kind in {"close", "still"} else 0.0 for guard in guards])
 
 
-def faint_time(own: Acting, found: Touching, slide_rate: Array) -> float:
-    """Time after which a slip that is faint is over [s], in a straight line; along a line it is over."""
-    if own.along is not None:
-        return 0.0
+def faint_time(found: Touching, slide_rate: Array) -> float:
+    """Time after which a slip is over, in a straight line."""
     u = across(found)
     return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
 

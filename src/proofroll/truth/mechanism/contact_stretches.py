@@ -31,6 +31,8 @@ from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
 
 _AHEAD = 1e-9  # of the natural time: after a stretch has begun, whether an effort is at its limit
 _CLAMPED = 1e-9  # of a limit: an effort as near to it comes from it
+# A slip that comes to rest: part by which its logarithm falls in a step, the most steps, and what is left at their end.
+_DECAY, _MOST_DECAYS, _NOTHING = 0.25, 120, 1e-12
 
 
 class SolvedContacts(NamedTuple):
@@ -128,10 +130,32 @@ class ContactStretches(Stretches[ContactMode]):
         if leg.guard is not None and leg.guard < len(guards):
             k, kind = guards[leg.guard]
             if kind == "still":
-                found = self._solved(last, mode)
-                rest = faint_time(mode[k], found.touching[k], found.slide_rate[k])
-                end, last = end + rest, last + rest * self._given.rate(last, mode)
+                last = self._spent(last, mode, k)
+                end += float(last[-1] - leg.last[-1])
         return replace(leg, start=time, first=state, end=end, last=last)
+
+    def _spent(self, state: Array, mode: ContactMode, k: int) -> Array:
+        """The state where a faint slip has ended, by the method of Runge and Kutta in the logarithm of what is left.
+
+        A slip turns the faster the slower it is: its equations are smooth in the logarithm, and stiff in time.
+        """
+        if mode[k].along is not None:
+            return state
+
+        def decay(y: Array) -> Array:
+            """Change of a state in the time that a straight line to rest takes."""
+            found = self._touching(y)
+            now = tuple(_headed(own, each) for own, each in zip(mode, found, strict=True))
+            return faint_time(found[k], self._solved(y, now).slide_rate[k]) * self._given.rate(y, now)
+
+        for _ in range(_MOST_DECAYS):
+            if np.linalg.norm(across(self._touching(state)[k])) < _NOTHING:
+                break
+            one = decay(state)
+            two = decay(state + _DECAY / 2 * one)
+            three = decay(state + _DECAY / 2 * two)
+            state = state + _DECAY / 6 * (one + 2 * two + 2 * three + decay(state + _DECAY * three))
+        return np.asarray(state + decay(state))
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
         """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
@@ -165,9 +189,18 @@ class ContactStretches(Stretches[ContactMode]):
             refuse_turning_onset(self.contacts[k], mode[k])
             mode[k] = self._leaving(leg.last, leg.mode, k)
             return Transition(leg.last, tuple(mode), (("slip", name),))
-        if kind == "still":
-            return self._after(leg, leg.last, [own.kind != "open" for own in mode], ())
-        return self._impact(leg, k)
+        return self._stopped(leg) if kind == "still" else self._impact(leg, k)
+
+    def _stopped(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
+        """Transition where a slip comes to rest: alone, or with all others; what slides while it turns ends at once."""
+        closed, found = [own.kind != "open" for own in leg.mode], self._solved(leg.last, leg.mode)
+        slides = [k for k, own in enumerate(leg.mode) if own.kind == "slip"]
+        slips = np.linalg.norm([across(found.touching[k]) for k in slides], axis=1)
+        if slips.max() <= FAINT:
+            ended = self._after(leg, leg.last, closed, (), stopped=FAINT)
+            if ended.mode is not None and self._stands(ended.state, ended.mode):
+                return replace(ended, blur=float((slips / np.linalg.norm(found.slide_rate[slides], axis=1)).max()))
+        return self._after(leg, leg.last, closed, ())
 
     def _after(
         self,
@@ -177,10 +210,11 @@ class ContactStretches(Stretches[ContactMode]):
         happened: tuple[tuple[str, str], ...],
         margin: float = np.inf,
         delay: float = 0.0,
+        stopped: float = STOPPED,
     ) -> Transition[ContactMode]:
-        """The mode that follows from the forces, with what stopped taken to stand."""
+        """The mode that follows from the forces; what slips no faster than ``stopped`` is taken to stand."""
         slips = [float(np.linalg.norm(across(each))) for each in self._touching(state)]
-        still = [shut and slip <= STOPPED for shut, slip in zip(closed, slips, strict=True)]
+        still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._given.eliminated(state, held(closed, still))
         mode, sure = self._decided(state, closed, still)
         changed = events(self.contacts, leg.mode, mode, self._stands(state, mode))
@@ -194,6 +228,15 @@ class ContactStretches(Stretches[ContactMode]):
             return False
         found = self._solved(state, mode)
         return float(np.abs(found.velocity).max()) <= AT_REST and float(np.abs(found.acceleration).max()) <= STANDS
+
+
+def _headed(own: Acting, found: Touching) -> Acting:
+    """A slip that may be faint with its direction now."""
+    slip = across(found)
+    if own.kind != "slip" or own.along is not None or not slip.any():
+        return own
+    x, y, z = (slip / np.linalg.norm(slip)).tolist()
+    return own._replace(heading=(x, y, z))
 
 
 def held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:

@@ -119,9 +119,9 @@ def moment(time: float) -> float:
 
 
 def _events(one: Path, two: Path, unit: float) -> Sequence[Event]:
-    """The changes of both routes, each with a bracket that holds both times and their round-off; ``unit`` [s]."""
+    """The changes of both routes, each with a bracket that holds both times, round-off and blur; ``unit`` [s]."""
     found = []
     for a, b in zip(one.happenings, two.happenings, strict=False):  # beyond where they part there may be more of one
-        time, wide = unit * float(a.time), unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * a.time)
+        time, wide = unit * float(a.time), unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * a.time + a.blur)
         found.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
     return tuple(found)
