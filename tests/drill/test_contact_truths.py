@@ -12,8 +12,8 @@ from proofroll.truth.mechanism.switched_truth import truth_of
 KNOWN = 1e-9
 # Scene and end [s], as far as a few seconds reach; and how often an event is seen until then, where the scene has any.
 ENDS = {
-    "two_spheres": (0.15, 1), "falling_rod": (0.27, 2), "rocking_block": (0.6, 4), "ladder": (1.06, 1),
-    "sled": (0.4, 3), "eccentric_sphere": (0.08, 1), "free_turntable": (0.2, 0), "tilted_disc": (0.15, 0),
+    "two_spheres": (0.15, 1), "falling_rod": (0.27, 2), "rocking_block": (0.6, 4), "sled": (0.4, 3),
+    "ladder": (1.06, 1), "eccentric_sphere": (0.08, 1), "free_turntable": (0.2, 0), "tilted_disc": (0.15, 0),
     "sled_on_slope": (0.12, 1), "rattleback": (0.1, 0),
 }  # fmt: skip
 # Starts and sizes in which the events come soon; so slow, most level sleds come to rest with all feet at once.
