@@ -22,7 +22,7 @@ from proofroll.core.truth import truth
 from proofroll.files.scene_file import load_scene
 from proofroll.running.simulation import simulate
 from proofroll_drill.mutants import ball_models, contact_models, joint_laws
-from proofroll_drill.mutants.drilling import ENOUGH, tried
+from proofroll_drill.mutants.drilling import ENOUGH, mutants, tried
 
 
 @functools.cache
@@ -36,7 +36,7 @@ def _drilled() -> dict[str, object]:
 @pytest.mark.slow
 @pytest.mark.timeout(900)  # 20 s of processor time, on a machine that may have much else to do
 def test_every_mutant_is_detected_and_most_are_named() -> None:
-    """At least thirty engines with one fault each: all are detected, nine of ten have their cause named."""
+    """At least thirty engines with one fault each: all are detected, nine of ten named, of contacts and joints all."""
     found = _drilled()
     rows = found["mutants"]
     assert isinstance(rows, list)
@@ -44,48 +44,19 @@ def test_every_mutant_is_detected_and_most_are_named() -> None:
     assert [row["mutant"] for row in rows if not row["detected"]] == []
     assert sum(row["named"] for row in rows) == found["named"] >= ENOUGH * len(rows)
     assert all(row["said"] for row in rows if row["named"])
+    of_laws = {kind.__name__ for kind in mutants() if kind.__module__ in {contact_models.__name__, joint_laws.__name__}}
+    assert [row for row in rows if row["mutant"] in of_laws and not row["named"]] == []
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        "PyramidForCone",
-        *(
-            pytest.param(name, marks=pytest.mark.drill)
-            for name in (
-                "OtherBody",
-                "FrictionOff",
-                "FrictionTwoPercent",
-                "ContactLeftOut",
-                "FootMoved",
-                "NormalTurned",
-                "RestitutionSwapped",
-                "LateImpact",
-            )
-        ),
-    ],
-)
-def test_every_fault_of_contacts_is_detected_and_named(fault: str) -> None:
-    """Friction, its law, geometry, pairs, forces and impacts that are not the scene's: each is found, and its cause."""
-    found = tried(getattr(contact_models, fault))
+def test_a_fault_of_contacts_is_detected_and_named() -> None:
+    """A law of friction that is not the scene's is found, and its cause."""
+    found = tried(contact_models.PyramidForCone)
     assert found.detected
     assert found.named, found.said
 
 
 @pytest.mark.parametrize(
-    "fault",
-    [
-        "RoughJoint",
-        "PushingJoint",
-        "TightClamp",
-        "SwappedGains",
-        "Undamped",
-        "InverseGear",
-        *(
-            pytest.param(name, marks=pytest.mark.drill)
-            for name in ("RoughAgain", "MovedStop", "MovedStopWithRebounds", "NoArmature", "NoClamp")
-        ),
-    ],
+    "fault", ["RoughJoint", "PushingJoint", "TightClamp", "SwappedGains", "Undamped", "InverseGear"]
 )
 def test_a_law_of_joints_that_is_another_is_named(fault: str) -> None:
     """Friction, stops, armature, limits, gains and gears of joints that are not the scene's are named as such."""

@@ -51,12 +51,11 @@ def solve(way: str, scene: Scene, until: float, samples: int = 3) -> xr.Dataset:
     params=[
         "reduced",
         pytest.param("unreduced", marks=pytest.mark.drill),
-        pytest.param("projection[formulation=euler]", marks=pytest.mark.drill),
         "projection[formulation=rotating_frame]",
     ]
 )
 def way(request: pytest.FixtureRequest) -> Any:
-    """Both routes to the truth, and the engine that is part of the project."""
+    """Both routes to the truth, and the engine that is part of the project; its Euler angles: ``test_extremes``."""
     return request.param
 
 
