@@ -1,10 +1,9 @@
 """Exudyn (https://github.com/jgerstmayr/EXUDYN), an engine for flexible and rigid multibody systems.
 
-It has no joint for a sphere on a curved wall. Four models of one are built here from what it has; see the modules
-:mod:`generic` (and of it, where the wall does not slide along itself or moves, :mod:`world_coordinates`),
-:mod:`carrier`, :mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first
-the ball is a rigid body, whose orientation is in the model, asked for or not: the node's Euler parameters are its
-coordinates.
+It has no joint for a sphere on a curved wall. Four formulations of one are built from its items: :mod:`generic` (on a
+wall that moves, or that no rigid motion slides along itself, :mod:`world_coordinates`), :mod:`carrier`,
+:mod:`rolling_disc` and :mod:`contact`. The first and the last let the ball slip. In all but the first the ball is a
+rigid body; its orientation is always in the model, as Euler parameters of its node.
 
 Mechanisms are bodies in redundant coordinates (:mod:`redundant`) or its kinematic tree (:mod:`tree`).
 """
@@ -136,7 +135,7 @@ class Exudyn:
 
     @staticmethod
     def version() -> str:
-        """Version of the installed package; the extension module names another one on some platforms."""
+        """Version of the installed package; on some platforms the extension module reports a different one."""
         return version("exudyn")
 
     @staticmethod
@@ -158,7 +157,7 @@ class Exudyn:
 
     @classmethod
     def build(cls, scene: Scene, settings: ExudynSettings) -> ExudynModel:
-        """See :class:`proofroll.core.engine.Engine`; what it builds is a run of a formulation."""
+        """See :class:`proofroll.core.engine.Engine`; builds a run of the formulation."""
         if settings.formulation in _WITH_FRAMES and not hasattr(exu, "HT"):
             raise Refused(
                 f"{settings.formulation} needs the frames of markers of exudyn 1.13, and this is {cls.version()}"

@@ -1,4 +1,4 @@
-"""Ball, weight and rolling resistance shared by the two rigid-body formulations."""
+"""Ball, weight and rolling resistance, shared by the formulations with a rigid body."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from proofroll.engines.exudyn.native import Output, add_rigid_body, items, loads
 
 @dataclass(frozen=True)
 class RigidBall:
-    """Exudyn's numbers of the items of one ball.
+    """Item numbers of one ball in an Exudyn system.
 
     Attributes:
         node: rigid-body node with Euler parameters; with the rotation-vector Lie-group node the same time step leaves
@@ -46,7 +46,7 @@ class RigidBall:
         )
 
     def built(self, ball_radius: float | None, gap: float | None) -> BallBuilt:
-        """Model read back from Exudyn; the radius [m] and the gap [m], which joints or contact hold, are given."""
+        """Model read back from Exudyn, with the radius [m] and the gap [m], which the caller reads from its joint."""
         body = rigid_body(self.system, self.body)
         return BallBuilt(
             mass=body["mass"],
@@ -67,11 +67,15 @@ class RigidBall:
 
 
 def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatArray, w: FloatArray) -> tuple[Any, Any]:
-    """Node and rigid body, not turned at time 0: centre [m], velocity [m/s], angular velocity [rad/s]."""
+    """Adds a rigid body in world axes at time 0: centre [m], velocity [m/s], angular velocity [rad/s].
+
+    Returns:
+        Its node and its body.
+    """
     node = system.AddNode(
         items.NodeRigidBodyEP(
             referenceCoordinates=[*p, 1.0, 0.0, 0.0, 0.0],
-            initialVelocities=[*v, 0.0, *(w / 2)],  # rates of the Euler parameters of a body that is not turned
+            initialVelocities=[*v, 0.0, *(w / 2)],  # rates of the Euler parameters of a body in world axes
         )
     )
     body = add_rigid_body(system, mass, [inertia, inertia, inertia, 0.0, 0.0, 0.0], node)
@@ -79,7 +83,10 @@ def add_body(system: Any, mass: float, inertia: float, p: FloatArray, v: FloatAr
 
 
 def add_ball(system: Any, rolling: RollingBall, spin: FloatArray | None = None) -> RigidBall:
-    """The ball with its weight and, where there is any, its rolling resistance; ``spin`` [rad/s] is its start's."""
+    """Adds the ball with its weight and any rolling resistance.
+
+    ``spin`` is the initial angular velocity [rad/s]; by default the scene's.
+    """
     ball, w0 = rolling.ball, rolling.w0 if spin is None else spin
     node, body = add_body(system, ball.mass, ball.inertia, rolling.p0, rolling.v0, w0)
     marker = system.AddMarker(items.MarkerBodyRigid(bodyNumber=body))
@@ -95,10 +102,10 @@ def add_ball(system: Any, rolling: RollingBall, spin: FloatArray | None = None) 
 
 
 def resisting(rolling: RollingBall, marker: Any, node: Any) -> dict[str, Any]:
-    """Arguments of the load of the rolling resistance on a marker, of a ball whose centre is that of a node."""
+    """Arguments of the load that applies rolling resistance at ``marker``; ``node`` is at the ball's centre."""
     return {
         "markerNumber": marker,
-        # Not used as a moment: it hands f to the function, and can be read back.
+        # Holds f for the user function, not a moment; so it can be read back.
         "loadVector": [rolling.contact.rolling_resistance, 0.0, 0.0],
         "loadVectorUserFunction": _resistance(rolling, node),
     }
@@ -132,7 +139,7 @@ def _resistance(rolling: RollingBall, node: Any) -> Any:
         # v·(∂e1/∂p)v, of which a homogeneous surface has the same coefficients everywhere
         turning = k22 * v2 * v2 + (twist * v2 + k33 * v3) * v3 if homogeneous else vx * ex + vy * ey + vz * ez
         N = m * (turning + x1 * gx + y1 * gy + z1 * gz)
-        # as resistance_moment, the call of which would be felt
+        # resistance_moment, written out to save the call
         factor = load[0] * N / speed
         M2, M3 = -factor * v3, factor * v2
         return [M2 * x2 + M3 * x3, M2 * y2 + M3 * y3, M2 * z2 + M3 * z3]

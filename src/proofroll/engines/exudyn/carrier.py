@@ -1,4 +1,4 @@
-"""A rigid ball held by a massless carrier that can only do what slides the wall along itself.
+"""A rigid ball held by a massless carrier whose only motions slide the wall along itself.
 
 The carrier's joint with the ground frees exactly the wall's two generators, and the ball turns about a point of the
 carrier. Rolling is two constraints between rates of relative coordinates. Everything is a built-in item of Exudyn;
@@ -22,13 +22,13 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 
 
 class RollingRow(NamedTuple):
-    """One constraint of rolling: a rate of the carrier, and the spin of the ball relative to it.
+    """One constraint of rolling, between a rate of the carrier and the spin of the ball relative to it.
 
     Attributes:
-        item: Exudyn's number of it.
-        generator: whose coordinate of the carrier it takes.
-        along: motion of the ball per unit of that coordinate, along e2 or e3 [m/unit].
-        axis: of the spin, in the world at time 0.
+        item: number of the constraint in Exudyn.
+        generator: motion of the carrier whose rate is constrained.
+        along: motion of the ball along e2 or e3 per unit of that coordinate [m/unit].
+        axis: axis of the spin, in the world at time 0.
     """
 
     item: Any
@@ -67,7 +67,11 @@ class Carrier(ExudynModel):
         self.integration = Integration(self.system, settings, self._turning(body))
 
     def _constrain(self, body: RollingBall, local: LocalGeometry) -> list[RollingRow]:
-        """Rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0."""
+        """Adds rolling along e2 and e3: K u̇ ± a (spin of the ball relative to the carrier) = 0.
+
+        Raises:
+            Refused: rolling along one direction involves both coordinates of the carrier.
+        """
         frame, a = body.surface.frame(body.u0), body.ball.radius
         result = []
         for along, about, sign in ((1, 2, 1.0), (2, 1, -1.0)):
@@ -92,7 +96,7 @@ class Carrier(ExudynModel):
         return result
 
     def _factor(self, row: RollingRow) -> float:
-        """Factor of the spin that makes up for a rate of the coordinate, in Exudyn."""
+        """Factor of the spin in a rolling constraint, as Exudyn holds it."""
         return float(self.system.GetObject(row.item)["factor1"])
 
     def _turning(self, body: RollingBall) -> dict[Any, FloatArray]:
@@ -110,13 +114,17 @@ class Carrier(ExudynModel):
     def built(self) -> BallBuilt:
         """See :class:`proofroll.core.engine.Engine`."""
         row = self.rolling[1]
-        # How far the ball's centre is from its place in the carrier, which is not turned at time 0.
+        # Distance of the ball's centre from its place in the carrier, whose axes are the world's at time 0.
         off = self.system.GetObjectOutput(self.joint, Output.DisplacementLocal)
         return self.ball.built(abs(self._factor(row) * row.along), -float(off @ self.normal))
 
 
 def _joint_axes(generators: tuple[Generator, Generator]) -> tuple[FloatArray, list[int]]:
-    """Axes of one joint, as columns, and which translations and rotations are locked; refuses what one joint cannot."""
+    """Axes of the carrier's joint, as columns, and 1 for each translation and rotation that it locks.
+
+    Raises:
+        Refused: the generators are two rotations, or skew, so that no single joint frees them.
+    """
     if all(generator.kind == "rotation" for generator in generators):
         raise Refused("one joint cannot guide the carrier about two axes")
     first, second = (np.asarray(generator.axis) for generator in generators)

@@ -1,6 +1,6 @@
-"""Joints and loops between rigid bodies as Exudyn's constraints and connectors, and what they transmit.
+"""Joints and loops between rigid bodies as Exudyn's constraints and connectors, and their reactions.
 
-Each has two markers with the axes of the joint's own frames, along whose first Exudyn gives its reactions.
+Each has two markers with the axes of the joint's own frames; Exudyn gives reactions in the axes of the first.
 """
 
 from collections.abc import Callable, Mapping
@@ -13,25 +13,29 @@ from proofroll.elements.mechanism.model import JointOrLoop
 from proofroll.elements.mechanism.rotations import Array, cross
 from proofroll.engines.exudyn.native import Output, data_node, exu, items
 
-# What Exudyn's joints hold between two frames: three translations and three rotations, in the axes of the first.
+# 1 for each of three translations and three rotations that Exudyn's joint locks, in the axes of its first frame.
 _HELD = {
     "fixed": (1, 1, 1, 1, 1, 1),
     "prismatic": (1, 1, 0, 1, 1, 1),
     "universal": (1, 1, 1, 0, 1, 0),
     "planar": (0, 0, 1, 1, 1, 0),
 }
-# A revolute loop of a planar mechanism: what else it holds is held already.
+# The same for a revolute loop of a planar mechanism: the plane locks the rest already.
 _IN_PLANE = (1, 1, 0, 0, 0, 0)
-# Which axes (of the first, of the second frame) each rotational row keeps perpendicular. ``TorqueLocal`` is no moment:
-# its components are these rows' multipliers. Found from the rows' residuals; Exudyn's documents do not say it.
+# The two axes, one of each frame, that each rotational row keeps perpendicular. Components of ``TorqueLocal`` are the
+# multipliers of these rows, not a moment. Found from residuals of the rows; Exudyn's documents do not describe it.
 _THREE, _TWO = ((2, 1), (2, 0), (0, 1)), ((2, 0), (2, 1))
 _ROWS = {"fixed": _THREE, "prismatic": _THREE, "revolute": _TWO, "planar": _TWO, "universal": (None, (0, 2))}
 
 
 class Connected(NamedTuple):
-    """A joint or loop, whose frames are as they are, or permuted, in Exudyn; its constraint, own spring and markers.
+    """A joint or loop in Exudyn.
 
-    ``rows`` are those of :data:`_ROWS`, between these frames.
+    Attributes:
+        between: the joint or loop, with its frames as Exudyn has them: for a universal joint the axes are permuted.
+        constraint, spring: Exudyn's objects; None where there is none.
+        markers: Exudyn's markers on both bodies.
+        rows: perpendicular axes of these frames, see ``_ROWS``.
     """
 
     between: JointOrLoop
@@ -42,7 +46,7 @@ class Connected(NamedTuple):
 
 
 def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], Any]) -> None:
-    """The springs between points; ``marker`` makes Exudyn's marker at a place in a body's frame."""
+    """Adds the springs between points; ``marker`` makes Exudyn's marker at a place in a body's frame."""
     for spring in mechanism.springs:
         ends = ((spring.body_a, spring.position_a), (spring.body_b, spring.position_b))
         system.AddObject(
@@ -56,9 +60,13 @@ def add_springs(system: Any, mechanism: Mechanism, marker: Callable[[str, Any], 
 
 
 class Connections:
-    """Connects the bodies of a system, by name, the world among them.
+    """Adds joints and loops between bodies of a system, and reads their reactions.
 
-    ``com``: Exudyn's reference point of each body; ``turns``: rotation from our body axes to Exudyn's.
+    Args:
+        system: Exudyn's system.
+        bodies: body name -> Exudyn's number of it; the world is one of them.
+        com: body name -> Exudyn's reference point, the centre of mass, in our body frame [m].
+        turns: body name -> rotation from our body axes to Exudyn's.
     """
 
     def __init__(
@@ -75,7 +83,7 @@ class Connections:
         return np.asarray(self._turns[body] @ (np.array(position) - self._com[body]))
 
     def coordinate(self, joint: Joint) -> Any:
-        """A marker of the coordinate of a joint; the angle of one is zero where Exudyn's axes of both bodies agree."""
+        """Marker of a joint's coordinate; an angle is zero where the axes of both bodies in Exudyn are parallel."""
         between: dict[str, Any] = {
             "bodyNumbers": [self._bodies[joint.parent], self._bodies[joint.child]],
             "localPosition0": self._local(joint.parent, joint.position),
@@ -88,21 +96,24 @@ class Connections:
         return self._system.AddMarker(items.MarkerBodiesRelativeRotationCoordinate(nodeNumber=node, **between))
 
     def connect(self, between: JointOrLoop, joint: Joint | None, *, flat: bool) -> Connected:
-        """A joint with its own spring, damper and drive, or a loop; ``flat`` in a planar mechanism."""
+        """Adds a joint with its own spring, damper and drive, or a loop, whose ``joint`` is None.
+
+        ``flat``: the mechanism is planar.
+        """
         kind, A, B = between.kind, between.frame_a, between.frame_b
         if kind == "universal":  # Exudyn's row is x of the first to z of the second, ours z to x
             A, B = A[:, [2, 0, 1]], B[:, [1, 2, 0]]
         markers = [self.marker(between.a, between.position_a, A), self.marker(between.b, between.position_b, B)]
-        made, rows = None, _ROWS.get(kind, ())
+        item, rows = None, _ROWS.get(kind, ())
         if kind == "spherical":
-            made = items.ObjectJointSpherical(markerNumbers=markers)
+            item = items.ObjectJointSpherical(markerNumbers=markers)
         elif kind == "revolute" and flat and joint is None:
-            made, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
+            item, rows = items.ObjectJointGeneric(constrainedAxes=_IN_PLANE, markerNumbers=markers), ()
         elif kind == "revolute":
-            made = items.ObjectJointRevoluteZ(markerNumbers=markers)
+            item = items.ObjectJointRevoluteZ(markerNumbers=markers)
         elif kind != "free":
-            made = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
-        constraint = None if made is None else self._system.AddObject(made)
+            item = items.ObjectJointGeneric(constrainedAxes=_HELD[kind], markerNumbers=markers)
+        constraint = None if item is None else self._system.AddObject(item)
         spring = None if joint is None else self._spring_of(joint, markers)
         return Connected(between._replace(frame_a=A, frame_b=B), constraint, spring, markers, rows)
 
@@ -113,20 +124,20 @@ class Connections:
         law = {"stiffness": joint.stiffness, "damping": joint.damping, "offset": joint.rest}
         if joint.kind == "spherical":
             D = np.diag([0.0, 0.0, 0.0, *[joint.damping] * 3])
-            made = items.ObjectConnectorRigidBodySpringDamper(damping=D, markerNumbers=markers)
+            item = items.ObjectConnectorRigidBodySpringDamper(damping=D, markerNumbers=markers)
         elif joint.kind == "prismatic":  # its force is a pull, as the spring's is
-            made = items.ObjectConnectorLinearSpringDamper(
+            item = items.ObjectConnectorLinearSpringDamper(
                 markerNumbers=markers, force=-joint.constant_drive, axisMarker0=[0.0, 0.0, 1.0], **law
             )
         else:  # its torque acts against the angle, as the spring's does; the node counts whole turns
             node = data_node(self._system, joint.q0[0])
-            made = items.ObjectConnectorTorsionalSpringDamper(
+            item = items.ObjectConnectorTorsionalSpringDamper(
                 nodeNumber=node, torque=-joint.constant_drive, **law, markerNumbers=markers
             )
-        return self._system.AddObject(made)
+        return self._system.AddObject(item)
 
     def axes(self, made: Connected) -> tuple[Array, Array]:
-        """The frames of a joint in the world."""
+        """World axes of both frames of a joint, as columns, shape (3, 3) each."""
         R_a, R_b = (
             np.eye(3) if body == WORLD else self.body(body, Output.RotationMatrix, np.zeros(3)).reshape(3, 3)
             for body in (made.between.a, made.between.b)
@@ -134,7 +145,7 @@ class Connections:
         return R_a @ made.between.frame_a, R_b @ made.between.frame_b
 
     def reaction(self, made: Connected) -> tuple[Array, Array]:
-        """Force and moment on the second body at its marker."""
+        """Force [N] and moment [N m] of a joint or loop on the second body at its marker, world axes."""
         system, (A, B) = self._system, self.axes(made)
         force, torque = np.zeros(3), np.zeros(3)
         if made.between.kind == "spherical":
@@ -154,7 +165,7 @@ class Connections:
         return force, torque
 
     def body(self, name: str, output: Any, at: Array) -> Array:
-        """A quantity at a place of a body, from its centre of mass."""
+        """Exudyn's output variable of a body at the place ``at`` relative to its centre of mass [m], our body axes."""
         turn, now = self._turns[name], exu.ConfigurationType.Current
         quantity = np.array(self._system.GetObjectOutputBody(self._bodies[name], output, turn @ at, now))
         return (quantity.reshape(3, 3) @ turn).ravel() if output == Output.RotationMatrix else quantity

@@ -34,13 +34,13 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 # Radius of the hollow sphere in radii of the ball where the wall is not curved. The larger it is, the less its normal
 # turns between two residuals, and the more the stiffness magnifies the round-off of the distance.
 ON_A_PLANE = 10.0
-# The ball slips once it has left the friction zone and is this many times as fast as its edge: at a grazing onset the
-# time steps throw the slip velocity to and fro across the edge itself.
+# Slip speed, in units of ``friction_zone``, from which the ball counts as slipping: at a grazing onset, time steps
+# throw the slip velocity to and fro across the edge of the zone itself.
 SURELY = 2.0
-# Part of the natural force [1]: a ball that presses less, of which rolling needs more friction than a grip gives, is
-# about to leave the wall, where a ball that sticks by whatever friction would leave it hardly later.
+# Part of the natural force [1]: with less normal force than this, a ball that slips for lack of grip is about to leave
+# the wall, and one with unbounded friction would leave it hardly later.
 LETTING_GO = 0.01
-# Looked up once: the functions that Exudyn calls ask for them at every iterate and step.
+# Looked up once: the functions that Exudyn calls use them at every iterate and step.
 POSITION, COORDINATES = Output.Position, Output.Coordinates
 # Exudyn wants a coefficient of restitution above zero.
 DEAD = 1e-6
@@ -68,7 +68,7 @@ class PenaltyContact(ExudynModel):
         if N <= 0 and not body.gap0:
             raise Refused("nothing presses the ball against the wall at time 0, so its contact is not closed")
         friction = force + N * e1
-        # With this slip velocity the softened friction is the one that rolling needs, and need not build up.
+        # At this slip velocity the softened friction is the one that rolling needs, from time 0 on.
         needed = float(np.linalg.norm(friction))
         if needed > mu * N and not self.bounded:
             raise Refused("rolling needs more friction than grip at time 0; use a larger grip")
@@ -94,7 +94,8 @@ class PenaltyContact(ExudynModel):
             items.ObjectContactSphereSphere(
                 markerNumbers=[self.ball.marker, self.follower],
                 nodeNumber=self.data,
-                # By half of what the ball sinks in under the first normal force: at time 0 it is where the scene says.
+                # Ball and hollow sphere overlap by the depth of the first normal force, half of it each, so that at
+                # time 0 the ball is where the scene puts it.
                 spheresRadii=[radius + sunk / 2, hollow - sunk / 2],
                 isHollowSphere1=True,
                 dynamicFriction=mu,
@@ -112,14 +113,14 @@ class PenaltyContact(ExudynModel):
         self._left: tuple[float, float] | None = None
         self._sticks = needed <= mu * N and not slips
         self._flies = body.flies
-        if not body.flies:  # else slip and stick are those of impacts, shorter than any sample
+        if not body.flies:  # a ball that flies sticks and slips only in impacts, shorter than any sample interval
             self.system.SetPostStepUserFunction(self._watch)
         self.integration = Integration(self.system, settings, impacts=body.flies)
         if not self._sticks and not body.flies:
             self.integration.events.append(Event("slip", 0.0, 0.0, 0.0))
 
     def _watch(self, system: Any, t: float) -> bool:
-        """Called by Exudyn after each step, and once where it starts."""
+        """Records events; Exudyn calls it after each step and once at the start. False ends the run."""
         if t <= self._t:
             return True
         gap, speed, _, _ = system.GetNodeOutput(self.data, COORDINATES).tolist()
@@ -142,7 +143,7 @@ class PenaltyContact(ExudynModel):
 
     def _switch(self, kind: EventKind, low: float, high: float) -> None:
         if not self.bounded:
-            # Friction of any bound slips before the ball leaves the wall: not the grip's fault where nothing presses.
+            # Any bounded friction slips just before the ball leaves the wall: then the grip is not too small.
             if self._pressing() < LETTING_GO * self._natural:
                 self._sticks = False
                 return
@@ -152,7 +153,7 @@ class PenaltyContact(ExudynModel):
         self._sticks, self._left = kind == "stick", None
 
     def _pressing(self) -> float:
-        """N [N] of a ball that slips."""
+        """Normal force on a slipping ball [N], from the size of the contact force and the grip."""
         force = np.asarray(self.system.GetObjectOutput(self.contact, Output.Force))
         return float(np.linalg.norm(force)) / math.hypot(1.0, self._grip)
 
@@ -167,7 +168,7 @@ class PenaltyContact(ExudynModel):
         """See :class:`proofroll.core.engine.Engine`."""
         contact = self.system.GetObject(self.contact)
         gap = float(self.system.GetObjectOutput(self.contact, Output.DisplacementLocal))
-        # The hollow sphere is no measure of how far from the wall a ball flies.
+        # The hollow sphere stops following a ball far from the wall, so an open gap is not reported.
         built = self.ball.built(float(contact["spheresRadii"][0] + min(gap, 0.0) / 2), None if gap > 0 else gap)
         mu = float(contact["dynamicFriction"])
         terms = built.terms or frozenset()
@@ -177,16 +178,16 @@ class PenaltyContact(ExudynModel):
 
 
 def _impacts(restitution: float | None) -> dict[str, float]:
-    """Arguments of the contact that damp its impacts; none without a restitution."""
+    """Arguments of Exudyn's contact for a coefficient of restitution; none if the scene gives none."""
     return {} if restitution is None else {"restitutionCoefficient": max(restitution, DEAD), "impactModel": 2}
 
 
 def _follower(
     system: Any, node: Any, marker: Any, nearby: Callable[..., tuple[float, ...]], distance: float
 ) -> Callable[..., None]:
-    """Moves the hollow sphere to where the ball touches the wall, as :func:`_centre` says; called for every residual.
+    """User function that moves the hollow sphere to touch the wall where the ball does, see :func:`_centre`.
 
-    So what Exudyn is asked is looked up once.
+    Exudyn calls it for every residual, so its own functions are looked up once.
     """
     output, move, farthest = system.GetNodeOutput, system.SetMarkerParameter, 0.5 * distance
 
@@ -200,7 +201,7 @@ def _follower(
 
 
 def _hollow_radius(body: RollingBall) -> float:
-    """Inner radius of a sphere that is curved as the wall is where it is curved most [m]."""
+    """Inner radius of the hollow sphere [m]: that of the wall's largest curvature at the start, or ``ON_A_PLANE``."""
     most = float(np.linalg.eigvalsh(curvature(body.surface, body.u0))[-1])
     return body.ball.radius * ON_A_PLANE if most <= 0 else body.ball.radius + 1 / most
 
@@ -208,10 +209,10 @@ def _hollow_radius(body: RollingBall) -> float:
 def _softened(
     body: RollingBall, settings: ExudynSettings, creep: FloatArray, press: float, mu: float, hollow: float
 ) -> dict[str, Regularised]:
-    """Softened quantities at time 0: creep, depth, the bound of friction, and forces that magnify round-off.
+    """Certificate tolerances at time 0 for creep, depth, bound of friction, and forces that magnify round-off.
 
-    At time 0 the ball slips with ``creep`` [m/s] under the normal force ``press`` [N]; ``mu`` [1] and the radius
-    ``hollow`` [m] of the sphere are those that are built.
+    At time 0 the ball slips with ``creep`` [m/s] under the normal force ``press`` [N]. The contact has the coefficient
+    ``mu`` [1] and a hollow sphere of radius ``hollow`` [m].
     """
     a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
     stiffness, zone, _ = settings.penalty
@@ -244,11 +245,14 @@ def _softened(
 
 
 def _centre(body: RollingBall, distance: float) -> FloatArray:
-    """Centre of the hollow sphere at time 0 [m], shape (3,): a touching ball's centre is ``distance`` away from it."""
+    """Centre of the hollow sphere at time 0 [m], shape (3,), ``distance`` [m] from the centre of a touching ball."""
     gap, *e1 = body.surface.nearby(*body.p0.tolist())
     return np.asarray(body.p0 + _back(gap, distance) * np.array(e1))
 
 
 def _back(gap: float, distance: float) -> float:
-    """Place of the hollow sphere's centre along e1 from the ball's [m]; of a ball far off, not beyond it."""
+    """Coordinate along e1 of the hollow sphere's centre from the ball's [m].
+
+    At most -``distance``/2: the sphere does not follow a ball that is further from the wall than that.
+    """
     return min(gap, 0.5 * distance) - distance

@@ -1,7 +1,7 @@
-"""Rolling resistance and Coulomb friction in the wall's local frame: what a ball needs to roll, and what it slips with.
+"""Rolling resistance and Coulomb friction in the wall's local frame: friction needed to roll, and friction of slip.
 
-Two components along e2 and e3 everywhere. While the ball slips, the force is -μk N d with a unit direction d that is
-held over one step, so that Newton's method never meets the kink of the law at rest.
+All vectors have two components, along e2 and e3. While the ball slips, the force is -μk N d with a unit direction d
+that is constant over a step, so that Newton's method never meets the kink of the law at rest.
 """
 
 import math
@@ -14,13 +14,13 @@ import numpy as np
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.local_frame import curvature
 
-# A slip that the needed friction would change within this part of a step is the round-off of a rolling constraint.
+# A slip that the needed friction would stop within this part of a step counts as round-off of a rolling constraint.
 AT_REST = 1e-6
 ROUND_OFF = 1e-12  # of a slip velocity [m/s]
-# Cosine below which a predicted direction is no longer that of a slip which goes on.
+# Cosine between present and predicted slip below which the slip counts as ending, not as turning.
 ACROSS = 0.1
-# Part of the speed of a fall by the radius below which the moment falls to zero with the speed: Newton's method does
-# not pass the jump of its direction at rest. A ball that stops from that speed goes the square of it, 4e-6, too far.
+# Speed, in units of sqrt(a g), below which the moment of rolling resistance falls to zero with the speed: Newton's
+# method fails at the jump of its direction at rest. It lets a ball roll too far by the square of this, 4e-6.
 _SLOW = 2e-3
 
 
@@ -29,7 +29,7 @@ class Touch(NamedTuple):
 
     Attributes:
         N: normal force [N].
-        need2, need3: the friction on the ball that would leave the slip velocity as it is [N].
+        need2, need3: friction on the ball that would keep the slip velocity constant [N].
         u2, u3: slip velocity [m/s].
     """
 
@@ -52,12 +52,12 @@ class Touch(NamedTuple):
 
 @dataclass
 class KineticFriction:
-    """Kinetic friction as it is built, shared with the function that applies it.
+    """Kinetic friction of a model; its user function for forces reads ``direction``.
 
     Attributes:
         mu_kinetic: |F|/N [1].
         direction: unit direction of slip (e2, e3) for the coming step; None: the ball rolls.
-        applied: the one with which the present state was computed.
+        applied: direction with which the present state was computed; None: rolling.
     """
 
     mu_kinetic: float
@@ -75,15 +75,15 @@ NeededAt = Callable[[float, float, float, float, float, float], tuple[float, flo
 
 
 def slow(body: RollingBall) -> float:
-    """Speed of the centre [m/s] below which the rolling resistance grows with it."""
+    """Speed of the centre [m/s] below which the rolling resistance is proportional to it."""
     return _SLOW * math.sqrt(body.ball.radius * float(np.linalg.norm(body.gravity)))
 
 
 def resistance_moment(f: float, N: float, v2: float, v3: float, slow: float) -> tuple[float, float]:
     """Moment about the centre along e2 and e3 [N m]: that of -N e1 shifted by ``f`` [m] along the velocity [m/s].
 
-    :func:`mechanics.resistance_moment` in the local frame and as plain floats: it runs for every residual. For ``slow``
-    see there.
+    :func:`mechanics.resistance_moment` in the local frame and as plain floats, for it runs for every residual. Below
+    the speed ``slow`` [m/s] the moment is proportional to the speed.
     """
     speed = max(math.hypot(v2, v3), slow)
     if not speed:
@@ -98,7 +98,9 @@ def mobility(body: RollingBall) -> float:
 
 
 def needed_function(body: RollingBall) -> NeededAt:
-    """The contact of a ball on a homogeneous surface, whose curvature in the local frame is the same everywhere.
+    """Function for the normal force and the needed friction of a ball on a homogeneous surface.
+
+    Homogeneous: the curvature in the local frame is the same everywhere.
 
     The slip velocity u = v + a ω × e1 changes by u̇ = g + βF + (a/J) M × e1 + a ω × ė1 along the tangents, with the
     moment M of the rolling resistance; N = m (v·ė1 + e1·g), as the ball stays on the wall.
@@ -123,16 +125,16 @@ def needed_function(body: RollingBall) -> NeededAt:
 def slip_direction(
     at: Touch, rate: tuple[float, float], friction: float, beta: float, dt: float, *, inside: bool
 ) -> tuple[float, float]:
-    """Unit direction of the slip velocity that stands for the coming step.
+    """Unit direction of slip (e2, e3) that is used throughout the coming step.
 
     Near rest the direction turns towards that of -need at the rate x = β|need| dt/|u| per step, faster than any step
-    resolves. With the need frozen it is left behind by a factor exp(-x), which gives the direction at the end of the
-    step, and its mean inside the step. Both are of second order where x is small and do not ring where it is large. In
-    the step that brings the ball to rest it is the one direction in which both components end together.
+    resolves. With the need constant, the old direction decays by exp(-x); this gives the direction at the end of the
+    step, or its mean inside the step. Both are of second order where x is small and do not ring where it is large. In
+    the step that brings the ball to rest, it is the one direction in which both components of slip end together.
 
     Args:
         at: the contact at the start of the step.
-        rate: of the needed friction [N/s].
+        rate: rate of the needed friction [N/s].
         friction: μk N [N].
         beta: see :func:`mobility`.
         dt: step [s].
@@ -158,7 +160,7 @@ def slip_direction(
 
 
 def _time_to_rest(at: Touch, need2: float, need3: float, friction: float, beta: float) -> float:
-    """Smallest τ > 0 [s] with |u - τ β need| = τ β friction: then one constant direction leads to rest."""
+    """Time to rest with a constant direction [s]: smallest τ > 0 with |u - τ β need| = τ β friction; else infinity."""
     # A τ² - 2 B τ + u² = 0, solved for 1/τ, which stays well-defined for A = 0.
     A = beta * beta * (need2 * need2 + need3 * need3 - friction * friction)
     B = beta * (at.u2 * need2 + at.u3 * need3)
@@ -169,10 +171,10 @@ def _time_to_rest(at: Touch, need2: float, need3: float, friction: float, beta: 
 
 
 def _mean(x: float) -> float:
-    """Part θ of the step after which 1/(1 + θx) is the mean of exp(-x) inside the step."""
+    """Part θ of the step for which 1/(1 + θx) is the mean of exp(-sx) over s in [0, 1]."""
     return 0.5 + x / 12 if x < 1e-3 else 1 / -math.expm1(-x) - 1 / x
 
 
 def _end(x: float) -> float:
-    """Part θ of the step after which 1/(1 + θx) is exp(-x); large enough beyond x = 30."""
+    """Part θ of the step for which 1/(1 + θx) is exp(-x); for x above 30, exp(-30)."""
     return 1 + x / 2 if x < 1e-6 else math.expm1(min(x, 30.0)) / x

@@ -2,7 +2,7 @@
 
 Lagrange's equations of the translation and Euler's equation of an isotropic body in a frame that turns with the
 surface; the wall is one constraint on a coordinate and rolling two rows that are linear in the velocities with
-constant coefficients. What is tested is Exudyn's integration of a system with multipliers, not its bodies or joints.
+constant coefficients. This tests Exudyn's integration of a system with multipliers, not its bodies or joints.
 """
 
 import math
@@ -55,7 +55,7 @@ class Generic(ExudynModel):
         if self.friction is None:
             self.integration = Integration(self.system, settings)
         else:
-            # Whether the contact depends on the coordinates themselves, and not on their rates alone.
+            # True if the contact forces depend on the coordinates, False if on their rates alone.
             self.place_matters = weight_turns(body, self.local)
             self._needed, self._local_gravity = needed_function(body), weight_function(body, self.local, np.eye(3))
             self._steady_gravity = None if self.place_matters else self._local_gravity([])[:3]
@@ -70,7 +70,7 @@ class Generic(ExudynModel):
         moving = np.array([0.0, *(q_t[1:3] if np.any(q_t[1:3]) else (1.0, 1.0)), 0.0, 0.0, 0.0])
 
         def forces(rates: FloatArray) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-            """Mass, force and moment in the local frame, when moving so, and what slip adds to the force."""
+            """Mass, force and moment in the local frame at these rates, and the force that kinetic friction adds."""
             data.SetODE2Coordinates_t(rates, initial)
             mass, _, rolling = initial_matrices(self.system, settings)
             slipping = rolling
@@ -89,7 +89,7 @@ class Generic(ExudynModel):
         return self._body.surface.frame(q[1:3]) @ weight / mass, f, None if self.friction is None else mu
 
     def _constrain(self, node: Any, radius: float) -> Any:
-        """The wall first and then rolling, so that the multipliers are N, -F2, -F3."""
+        """Adds the constraint of the wall, then those of rolling: the multipliers are N, -F2, -F3."""
         add_marker, add_object = self.system.AddMarker, self.system.AddObject
         ground = self.system.AddNode(items.NodePointGround())
         distance = [
@@ -134,14 +134,14 @@ class Generic(ExudynModel):
         )
 
     def needed(self, q: FloatArray, q_t: FloatArray) -> tuple[float, float, float]:
-        """N, and the friction along e2 and e3 that it takes to roll on [N]; as in :meth:`touch`."""
+        """Normal force, and friction along e2 and e3 needed to keep the slip velocity [N]; see :class:`Touch`."""
         _, rate1, rate2, w1, _, _ = q_t.tolist()
         t2u, t2v, t3u, t3v = self._tangents
         g1, g2, g3 = self._steady_gravity or self._local_gravity(q)[:3]
         return self._needed(t2u * rate1 + t2v * rate2, t3u * rate1 + t3v * rate2, w1, g1, g2, g3)
 
     def touch(self, q: FloatArray, q_t: FloatArray) -> Touch:
-        """The contact in the state of these coordinates and rates."""
+        """Contact forces and slip at these coordinates and rates."""
         _, rate1, rate2, _, w2, w3 = q_t.tolist()
         (t2u, t2v, t3u, t3v), radius = self._tangents, self._body.ball.radius
         slip2 = t2u * rate1 + t2v * rate2 + radius * w3
@@ -156,12 +156,12 @@ class Generic(ExudynModel):
         self.friction.direction = direction
 
     def reached(self) -> None:
-        """The present state was computed with what is held now."""
+        """Records that the present state was computed with the present direction of slip."""
         assert self.friction is not None
         self.friction.applied = self.friction.direction
 
     def without_slip(self, q_t: FloatArray) -> FloatArray:
-        """The rates after the impulse that ends the slip: that of the constraint, through the mass matrix."""
+        """Rates after the impulse of the rolling constraint that ends the slip, by Exudyn's mass matrix."""
         rows = self._rows()
         by_impulse = np.linalg.solve(self._mass_matrix(), rows.T)
         return np.asarray(q_t - by_impulse @ np.linalg.solve(rows @ by_impulse, rows @ q_t))

@@ -12,7 +12,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.engines.exudyn.friction import KineticFriction, slow
 from proofroll.engines.exudyn.local_frame import LocalGeometry
 
-# The distance towards the wall, its two coordinates, and three whose rates are the spin.
+# Coordinates: distance towards the wall, two of the surface, and three whose rates are the angular velocity.
 SIZE = 6
 
 
@@ -84,13 +84,17 @@ def _written_out(
 
 
 def weight_turns(body: RollingBall, local: LocalGeometry) -> bool:
-    """True if gravity turns in the local frame as the ball goes along."""
+    """True if the direction of gravity in the local frame changes as the ball moves along the wall."""
     axes = [np.asarray(generator.axis) for generator in local.generators if generator.kind == "rotation"]
     return bool(axes) and bool(np.any(np.abs(np.cross(axes[0], body.gravity)) > 1e-14 * np.linalg.norm(body.gravity)))
 
 
 def weight_function(body: RollingBall, local: LocalGeometry, scaled: FloatArray) -> Callable[[Any], list[float]]:
-    """Generalised gravity as a function of q: constant, or turning once around with one of the coordinates."""
+    """Generalised gravity as a function of q: constant, or periodic in the one coordinate that is an angle.
+
+    ``scaled`` maps a local force per mass to generalised forces: mass times :func:`base`, or the identity for the
+    acceleration itself. Raises Refused on a wall with two rotations.
+    """
     to_local, zero = body.surface.frame(body.u0).T, [0.0, 0.0, 0.0]
     if not weight_turns(body, local):
         constant = [*(scaled.T @ to_local @ body.gravity).tolist(), *zero]

@@ -12,12 +12,13 @@ from proofroll.core.events import Event
 from proofroll.engines.exudyn.native import ExudynError, exu, new_settings
 from proofroll.engines.exudyn.settings import EXPLICIT, ExudynSettings
 
-# At 4 m/s the ball comes 0.3 micrometres nearer in a step of 1e-4 s that is halved so much oftener than ten times.
+# Further halvings of a step for impacts: a ball of 4 m/s moves by 0.4 micrometres in a step of 1e-4 s that is halved
+# ten times, and by 0.02 micrometres with four more.
 _FOR_IMPACTS = 4
 
 
 def new_system() -> tuple[Any, Any]:
-    """An empty container and system; what is global in Exudyn is set back to its defaults, and it is silent."""
+    """An empty container and system; also silences Exudyn and resets its process-wide timeout."""
     exu.config.printToConsole = False
     exu.special.solver.timeout = -1
     container = exu.SystemContainer()
@@ -25,9 +26,9 @@ def new_system() -> tuple[Any, Any]:
 
 
 class ExudynModel:
-    """A run of a formulation in a system of its own; see :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a formulation in its own Exudyn system; see :class:`proofroll.core.engine.Engine` for the methods."""
 
-    integration: Any  # an Integration, or what stands in for one
+    integration: Any  # an Integration or a SwitchedIntegration
 
     def __init__(self) -> None:
         self.container, self.system = new_system()
@@ -42,10 +43,10 @@ class ExudynModel:
 
 
 def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, impacts: bool = False) -> Any:
-    """The settings in Exudyn's own structure: no files, one thread, a step that never changes on its own.
+    """Settings in Exudyn's own structure: no files, one thread, a step that only ``halvings`` may shorten.
 
-    ``dependent``: constraints may depend on each other, which needs a linear solver that looks for it. ``impacts``:
-    steps end where contacts close and open, for which they are halved more often.
+    ``dependent``: constraints may depend on each other, so the linear solver must handle a singular matrix.
+    ``impacts``: steps are halved more often, to end where contacts close and open.
     """
     kind = getattr(exu.DynamicSolverType, settings.integrator.upper()) if settings.integrator in EXPLICIT else None
     result = new_settings(dependent=dependent, explicit=kind)
@@ -58,7 +59,7 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, im
         time.minimumStepSize = settings.dt / 2 ** (settings.halvings + (_FOR_IMPACTS if impacts else 0))
     time.newton.relativeTolerance = settings.newton_tolerance
     time.newton.absoluteTolerance = settings.newton_tolerance / 100
-    time.newton.useModifiedNewton = True  # in 1.11 it is off by default, and every difference from 1.13 comes from that
+    time.newton.useModifiedNewton = True  # off by default in 1.11, which explains every difference from 1.13
     time.newton.modifiedNewtonJacUpdatePerStep = settings.jacobian == "step"
     alpha = time.generalizedAlpha
     if settings.spectral_radius is not None:
@@ -72,8 +73,8 @@ def simulation_settings(settings: ExudynSettings, *, dependent: bool = False, im
 class Integration:
     """One run of Exudyn's implicit solver over an assembled system.
 
-    The solver is initialised once. ``SolveSteps`` goes from the start to the end that its iteration data name and keeps
-    coordinates, accelerations and multipliers, so moving start and end continues the run.
+    The solver is initialised once. ``SolveSteps`` integrates from the start time to the end time in its iteration data
+    and keeps coordinates, accelerations and multipliers, so new times continue the run.
 
     Attributes:
         t: present time [s].
@@ -161,11 +162,11 @@ class Integration:
 def initial_matrices(
     system: Any, settings: ExudynSettings, *, dependent: bool = False
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Mass matrix, the whole [0 Cᵀ; C D] of the constraints, and generalised forces, in the initial state.
+    """Mass matrix, matrix [0 Cᵀ; C D] of the constraints, and generalised forces, in the initial state.
 
     D is not zero where a joint has a free axis, whose multiplier Exudyn keeps and sets to zero.
 
-    A second solver is asked, so that the one that integrates is not disturbed. Afterwards the system's present
+    Uses a solver of its own, so as not to disturb the one that integrates. Afterwards the system's present
     accelerations and multipliers are those that Exudyn finds for the initial state.
     """
     options = simulation_settings(settings, dependent=dependent)
@@ -187,10 +188,10 @@ def consistent_start(
 ) -> tuple[FloatArray, FloatArray]:
     """Accelerations of the coordinates and multipliers at time 0 of an assembled system.
 
-    Where a constraint at velocity level, C q̇ = 0, changes its direction, its derivative is C q̈ = -Ċ q̇. Exudyn
-    leaves the right side out for the constraints used here, and the trapezoidal rule would carry the wrong
-    multipliers along as an undamped oscillation. So its own mass matrix, constraint Jacobian, accelerations and
-    multipliers are taken, and corrected by what the right sides add: ``turning``, -Ċ q̇ of the rows of each constraint.
+    A constraint at velocity level, C q̇ = 0, has the derivative C q̈ = -Ċ q̇. For the constraints used here, Exudyn
+    leaves out the right side, and the trapezoidal rule would keep the wrong multipliers as an undamped oscillation. So
+    the accelerations and multipliers that Exudyn finds are corrected, by its own matrices, for the missing right side:
+    ``turning``, constraint -> -Ċ q̇ of its rows.
     """
     mass, jacobian, _ = initial_matrices(system, settings)
     data = system.systemData
@@ -206,5 +207,5 @@ def consistent_start(
 
 
 def _sentence(text: object) -> str:
-    """Message of Exudyn on one line, without the stack of Python calls that it appends."""
+    """Message of Exudyn on one line, without the Python traceback that it appends."""
     return " ".join(str(text).partition("\n\nAt:")[0].split())

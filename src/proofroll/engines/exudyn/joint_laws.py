@@ -1,10 +1,10 @@
 """Laws along coordinates of joints: dry friction and stops, actuators, drives in time, couplings, armature.
 
-Friction and stops are Exudyn's ``CoordinateSpringDamperExt``. Friction holds by a bristle, a spring and damper that
-slips at the friction's force; a stop is a spring and damper. Both have what stops the joint's child
-within a step, so that what they give way by goes with the step: neither is part of the scene. A servo with a constant
-target and no limit is a ``CoordinateSpringDamper``; any other effort is a user function of one, evaluated at every
-iterate. A coupling is an ``ObjectConnectorCoordinate``, and so is what holds a rotor, the armature, to its joint.
+Friction and stops are Exudyn's ``CoordinateSpringDamperExt``. Friction is a bristle: a spring and damper that slips at
+the friction's force. A stop is a spring and damper. Their stiffness and damping, which the scene does not have, stop
+the joint's child within a step, so that their deflection vanishes with the step. A servo with a constant target and no
+limit is a ``CoordinateSpringDamper``; any other effort is a user function of one, evaluated at every iterate. A
+coupling is an ``ObjectConnectorCoordinate``; another one holds the rotor of an armature to its joint.
 """
 
 from collections.abc import Callable
@@ -21,9 +21,13 @@ from proofroll.engines.exudyn.native import Output, add_renamed, data_node, item
 
 
 class JointLaw(NamedTuple):
-    """Exudyn's object, the number of a joint that it pushes, and that push over the force that Exudyn tells.
+    """Force of an Exudyn object along the coordinate of a joint.
 
-    ``field`` and ``place`` are where a sample has that push; those of a drive in time and of armature are in none.
+    Attributes:
+        item: Exudyn's object.
+        number: number of the joint.
+        factor: force along the coordinate over the force that Exudyn reports.
+        field, place: field of a sample, and place in it, that hold the force; none for drives in time and armature.
     """
 
     item: Any
@@ -94,7 +98,7 @@ class JointLaws:
         )
 
     def _pushing(self, joint: str, push: Callable[[float, float, float], float]) -> Any:
-        """Exudyn's object for a push on a joint's coordinate, a function of time, coordinate and rate."""
+        """Adds a force along a joint's coordinate, given as a function of time, coordinate and rate."""
 
         def pull(system: Any, t: float, item: int, q: float, v: float, *law: float) -> float:  # noqa: ARG001 -- Exudyn's signature
             return -push(t, q, v)
@@ -104,7 +108,7 @@ class JointLaws:
         )
 
     def _acting(self, actuator: Actuator) -> Any:
-        """Exudyn's object for an actuator."""
+        """Adds an actuator: a spring and damper if its law is linear and constant, else a user function."""
         if actuator.kind != "position" or actuator.limit is not None or varies(actuator.target):
             return self._pushing(actuator.joint, actuator.effort)
         n = actuator.gear
@@ -118,29 +122,29 @@ class JointLaws:
         )
 
     def _coupled(self, markers: list[Any], ratio: float, offset: float) -> Any:
-        """The first coordinate is ``ratio`` times the second, plus ``offset``."""
-        made = items.ObjectConnectorCoordinate(markerNumbers=markers, offset=-offset)
-        return add_renamed(self._system, made, ratio, "factor1", "factorValue1")
+        """Adds a constraint: first coordinate = ``ratio`` times the second + ``offset``."""
+        item = items.ObjectConnectorCoordinate(markerNumbers=markers, offset=-offset)
+        return add_renamed(self._system, item, ratio, "factor1", "factorValue1")
 
     def _rotor(self, joint: Joint) -> Any:
-        """A rotor with the joint's armature, which follows its coordinate."""
+        """Adds a rotor with the inertia of the joint's armature, constrained to the joint's coordinate."""
         system = self._system
         node = system.AddNode(items.Node1D(initialCoordinates=[joint.q0[0]], initialVelocities=[joint.v0[0]]))
         if joint.kind == "prismatic":
             add_renamed(system, items.ObjectMass1D(nodeNumber=node), joint.armature, "mass", "physicsMass")
         else:
-            made = items.ObjectRotationalMass1D(nodeNumber=node)
-            add_renamed(system, made, joint.armature, "inertia", "physicsInertia")
+            item = items.ObjectRotationalMass1D(nodeNumber=node)
+            add_renamed(system, item, joint.armature, "inertia", "physicsInertia")
         marker = system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))
         return self._coupled([self._coordinate(joint.name), marker], 1.0, 0.0)
 
     def pushes(self) -> list[tuple[JointLaw, float]]:
-        """The laws, and what each pushes its joint with along the coordinate [N, N m]."""
-        told = [self._system.GetObjectOutput(law.item, Output.Force) for law in self._laws]
-        return [(law, law.factor * float(np.ravel(force)[0])) for law, force in zip(self._laws, told, strict=True)]
+        """Each law with its force along the coordinate of its joint [N, N m]."""
+        forces = [self._system.GetObjectOutput(law.item, Output.Force) for law in self._laws]
+        return [(law, law.factor * float(np.ravel(force)[0])) for law, force in zip(self._laws, forces, strict=True)]
 
     def named(self, pushes: list[tuple[JointLaw, float]]) -> dict[str, Array]:
-        """Named forces of a sample."""
+        """Fields of a sample: friction and stops by joint, efforts by actuator, forces by coupling [N, N m]."""
         forces = {name: np.full(count, np.nan) for name, count in lengths(self._mechanism).items()}
         for law, push in pushes:
             if law.field == "joint":
@@ -157,7 +161,7 @@ def _drive(joint: Joint) -> Callable[[float, float, float], float]:
 
 
 def _inertia(joint: Joint, child: Body) -> float:
-    """Inertia of the child alone against the joint's coordinate, with its armature [kg, kg m²]."""
+    """Inertia of the child alone along the joint's coordinate, plus the joint's armature [kg, kg m²]."""
     if joint.kind == "prismatic":
         return child.mass + joint.armature
     axis = joint.child_frame[:, 2]

@@ -1,4 +1,4 @@
-"""Surfaces as a body that moves along them sees them: coefficients that do not change from place to place."""
+"""Homogeneous surfaces: their derivatives in the local frame, which are the same at every place."""
 
 from dataclasses import dataclass
 
@@ -18,7 +18,7 @@ class LocalGeometry:
         tangents: ∂p/∂u [m/unit], shape (3, 2).
         second: ∂²p/∂u∂u [m/unit²], shape (3, 2, 2).
         turn: angular velocity of the frame per rate of u [rad/unit], shape (3, 2).
-        generators: the two motions.
+        generators: the two rigid motions that slide the surface along itself.
     """
 
     tangents: FloatArray
@@ -28,25 +28,25 @@ class LocalGeometry:
 
 
 def slides(body: RollingBall) -> bool:
-    """True if the wall is at rest and two rigid motions slide it along itself: the coefficients may be constant."""
+    """True if the wall is at rest and two rigid motions slide it along itself, so it may be homogeneous."""
     return body.surface.generators is not None and body.wall_rate is None
 
 
 def local_geometry(surface: Surface, u0: FloatArray) -> LocalGeometry:
-    """Constant local coefficients of a homogeneous surface; any other is refused."""
+    """Constant local coefficients of a homogeneous surface. Raises Refused for any other."""
     generators = surface.generators
     if generators is None:
         raise Refused(
             "the wall does not slide along itself, so rolling has no constant coefficients; use generic or rolling_disc"
         )
-    here = _coefficients(surface, generators, u0)
+    at_start = _coefficients(surface, generators, u0)
     # Two generators that do not commute give a frame that slides along itself but derivatives that change.
     for step in ((0.3, 0.0), (0.0, 0.3), (-0.7, 0.4)):
-        there = _coefficients(surface, generators, u0 + np.asarray(step))
-        for name, one, other in zip(("tangents", "second derivatives", "turn"), here, there, strict=True):
+        elsewhere = _coefficients(surface, generators, u0 + np.asarray(step))
+        for name, one, other in zip(("tangents", "second derivatives", "turn"), at_start, elsewhere, strict=True):
             if not np.allclose(one, other, rtol=1e-9, atol=1e-12 * float(np.max(np.abs(one)))):
                 raise Refused(f"the {name} of the wall change from place to place in the local frame")
-    return LocalGeometry(*here, generators)
+    return LocalGeometry(*at_start, generators)
 
 
 def _coefficients(
@@ -58,8 +58,8 @@ def _coefficients(
         if generator.kind == "rotation":
             turn[:, column] = to_local @ np.asarray(generator.axis)
     second = np.einsum("ij,jkl->ikl", to_local, surface.second(u))
-    # Projections that vanish on paper are left as round-off by the tilt of the world; they would only cost time. How
-    # large round-off is depends on the size of the wall.
+    # Components that are zero in exact arithmetic are round-off in a tilted world: set to zero, to save their terms.
+    # The size of round-off depends on the size of the wall.
     derivatives = (to_local @ surface.tangents(u), second, turn)
     rounded = (np.where(np.abs(x) < 1e-14 * np.max(np.abs(x)), 0.0, x) for x in derivatives)
     tangents, second, turn = rounded

@@ -1,4 +1,4 @@
-"""Exudyn's modules without types: its stubs leave ``self`` out of every method and so describe other signatures."""
+"""Exudyn's modules as ``Any`` (its stubs omit ``self`` from every method), and names that differ between versions."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,10 +15,10 @@ ExudynError: Any = getattr(exudyn, "ExudynError", RuntimeError)
 
 
 def new_settings(*, dependent: bool, explicit: Any = None) -> Any:
-    """Exudyn's simulation settings, by the names of its version: no files, no sensors.
+    """Exudyn's simulation settings, in the names of the installed version: no files, no sensors.
 
-    Constraints that may be ``dependent`` need a linear solver that looks for it; ``explicit`` is the type of an
-    explicit solver.
+    ``dependent``: constraints may depend on each other, so the linear solver must handle a singular matrix.
+    ``explicit``: type of an explicit solver.
     """
     settings = exu.SimulationSettings()
     renamed = not hasattr(settings, "solution")
@@ -43,28 +43,28 @@ def new_settings(*, dependent: bool, explicit: Any = None) -> Any:
 
 
 def data_node(system: Any, *values: float) -> Any:
-    """A node that keeps numbers from step to step."""
+    """Adds a data node, which keeps numbers from step to step, with these initial values."""
     node = items.NodeGenericData(initialCoordinates=list(values), numberOfDataCoordinates=len(values))
     return system.AddNode(node)
 
 
 def add_renamed(system: Any, item: Any, value: float, *names: str) -> Any:
-    """Adds an object whose parameter has one of these names, by the version of Exudyn."""
+    """Adds an object after setting a parameter, whose name depends on the version of Exudyn: the first that exists."""
     setattr(item, next(name for name in names if hasattr(item, name)), value)
     return system.AddObject(item)
 
 
 def add_rigid_body(system: Any, mass: float, inertia: Sequence[float], node: Any) -> Any:
-    """A rigid body on a node: mass [kg], moments and products xx, yy, zz, yz, xz, xy about the node [kg m²]."""
-    made = items.ObjectRigidBody(nodeNumber=node)
-    prefix = "" if hasattr(made, "mass") else "physics"
+    """Adds a rigid body on a node: mass [kg], inertia xx, yy, zz, yz, xz, xy about the node [kg m²]."""
+    item = items.ObjectRigidBody(nodeNumber=node)
+    prefix = "" if hasattr(item, "mass") else "physics"
     for name, value in (("mass", mass), ("inertia", list(inertia))):
-        setattr(made, _named(prefix, name), value)
-    return system.AddObject(made)
+        setattr(item, _named(prefix, name), value)
+    return system.AddObject(item)
 
 
 def rigid_body(system: Any, number: Any) -> dict[str, Any]:
-    """Rigid body as Exudyn holds it: ``mass``, ``inertia`` as above, ``centerOfMass``."""
+    """Rigid body as Exudyn holds it: ``mass``, ``inertia`` (as for :func:`add_rigid_body`), ``centerOfMass``."""
     item = system.GetObject(number)
     prefix = "" if "mass" in item else "physics"
     return {name: item[_named(prefix, name)] for name in ("mass", "inertia", "centerOfMass")}
@@ -77,10 +77,10 @@ def _named(prefix: str, name: str) -> str:
 def add_kinematic_tree(
     system: Any, q: Any, v: Any, turns: Any, offsets: Any, inertias: Any, coms: Any, **others: Any
 ) -> Any:
-    """An ``ObjectKinematicTree`` with a node of its own, which starts at the coordinates ``q`` with the rates ``v``.
+    """Adds an ``ObjectKinematicTree`` and its node, which starts at the coordinates ``q`` with the rates ``v``.
 
-    Of each link: rotation and offset [m] of its joint in the frame of its parent, its inertia about the centre of mass
-    [kg m²], and where that is [m]; ``others`` are arguments of the object that are plain lists.
+    ``turns`` and ``offsets`` [m] place the joint of each link in the frame of its parent; ``inertias`` [kg m²] are
+    about centres of mass ``coms`` [m]; ``others`` are further arguments of the object, as plain lists.
     """
     size = len(turns)
     # all at full length, or Exudyn ignores them

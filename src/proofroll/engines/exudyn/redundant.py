@@ -46,10 +46,10 @@ _DIFFERENCED = Regularised(
 
 
 class Redundant(ExudynModel):
-    """See :class:`proofroll.core.engine.Engine` for the methods.
+    """Run in redundant coordinates; see :class:`proofroll.core.engine.Engine` for the methods.
 
     Attributes:
-        provides, lacking: of its formulation.
+        provides, lacking: capabilities of the formulation, and reasons for missing ones.
     """
 
     provides: ClassVar[frozenset[str]] = PROVIDES
@@ -80,7 +80,7 @@ class Redundant(ExudynModel):
         self.integration = Integration(self.system, settings, dependent=self._rank < len(self._rows))
 
     def marker(self, body: str, position: Any) -> Any:
-        """A marker at a place in a body's frame."""
+        """Adds a marker at a place in a body's frame [m]."""
         return self._connections.marker(body, position, np.eye(3))
 
     def _add_bodies(self) -> None:
@@ -96,22 +96,21 @@ class Redundant(ExudynModel):
                 )
             )
             (xx, xy, xz), (_, yy, yz), (_, _, zz) = turn @ np.array(body.inertia) @ turn.T
-            made = add_rigid_body(system, body.mass, [xx, yy, zz, yz, xz, xy], node)
-            self.bodies[body.name] = made
-            marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=made))
+            self.bodies[body.name] = add_rigid_body(system, body.mass, [xx, yy, zz, yz, xz, xy], node)
+            marker = system.AddMarker(items.MarkerBodyMass(bodyNumber=self.bodies[body.name]))
             system.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=self._mechanism.gravity))
 
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
         """Adds contacts; this formulation has none."""
 
     def _constraint_rows(self, settings: ExudynSettings) -> Array:
-        """Rows of all constraints on Exudyn's velocities; free axes have none."""
+        """Constraint Jacobian on Exudyn's velocities, shape (rows, velocities), without the zero rows of free axes."""
         mass, jacobian, _ = initial_matrices(self.system, settings, dependent=True)
         rows = jacobian[len(mass) :, : len(mass)]
         return np.asarray(rows[np.abs(rows).max(axis=1, initial=0.0) > 0])
 
     def _over_bodies(self, output: Any) -> Array:
-        """A quantity of the origins of all bodies' frames."""
+        """Exudyn's output variable at the origins of all body frames, a row for each body."""
         return np.array(
             [self._connections.body(body.name, output, -self._com[body.name]) for body in self._mechanism.bodies]
         )
@@ -175,10 +174,10 @@ class Redundant(ExudynModel):
 
 
 def _turns(mechanism: Mechanism) -> dict[str, Array]:
-    """Rotation of each body's axes into Exudyn's.
+    """Rotation from each body's axes to those that it has in Exudyn, by body name.
 
-    Where a joint has a law along its coordinate, they are those of the world at q = 0: the coordinate that Exudyn
-    measures is the angle between the axes of two bodies.
+    If any joint has a law along its coordinate, Exudyn's axes are parallel to the world's at q = 0, because Exudyn
+    measures the coordinate as the angle between the axes of two bodies. Else they are the body's own.
     """
     turns = {WORLD: np.eye(3)} | {body.name: np.eye(3) for body in mechanism.bodies}
     laws = any(joint.friction or joint.limits or joint.armature or varies(joint.torque) for joint in mechanism.joints)
@@ -194,7 +193,7 @@ def _matrix(six: Any) -> Array:
 
 
 def _check(mechanism: Mechanism) -> None:
-    """Refuses bodies without mass and springs of universal joints, which no capability covers."""
+    """Raises Refused for bodies without mass and for forces in universal joints, which no capability covers."""
     for body in mechanism.bodies:
         if not body.mass:
             raise Refused(f"{body.name} has no mass; in redundant coordinates each body needs one")

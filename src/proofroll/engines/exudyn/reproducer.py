@@ -1,4 +1,4 @@
-"""Writes the program that shows what Exudyn does without proofroll: with a ball on a wall, or with a mechanism."""
+"""Source of a program that repeats a run with Exudyn alone, without proofroll: of a ball on a wall or a mechanism."""
 
 import math
 from typing import Any
@@ -28,7 +28,7 @@ def run(times):
 
 
 def source(model: Any, body: RollingBall, settings: ExudynSettings) -> str:
-    """See :class:`proofroll.core.engine_abilities.Reproduces`: the adapter's ``model`` of a ball, cut out."""
+    """Program for a ball, cut out of the adapter; see :class:`proofroll.core.engine_abilities.Reproduces`."""
     if body.flies:
         raise Refused("there is no program with impacts yet")
     if isinstance(model, Generic) and math.isfinite(body.contact.mu_static):
@@ -95,7 +95,7 @@ def seen():
 
 
 def mechanism_source(model: Any, mechanism: Mechanism, settings: ExudynSettings) -> str:
-    """The program's part that runs a formulation; adds markers to the system of its ``model``, which is at time 0."""
+    """Part of the program that runs a mechanism. Adds markers to the system of ``model``, which must be at time 0."""
     followed = [(point.body, point.position) for point in mechanism.points]
     followed = followed or [(body.name, (0.0, 0.0, 0.0)) for body in mechanism.bodies]
     com = {body.name: body.com for body in mechanism.bodies}
@@ -116,7 +116,7 @@ def mechanism_source(model: Any, mechanism: Mechanism, settings: ExudynSettings)
 
 
 def _essential(item: dict[str, Any]) -> dict[str, Any]:
-    """Item of Exudyn without drawing, name and entries listed twice; refuses one with a function."""
+    """Item of Exudyn without drawing, name and duplicate entries. Raises Refused for one with a user function."""
     if any(isinstance(value, dict) and "function" in value for value in item.values()):
         raise Refused("efforts that change in time or have a limit are functions, which programs do not hold yet")
     twice = {"jointHTs", "referenceHT", "referenceRotation"} | ({"localPosition"} if "localHT" in item else set())
@@ -130,7 +130,7 @@ def _essential(item: dict[str, Any]) -> dict[str, Any]:
 
 
 def _literal(value: Any) -> str:
-    """A value of Exudyn's as Python writes it."""
+    """Python source of a value of Exudyn's."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key!r}: {_literal(item)}" for key, item in value.items()) + "}"
     if isinstance(value, np.ndarray):

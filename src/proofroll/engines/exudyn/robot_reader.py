@@ -1,4 +1,4 @@
-"""A robot in Exudyn, which reads no such files: its kinematic tree is fed from our reading."""
+"""Exudyn's kinematic tree of a robot, built from proofroll's own reading of the file: Exudyn has no importer."""
 
 import importlib.metadata
 from collections.abc import Mapping
@@ -13,13 +13,16 @@ from proofroll.engines.exudyn.native import Output, add_kinematic_tree, exu, ite
 from proofroll.robots.model import WORLD, Array, RobotJoint
 from proofroll.robots.protocol import AtState, Reading, Request, evaluate
 
-# Types of links, and their axes.
+# Exudyn's joint type and axis of each link that stands for a joint.
 _FREE = tuple((kind, axis) for kind in ("prismatic", "revolute") for axis in "XYZ")
 _CHAINS = {"free": _FREE, "spherical": _FREE[3:], "revolute": (("revolute", "Z"),), "prismatic": (("prismatic", "Z"),)}
 
 
 class ExudynRobots:
-    """``ObjectKinematicTree``: joints about z, a ball joint as hinges about x, y, z, a free one after slides."""
+    """Robots as ``ObjectKinematicTree``.
+
+    Single joints are about or along z. A ball joint is three hinges about x, y, z; a free joint has three slides first.
+    """
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf", "mjcf")
     fed: ClassVar[bool] = True
@@ -32,7 +35,7 @@ class ExudynRobots:
         return importlib.metadata.version("exudyn")
 
     def read(self, request: Request) -> Reading:
-        """The tree, evaluated by the parts of its implicit solver."""
+        """The tree, evaluated by functions of Exudyn's implicit solver."""
         tree = _Tree(request)
         joints = tuple(joint.name for joint in request.robot.moving)
         dofs = tuple(joint.dofs for joint in request.robot.moving)
@@ -70,21 +73,21 @@ class ExudynRobots:
 
 
 def _turn(joint: RobotJoint) -> Array:
-    """Axes of the tree's link in the child's frame: z is the joint's axis; of one that turns freely the child's own."""
+    """Axes of the tree's link in the child's frame: z along the joint's axis; for ball and free joints identity."""
     if joint.dofs > 1:
         return np.eye(3)
     return np.asarray(Rotation.align_vectors(joint.axis[None], [[0, 0, 1]])[0].as_matrix())
 
 
 class _Tree:
-    """The tree in a system of its own, and where its coordinates are."""
+    """Kinematic tree of a robot in its own Exudyn system; the robot's velocity columns are its coordinates."""
 
     def __init__(self, request: Request) -> None:
         self.request, self.robot = request, request.robot
         self.turn = {joint.name: _turn(joint) for joint in self.robot.moving}
         damping: Array = np.concatenate([np.full(joint.dofs, joint.damping) for joint in self.robot.moving])
         loose: Array = np.concatenate([np.full(joint.dofs, joint.dofs > 1) for joint in self.robot.moving])
-        # Where a body turns freely it acts on its velocities, not on the rates of the tree's angles.
+        # Damping of ball and free joints acts on angular velocities, not on the rates of the tree's angles.
         self.free_damping: Array = loose * damping
         self.damping: Array = damping - self.free_damping
         self.link: dict[str, int] = {}
@@ -121,7 +124,7 @@ class _Tree:
         home, p, R = robot.welded[joint.parent]
         position, rotation = p + R @ joint.position, R @ joint.rotation @ A
         parent = -1
-        if joint.kind == "free":  # its coordinates are of the world, whatever it hangs on
+        if joint.kind == "free":  # its coordinates are relative to the world, whatever its parent is
             position, rotation = np.zeros(3), np.eye(3)
         elif home != WORLD:
             parent = self.link[home]
@@ -137,7 +140,7 @@ class _Tree:
         return rows
 
     def state(self, k: int) -> tuple[Array, Array, Array, Array]:
-        """Coordinates, velocities, and their relation to the common velocity."""
+        """Coordinates q, rates v, T and drift d of state ``k``: v = T ν and v̇ = T ν̇ + d, ν as in ``AtState``."""
         states, n = self.request.states, self.robot.dofs
         q, T, drift = np.zeros(n), np.eye(n), np.zeros(n)
         velocity = np.concatenate([states.velocity[joint.name][k] for joint in self.robot.moving])
@@ -155,7 +158,7 @@ class _Tree:
             y = Rotation.from_euler("X", angles[0]).apply([0.0, 1.0, 0.0])
             z = Rotation.from_euler("XY", angles[:2]).apply([0.0, 0.0, 1.0])
             inverse = np.linalg.inv(np.column_stack([x, y, z]))
-            # the angular velocity of a free joint has the axes of the world, of a spherical one those of the child
+            # the common angular velocity of a free joint has world axes, that of a ball joint the child's axes
             T[turned, turned] = inverse @ R
             a, b, _ = rates = T[turned, turned] @ velocity[turned]
             moving = np.column_stack([0 * x, np.cross(a * x, y), np.cross(a * x + b * y, z)]) @ rates
@@ -163,22 +166,22 @@ class _Tree:
         return q, T @ velocity, T, drift
 
     def put(self, q: Array, v: Array, torque: Array) -> None:
-        """Puts the system into a state with joint torques."""
+        """Sets coordinates, rates and joint torques of the tree."""
         self.mbs.systemData.SetODE2Coordinates(list(q))
         self.mbs.systemData.SetODE2Coordinates_t(list(v))
         self.mbs.SetObjectParameter(self.tree, "jointForceVector", list(torque))
 
     def damp(self, part: float) -> None:
-        """Sets the damping of joints in parts of the file's."""
+        """Sets the damping of joints to ``part`` times that of the file."""
         self.mbs.SetObjectParameter(self.tree, "jointDControlVector", list(part * self.damping))
 
     def force(self) -> Array:
-        """Right-hand side: what M times the accelerations is equal to, damping included."""
+        """Right-hand side Q of M q̈ = Q, damping included."""
         self.solver.ComputeODE2RHS(self.mbs)
         return np.array(self.solver.GetSystemResidual())[: self.robot.dofs]
 
     def mass_matrix(self) -> Array:
-        """The mass matrix."""
+        """Mass matrix of the tree. Raises Refused if it is not finite."""
         self.solver.ComputeMassMatrix(self.mbs)
         matrix = np.array(self.solver.GetSystemMassMatrix())
         if not np.all(np.isfinite(matrix)):

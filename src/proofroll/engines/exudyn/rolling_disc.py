@@ -36,13 +36,13 @@ class RollingDisc(ExudynModel):
         )
         self.system.SetPreNewtonResidualUserFunction(self._aiming(body))
         self.system.Assemble()
-        # d/dt (v + a ω × e1) = v̇ + a ω̇ × e1 + a ω × ė1, in the directions of the joint's rows; ė1 is the re-aiming,
-        # of which Exudyn cannot know.
+        # d/dt (v + a ω × e1) = v̇ + a ω̇ × e1 + a ω × ė1, in the directions of the joint's rows; the last term comes
+        # from the re-aiming, which Exudyn does not differentiate.
         turning = body.ball.radius * np.cross(body.w0, body.surface.normal_gradient(body.p0) @ body.v0)
         self.integration = Integration(self.system, settings, {self.joint: -self._directions().T @ turning})
 
     def _aiming(self, body: RollingBall) -> Any:
-        """Turns the joint to the tangent plane below the present iterate; plain floats, it runs at every iterate."""
+        """User function that turns the joint to the wall's tangent plane at the ball; called at every iterate."""
         frame = body.surface.triad
         node, joint = self.ball.node, self.joint
         position, rotation = Output.Position, Output.RotationMatrix

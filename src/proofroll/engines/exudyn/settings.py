@@ -20,18 +20,18 @@ class ExudynSettings:
             ``contact`` (its contact with a hollow sphere that follows the ball; penalty and regularised friction); of
             mechanisms: ``redundant`` (bodies in redundant coordinates, joints as constraints), ``spheres`` (the same
             with its penalty contacts of spheres) or ``tree`` (its kinematic tree in joint coordinates).
-        preset: name of the preset that the values started from.
+        preset: name of the preset that supplies the other values.
         dt: fixed time step [s].
         integrator: ``generalized_alpha`` (constraints at position level, index 3) or ``trapezoidal_index2``
             (undamped, constraints at velocity level); of ``tree`` ``rk44`` or ``rk67``, explicit.
         spectral_radius: of the generalized-alpha method at infinite frequency [1]; 1 damps nothing. None: the engine's
-            own, 0.9. The trapezoidal rule has no damping and does not look at it.
+            own, 0.9. The trapezoidal rule has no damping and ignores it.
         newton_tolerance: relative tolerance of Newton's method [1]; the absolute one is a hundredth of it, which is
-            the engine's own ratio. Explicit integrators have none, and look at neither this nor ``jacobian``.
-        jacobian: ``reused`` while Newton's method contracts, or set up again at every ``step``.
-        halvings: number of times a step is halved where Newton's method fails, before the run ends; ``contact`` and
-            ``spheres`` only, as the following. With 0, and in the other formulations, all steps are dt.
-        stiffness: of the contact's normal force [N/m].
+            the engine's own ratio. Explicit integrators ignore it and ``jacobian``.
+        jacobian: ``reused`` while Newton's method contracts, or computed anew at every ``step``.
+        halvings: number of times a step is halved where Newton's method fails, before the run ends. With 0, and in
+            formulations other than ``contact`` and ``spheres``, all steps are dt.
+        stiffness: stiffness of the normal force [N/m]; this and the next: ``contact`` and ``spheres`` only.
         friction_zone: slip velocity up to which friction is proportional to it [m/s].
         grip: coefficient that stands for unbounded friction [1]; the ball creeps by friction_zone |F| / (grip N).
             ``contact`` only.
@@ -53,7 +53,7 @@ class ExudynSettings:
 
     @property
     def order(self) -> int:
-        """Both implicit methods are of second order in positions, velocities and multipliers."""
+        """Order of the integrator: both implicit methods have 2 in positions, velocities and multipliers."""
         return EXPLICIT.get(self.integrator, 2)
 
     @property
@@ -62,7 +62,7 @@ class ExudynSettings:
         return Scheme.RK4 if self.integrator == "rk44" else self.integrator
 
     def __post_init__(self) -> None:
-        """Accepts only settings that have an effect, and all that the formulation needs."""
+        """Raises InputError if a setting has no effect, or the formulation lacks one that it needs."""
         if (self.integrator in EXPLICIT) != (self.formulation == "tree"):
             advice = f"tree has {' and '.join(EXPLICIT)}, the others have implicit integrators"
             raise InputError("exudyn: integrator", self.integrator, advice)
@@ -80,14 +80,14 @@ class ExudynSettings:
         value = getattr(self, name)
         if value is None:
             return
-        # A preset's own value was not asked for: another integrator was put over the preset that needs it.
+        # The value may come from the preset, whose integrator the user has replaced: then it is dropped.
         if value != getattr(PRESETS.get(self.formulation, {}).get(self.preset), name, None):
             raise InputError(f"exudyn: {name}", value, advice)
         object.__setattr__(self, name, None)
 
     @property
     def penalty(self) -> tuple[float, float, float]:
-        """Stiffness [N/m], friction zone [m/s] and grip [1] of the contact; without a grip none can stand for it."""
+        """Stiffness [N/m], friction zone [m/s] and grip [1] of the contact; grip 0 for ``spheres``, which have none."""
         assert self.stiffness is not None  # see __post_init__, here and below
         assert self.friction_zone is not None
         return self.stiffness, self.friction_zone, self.grip or 0.0
@@ -95,27 +95,27 @@ class ExudynSettings:
 
 # Explicit integrators, and their order.
 EXPLICIT = {"rk44": 4, "rk67": 6}
-# Settings that formulations with a penalty contact alone have.
+# Settings that belong to formulations with a penalty contact only.
 CONTACT_ONLY: Mapping[str, tuple[str, ...]] = {
     "contact": ("halvings", "stiffness", "friction_zone", "grip"),
     "spheres": ("halvings", "stiffness", "friction_zone"),
 }
 
 
-# ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Its own step,
-# a hundredth of the simulated time, is no choice of one; with the 1e-2 s that it is for a second, the ball turns by
-# 1.6 rad per step. So ``default`` tells what those options do, not what a script gives that sets no step. Its adaptive
-# step is taken over by ``contact`` alone: see ``simulation_settings``.
+# ``default`` is Exudyn's own choice of integrator, damping and Newton options at a common step of 1e-3 s. Exudyn's own
+# step, a hundredth of the simulated time, would be 1e-2 s for one second, in which the ball turns by 1.6 rad. So
+# ``default`` shows those options, not a script that sets no step. Of the formulations for balls, only ``contact`` has
+# Exudyn's adaptive step: see ``simulation_settings``.
 
 
 def _default(formulation: Literal["generic", "carrier", "rolling_disc", "redundant"]) -> ExudynSettings:
-    # The tolerance of 1e-8 is felt: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise
+    # The tolerance of 1e-8 matters: with rolling resistance it moves z by about 1e-6 m at dt = 1e-3, and leaves noise
     # of 0.3 N in the carrier's F2. With rigid bodies, ρ = 0.9 stops being stable where the ball turns by more than
     # about 0.3 rad per step.
     return ExudynSettings(formulation, "default", 1e-3, "generalized_alpha", 0.9, 1e-8, "reused")
 
 
-# Above what any scene needs to roll; the larger it is, the steeper friction rises inside its zone.
+# More than any scene needs to roll; the larger it is, the steeper friction rises inside its zone.
 GRIP = 10.0
 
 PRESETS: Mapping[str, Mapping[str, ExudynSettings]] = {

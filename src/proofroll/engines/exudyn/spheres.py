@@ -1,8 +1,8 @@
-"""Formulation ``spheres``: bodies of :mod:`redundant` that touch by Exudyn's penalty contacts of spheres.
+"""Formulation ``spheres``: bodies of :mod:`redundant` with Exudyn's penalty contacts of spheres.
 
 A sphere meets a plane as ``ObjectContactSphereTriangle``, with a triangle so wide that its edges are out of reach, and
 another sphere as ``ObjectContactSphereSphere``. Friction is proportional to the slip up to ``friction_zone`` and
-Coulomb's beyond, in the direction of the slip: what sticks creeps.
+Coulomb's beyond, in the direction of the slip: a contact that should stick creeps.
 """
 
 import math
@@ -34,10 +34,10 @@ LACKING: Mapping[str, str] = {
     **redundant.LACKING,
     _CAPABILITY.CONTACT_REBOUNDS: "its restitution is a damping that comes near it with ever shorter steps alone",
 }
-# m: from the place of a plane to the sides of the triangle that stands for it.
+# m: distance from the centre of the triangle that stands for a plane to its sides.
 _WIDE = 1e3
-# Part of the largest force of contact: friction below it is none. The rest of what a start may lack of it is that of
-# the certificate of soft loops.
+# Missing friction at the start, in units of the largest contact force: less than the first counts as none; the
+# tolerance of accelerations is at most the second, as for soft loops.
 _LITTLE, _LARGEST = 1e-6, 0.5
 # Relative error of accelerations at the start that Exudyn differentiates numerically.
 _DIFFERENCED = 1e-5
@@ -45,7 +45,7 @@ _CORNERS = ((-1.0, -1.0, 0.0), (2.0, -1.0, 0.0), (-1.0, 2.0, 0.0))
 
 
 def family(settings: ExudynSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; balls and bodies have the same."""
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and for bodies of mechanisms."""
     if settings.formulation not in {"spheres", "contact"}:
         return of_contact(Family.HARD)
     return of_contact(Family.SOFTENED, stiffness=settings.stiffness, zone=settings.friction_zone)
@@ -60,13 +60,13 @@ class _Made(NamedTuple):
 
 
 class Spheres(Redundant):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run with contacts of spheres; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     provides: ClassVar[frozenset[str]] = PROVIDES
     lacking: ClassVar[Mapping[str, str]] = LACKING
 
     def _add_contacts(self, mechanism: Mechanism, settings: ExudynSettings) -> None:
-        """Contacts that start at the depth of their load; the spheres are larger by that depth."""
+        """Adds contacts at the depth of their load at the start, with spheres enlarged by that depth."""
         self._contacts: list[_Made] = []
         self._contact_settings = settings
         self._softness, self._larger, self._builds_up = 0.0, 0.0, False
@@ -77,7 +77,7 @@ class Spheres(Redundant):
         dynamics = ContactDynamics(mechanism)
         try:
             start = dynamics.solve(*mechanism.start(), dynamics.begin()[0])
-        except NotUnique:  # no law says what presses
+        except NotUnique:  # the contact forces are not determined
             start = dynamics.solve(*mechanism.start(), (OPEN,) * len(dynamics.contacts))
         lacking = 0.0
         for number, contact in enumerate(mechanism.contacts):
@@ -95,7 +95,7 @@ class Spheres(Redundant):
     def _add_contact(
         self, contact: BodyContact, gap: float, pressed: float, slip: float, settings: ExudynSettings
     ) -> _Made:
-        """One contact that is ``pressed`` [N] and slips [m/s] at the start."""
+        """Adds a contact with the normal force ``pressed`` [N], ``gap`` [m] and ``slip`` [m/s] at the start."""
         stiffness, zone = settings.penalty[:2]
         sunk = pressed / stiffness
         sides = [(contact.body_a, contact.shape_a), (contact.body_b, contact.shape_b)]
@@ -133,7 +133,7 @@ class Spheres(Redundant):
         return _Made(self.system.AddObject(made), sign, sunk)
 
     def _moved(self, *bodies: str) -> float:
-        """Mass that two bodies have against each other [kg]."""
+        """Reduced mass of two bodies [kg]; the world counts as infinite."""
         masses = {body.name: body.mass for body in self._mechanism.bodies}
         return 1 / sum(1 / masses[body] for body in bodies if body in masses)
 
@@ -157,13 +157,13 @@ class Spheres(Redundant):
             contact_restitution=np.zeros(len(self._contacts)),
         )
         larger = Regularised(_DIFFERENCED + self._larger, "a sphere is larger by as much as it is pressed in")
-        if self._builds_up:  # then the first accelerations tell nothing of what holds
+        if self._builds_up:  # then the first accelerations lack friction and prove nothing
             larger = Regularised(self._softness, "friction of what does not slip yet builds up with the creep")
             model = replace(model, acceleration=None, angular_acceleration=None)
         return replace(model, regularised=dict.fromkeys(("acceleration", "angular_acceleration"), larger))
 
     def _lying(self, made: _Made) -> tuple[float, Array, Array]:
-        """Gap [m], normal from b to a and place [m] of a contact, from what Exudyn holds of it."""
+        """Gap [m], normal from b to a, and place [m] of a contact, read from Exudyn's object."""
         item = self.system.GetObject(made.item)
         now = exu.ConfigurationType.Current
         one, two = (np.array(self.system.GetMarkerOutput(k, Output.Position, now)) for k in item["markerNumbers"])
@@ -180,7 +180,7 @@ class Spheres(Redundant):
 
 
 def _check(contact: BodyContact) -> None:
-    """Refuses shapes that Exudyn's contacts do not have."""
+    """Raises Refused for shapes that Exudyn's contacts do not have."""
     for shape in (contact.shape_a, contact.shape_b):
         if isinstance(shape, SphereShape) and not shape.radius:
             raise Refused(f"a corner touches in {contact.name}; Exudyn's contacts are of spheres with a radius")

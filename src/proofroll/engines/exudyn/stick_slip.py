@@ -1,8 +1,8 @@
-"""Runs a model whose rolling constraint is switched off while the ball slips, and locates each switch.
+"""Integration of a model whose rolling constraint is off while the ball slips, with located events.
 
-Exudyn integrates with its fixed step; a function that it calls after each step stops it when the needed friction has
-left the static cone, or when the slip has turned around. The step is then taken back and divided at the event, which
-keeps the integrator's order, and a fresh solver starts on either side with consistent accelerations.
+Exudyn integrates with its fixed step; a function that it calls after each step stops it when the needed friction
+leaves the static cone, or the slip reverses. The step is then repeated in parts that end at the event, which keeps the
+integrator's order; a fresh solver starts on either side with consistent accelerations.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from proofroll.engines.exudyn.settings import ExudynSettings
 if TYPE_CHECKING:  # which drives itself by what is here
     from proofroll.engines.exudyn.generic import Generic
 
-# An event is located to this part of a step, far below what one step of the integrator is wrong by.
+# An event is located to this part of a step, far below the error of one step of the integrator.
 LOCATED = 1e-6
 # A ball that friction would stop within this part of a step is at rest.
 AT_REST = 1e-2
 
 
 class ContactState(NamedTuple):
-    """Coordinates, their rates, and the contact that follows from them."""
+    """Coordinates, their rates, and the contact forces and slip at them."""
 
     q: FloatArray
     q_t: FloatArray
@@ -42,13 +42,13 @@ class ContactState(NamedTuple):
 
 
 class SwitchedIntegration:
-    """Drives :class:`~proofroll.engines.exudyn.generic.Generic`; stands in for :class:`Integration`.
+    """Integrates :class:`~proofroll.engines.exudyn.generic.Generic` with stick and slip; see :class:`Integration`.
 
     Attributes:
         t: present time [s].
-        sticking: whether the ball rolls without slip.
+        sticking: True if the ball rolls without slip.
         direction: unit direction of slip in the present step (e2, e3).
-        events: so far.
+        events: events so far.
     """
 
     def __init__(self, model: Generic, body: RollingBall, settings: ExudynSettings) -> None:
@@ -65,7 +65,7 @@ class SwitchedIntegration:
         self.state = self._state(exu.ConfigurationType.Initial)
         self._before, self._before_t = self.state, 0.0
         self._last_step: tuple[Touch, Touch, float] | None = None  # its end, its start and its length [s]
-        # What _watch read after the last step and the one before it; not the coordinates where they do not matter.
+        # Time, coordinates and rates after the last step and the one before it; rates stand for unused coordinates.
         self._latest: tuple[float, FloatArray, FloatArray] = (0.0, self.state.q, self.state.q_t)
         self._earlier: tuple[float, FloatArray, FloatArray] | None = None
         self._place_matters, self._shortest = model.place_matters, 0.5 * settings.dt
@@ -94,11 +94,11 @@ class SwitchedIntegration:
         self.t = self.integration.t = t
 
     def _watch(self, system: Any, t: float) -> bool:  # noqa: ARG002 -- Exudyn's signature
-        """Called by Exudyn after each step, and once where it starts; False stops it."""
+        """Updates the contact; Exudyn calls it after each step and once at the start. False: stop, at an event."""
         if not self._watching:
             return True
         elapsed = t - self.t
-        if self.sticking:  # in as few calls as can be, for a step takes microseconds
+        if self.sticking:  # with as few calls as possible, for a step takes microseconds
             if elapsed <= self._shortest:
                 return True
             q_t = self._q_t()
@@ -121,7 +121,7 @@ class SwitchedIntegration:
         return True
 
     def _begin_to_slip(self, t: float) -> bool:
-        """Ends the step in which more friction is needed than there is."""
+        """Stops Exudyn after the step in which the needed friction exceeds the static bound; returns False."""
         if self._earlier is not None:
             (now, *latest), (before, *earlier) = self._latest, self._earlier
             self._last_step = self.model.touch(*latest), self.model.touch(*earlier), now - before
@@ -131,29 +131,30 @@ class SwitchedIntegration:
         return False
 
     def _margin(self, touch: Touch) -> float:
-        """Positive while the contact stays as it is: friction left in the cone [N], or slip still forward [m/s]."""
+        """Event function, positive before an event: unused static friction [N], or slip along its direction [m/s]."""
         if self.sticking:
             return self.mu_static * touch.N - math.hypot(touch.need2, touch.need3)
         return touch.u2 * self.direction[0] + touch.u3 * self.direction[1]
 
     def _aim(self, dt: float, *, inside: bool = False) -> None:
-        """Sets the direction of slip for the coming step [s]: for its end, as the solver knows that at its start.
+        """Sets the direction of slip for the coming step of length ``dt`` [s].
 
-        A step of a fresh solver has one direction throughout, the mean one ``inside``.
+        A running solver evaluates forces at the end of a step, having those of its start: it needs the direction at the
+        end. A fresh solver uses one direction at both ends: the mean one ``inside`` the step.
         """
         friction = self.mu_kinetic * self.state.touch.N
         self.direction = slip_direction(self.state.touch, self._need_rate(), friction, self.beta, dt, inside=inside)
         self.model.hold(self.direction)
 
     def _need_rate(self) -> tuple[float, float]:
-        """Rate of the needed friction in the last step that was whole [N/s]; only a slip asks for it."""
+        """Rate of the needed friction over the last undivided step [N/s], along e2 and e3; used for slip only."""
         if self._last_step is None:
             return 0.0, 0.0
         touch, old, elapsed = self._last_step
         return (touch.need2 - old.need2) / elapsed, (touch.need3 - old.need3) / elapsed
 
     def _divide(self) -> None:
-        """Takes the last step again, in parts that end where the contact changes."""
+        """Repeats the last step in parts that end where the contact changes."""
         now, end = self._before_t, self.t
         self.state = self._before
         while (left := end - now) > LOCATED * self.settings.dt:
@@ -167,7 +168,7 @@ class SwitchedIntegration:
                 self._switch("slip", now, self._before_t, end)
                 continue
             if not self.sticking and (self._begun(now) or self._margin(self.state.touch) <= 0):
-                # The cone was only touched: the ball does not begin to slip after all, and the step ends sticking.
+                # The force only touched the cone: the ball does not slip after all, and the step ends sticking.
                 self._take_back(now)
                 self.state = self._part(left)
                 break
@@ -177,7 +178,7 @@ class SwitchedIntegration:
             self._land(now, end)
 
     def _crossing(self, beyond: ContactState, left: float) -> float:
-        """Time until the contact changes [s], by ``left`` [s] at the latest."""
+        """Time from the present state until the contact changes [s], at most ``left`` [s]."""
         from scipy.optimize import brentq
 
         ends = {0.0: self._margin(self.state.touch), left: self._margin(beyond.touch)}
@@ -188,7 +189,7 @@ class SwitchedIntegration:
         return float(brentq(margin, 0.0, left, xtol=LOCATED * left))
 
     def _land(self, now: float, end: float) -> None:
-        """Changes the contact in the present state, where an event was located."""
+        """Switches the contact in the present state, which is at an event."""
         touch = self.state.touch
         if self.sticking:
             self._switch("slip", now, self._before_t, end)
@@ -232,7 +233,7 @@ class SwitchedIntegration:
         return ContactState(q, q_t, self.model.touch(q, q_t))
 
     def _restart(self) -> None:
-        """A fresh solver in the present state."""
+        """Starts a fresh solver in the present state."""
         self._set_initial()
         if self.sticking:
             self.model.hold(None)

@@ -1,7 +1,7 @@
 """Formulation ``tree``: a mechanism without loops as Exudyn's kinematic tree, integrated by explicit methods.
 
-Its links have their frames on their joints, so that everything of a body is turned and moved there first. It knows
-neither reactions nor joints of more than one coordinate.
+Its links have their frames at their joints, so all data of a body are transformed to there first. It has no reactions,
+and no joints of more than one coordinate.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ _READ = ("Position", "Velocity", "AngularVelocity", "RotationMatrix", "Accelerat
 
 
 class KinematicTree(ExudynModel):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run in joint coordinates; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, scene: Any, settings: ExudynSettings) -> None:
         mechanism = mechanism_of(scene)
@@ -87,7 +87,7 @@ class KinematicTree(ExudynModel):
         )
 
     def _coordinate(self, joint: Joint) -> Any:
-        """A marker of a joint's coordinate."""
+        """Adds a marker of a joint's coordinate."""
         node, number = self.system.GetObject(self._tree)["nodeNumber"], self._mechanism.joint_index[joint.name]
         return self.system.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=number))
 
@@ -96,7 +96,7 @@ class KinematicTree(ExudynModel):
         return [float(x) for x in p + R @ position]
 
     def marker(self, body: str, position: Any) -> Any:
-        """A marker at a place in a body's frame."""
+        """Adds a marker at a place in a body's frame [m]."""
         if body == WORLD:
             return self.system.AddMarker(items.MarkerBodyRigid(bodyNumber=self._ground, localPosition=list(position)))
         return self.system.AddMarker(
@@ -106,7 +106,7 @@ class KinematicTree(ExudynModel):
         )
 
     def _add_sensors(self, name: str, places: Sequence[tuple[int, list[float]]]) -> list[Any]:
-        """Sensors of a quantity at places of links, which are read when it is asked for."""
+        """Adds sensors of a quantity at places of links: (number of the link, place in its frame [m])."""
         return [
             self.system.AddSensor(
                 items.SensorKinematicTree(
@@ -124,7 +124,7 @@ class KinematicTree(ExudynModel):
         return np.array([self.system.GetSensorValues(sensor) for sensor in sensors])
 
     def sample(self) -> MechanismSample:
-        """See :class:`proofroll.core.engine.Engine`; the tree knows no reactions."""
+        """See :class:`proofroll.core.engine.Engine`; the tree has no reactions."""
         links = self._read(self._sensors["RotationMatrix"]).reshape(-1, 3, 3)
         if not np.isfinite(links).all():  # Exudyn's explicit steps go on with such numbers
             raise Diverged(f"the state is not finite at t = {self.integration.t:.6g} s")
@@ -161,7 +161,7 @@ class KinematicTree(ExudynModel):
         )
 
     def _accelerations(self) -> tuple[Array, Array]:
-        """Accelerations of the origins of the bodies' frames, and angular ones; the state stays as it is."""
+        """Linear [m/s²] and angular accelerations [rad/s²] of the body frames, shape (bodies, 3); keeps the state."""
         solver, state = self.integration.solver, self.system.systemData
         solver.ComputeMassMatrix(self.system, 1.0)
         solver.ComputeODE2RHS(self.system)

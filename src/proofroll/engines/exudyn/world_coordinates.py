@@ -1,8 +1,8 @@
-"""``generic`` on walls that do not slide along themselves, or that move: world coordinates, and rolling as one vector.
+"""``generic`` in world coordinates: for walls that move, or that no rigid motion slides along themselves.
 
-Two mass points, one of the mass at the ball's centre and one of its inertia, whose velocity is the angular velocity:
-for a ball J ω̇ is the whole of Euler's equation. Rolling, v + a ω × e1 = W × (p + a e1), is a constraint on velocities
-by user functions (``CoordinateVectorConstraint``); along e1 it is the wall. As in :mod:`generic`, what is tested is
+Two mass points stand for the ball: one with its mass at its centre, one with its inertia, whose velocity is the angular
+velocity (Euler's equation of a ball is J ω̇ = M). Rolling, v + a ω × e1 = W × (p + a e1), is a constraint on velocities
+by user functions (``CoordinateVectorConstraint``); its component along e1 is the wall. As in :mod:`generic`, this tests
 Exudyn's integration of a system with multipliers.
 """
 
@@ -46,7 +46,7 @@ class WorldCoordinates(ExudynModel):
         marker = add.AddMarker(items.MarkerBodyMass(bodyNumber=self._objects[0]))
         self._weight = add.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=body.gravity.tolist()))
         self._resistance = None
-        if body.contact.rolling_resistance:  # a force on what has the angular velocity for its velocity
+        if body.contact.rolling_resistance:  # a moment is a force on the point whose velocity is ω
             turned = add.AddMarker(items.MarkerNodePosition(nodeNumber=spin))
             self._resistance = add.AddLoad(items.LoadForceVector(**resisting(body, turned, centre)))
         self._rolling = add.AddObject(
@@ -59,12 +59,12 @@ class WorldCoordinates(ExudynModel):
             )
         )
         self.system.Assemble()
-        # The derivative of the rows without p̈ and ω̇, of which Exudyn cannot know.
+        # Terms of the rows' derivative without p̈ and ω̇, which Exudyn does not compute.
         a, e1_rate = body.ball.radius, body.surface.normal_gradient(body.p0) @ body.v0
         turning = -a * cross(body.w0, e1_rate)
         if body.wall_rate is not None:
             turning += cross(body.wall_rate, body.v0 + a * e1_rate)
-        # Of a ball that turns: the rows are a times a matrix of which two singular values are 1, and one is 0.
+        # The block of ω in the rows is a times a matrix with the singular values 1, 1 and 0.
         _, jacobian, _ = initial_matrices(self.system, settings)
         self._radius = float(np.linalg.norm(jacobian[6:, 3:6])) / math.sqrt(2)
         self.integration = Integration(self.system, settings, {self._rolling: turning})
@@ -98,7 +98,7 @@ class WorldCoordinates(ExudynModel):
 
 
 def _rolling(body: RollingBall) -> Callable[..., FloatArray]:
-    """Velocity of the ball at the contact, less that of the wall there [m/s]."""
+    """User function for the velocity of the ball at the contact relative to the wall [m/s]."""
     a, normal, wall_rate = body.ball.radius, body.surface.normal, body.wall_rate
 
     def constraint(_system: Any, _t: float, _item: int, q: Any, q_t: Any, _velocity_level: bool) -> FloatArray:
@@ -111,7 +111,7 @@ def _rolling(body: RollingBall) -> Callable[..., FloatArray]:
 
 
 def _along(body: RollingBall) -> Callable[..., FloatArray]:
-    """The rows' derivatives by the velocities: 1, and -a [e1]×."""
+    """User function for the rows' Jacobian with respect to the velocities v and ω: [1, -a [e1]×], shape (3, 6)."""
     a, nearby = body.ball.radius, body.surface.nearby
 
     def jacobian(_system: Any, _t: float, _item: int, q: Any, _q_t: Any, _velocity_level: bool) -> FloatArray:

@@ -38,7 +38,7 @@ _MECHANISMS: Mapping[str, type[MujocoMechanism]] = {"joints": MujocoMechanism, "
 _TURNING_JOINTS = (int(mujoco.mjtJoint.mjJNT_BALL), int(mujoco.mjtJoint.mjJNT_FREE))
 # Part of the natural force above which a normal force is more than round-off.
 _PRESSED = 1e-6
-_STANDS = "its wall is a fixed body, which has no velocity in MuJoCo (free gives it one with preset=tuned)"
+_FIXED_WALL = "its wall is a fixed body, which has no velocity in MuJoCo (free gives it one with preset=tuned)"
 
 
 class Mujoco(SteppedModel):
@@ -48,7 +48,7 @@ class Mujoco(SteppedModel):
     """
 
     name: ClassVar[str] = "mujoco"
-    oldest: ClassVar[str] = "3.5"  # before, mj_copyData is not there, on which every sample rests
+    oldest: ClassVar[str] = "3.5"  # the first version with mj_copyData, which every sample needs
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
         "chart": ALL_OF_A_BALL,
         "free": frozenset(BallCapability),
@@ -62,11 +62,11 @@ class Mujoco(SteppedModel):
             BallCapability.BOUNDED_FRICTION: "each edge between two boxes throws the ball off the wall, so facets "
             "cannot tell when it slips",
             BallCapability.IMPACTS: "each edge between two boxes is an impact of its own",
-            BallCapability.MOVING_WALL: _STANDS,
+            BallCapability.MOVING_WALL: _FIXED_WALL,
         },
         "chart": {
             BallCapability.IMPACTS: "an impact is one step of damping, which RK4 spreads over stages",
-            BallCapability.MOVING_WALL: _STANDS,
+            BallCapability.MOVING_WALL: _FIXED_WALL,
         },
         "joints": mechanism.LACKING,
         "geoms": mechanism_geoms.LACKING,
@@ -120,7 +120,7 @@ class Mujoco(SteppedModel):
 
     @staticmethod
     def defaults() -> Mapping[str, Any]:
-        """See :class:`proofroll.core.engine_abilities.TellsDefaults`: options, and what a bare geom has."""
+        """See :class:`proofroll.core.engine_abilities.TellsDefaults`: values of options and of a geom's attributes."""
         model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
         options = {name: getattr(model.opt, name) for name in dir(model.opt) if not name.startswith("_")}
         defaults = {
@@ -232,7 +232,7 @@ class Mujoco(SteppedModel):
         )
 
     def _coefficients(self) -> tuple[float, float]:
-        """Static and kinetic coefficient of friction that MuJoCo's contact has, or will have."""
+        """Static and kinetic coefficient of friction of MuJoCo's contact; without a contact yet, of the next one."""
 
         def read() -> float:
             return contact_coefficient(self._model, self._evaluated(), self._geoms)
@@ -243,9 +243,10 @@ class Mujoco(SteppedModel):
         return self._friction.coefficients(read)
 
     def _lever(self, data: Any) -> float:
-        """Lever f [m]: of the torque that acts, by the normal force; where neither can be, of the law of the torque.
+        """Lever arm f of the rolling resistance [m]: applied torque by normal force; else from the torque's own law.
 
-        A ball that the torque stops at once takes less of it, and a start at depth zero may have no normal force yet.
+        The law is read where the quotient has no meaning: the torque is cut so that it does not reverse a ball it stops
+        within a step, and a start at depth zero may have no normal force yet.
         """
         torque = float(np.linalg.norm(data.xfrc_applied[self._ball, 3:]))
         N = -float(contact_force(self._model, data, self._geom) @ self._body.surface.normal(data.xpos[self._ball]))
@@ -271,11 +272,11 @@ def mjspec(scene: Scene, **settings: Any) -> mujoco.MjSpec:
 
     Args:
         scene: holds one mechanism.
-        **settings: of the adapter, as ``dt`` and ``preset``; without ``formulation`` it is ``joints``.
+        **settings: settings of the adapter (``dt``, ``preset`` …); ``formulation`` defaults to ``joints``.
 
     Raises:
         InputError: a setting or formulation of mechanisms that does not exist.
-        Refused: MuJoCo cannot represent it, or only with something that is set from outside in every step.
+        Refused: MuJoCo cannot represent the scene, or only with values that the adapter sets anew in every step.
     """
     resolved = resolve_settings(Mujoco, {"formulation": "joints", **settings}, scene.requires)
     if resolved.formulation not in _MECHANISMS:

@@ -35,7 +35,11 @@ class Chart(Formulation):
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Lays the joints along the surface's motions; refuses one without, and a file with joints of another kind."""
+        """Lays the joints along the two rigid motions that slide the surface along itself.
+
+        Raises:
+            Refused: the surface has no such motions, or the file's joints are of another kind.
+        """
         surface = body.surface
         if surface.generators is None:
             raise Refused("chart needs a surface that two rigid motions slide along itself")
@@ -56,7 +60,7 @@ class Chart(Formulation):
 
     @property
     def resists(self) -> bool:
-        """See :class:`Formulation`: whether MuJoCo is given the torque's callback."""
+        """See :class:`Formulation`: True if the callback that applies the torque is set in MuJoCo."""
         with self._callbacks(mujoco.MjData(self._model)):
             return mujoco.get_mjcb_passive() is not None
 
@@ -76,7 +80,7 @@ class Chart(Formulation):
 
     @contextmanager
     def _callbacks(self, data: Any) -> Iterator[None]:
-        """MuJoCo's callbacks belong to the process: they are ours only while we compute with ``data``."""
+        """Sets MuJoCo's callbacks, which are global to the process, only while this run computes with ``data``."""
         mujoco.set_mjcb_contactfilter(self._wall_poser(data))
         mujoco.set_mjcb_passive(self._resister(data) if self.resistance.f else None)
         mujoco.set_mjcb_control(self._correct if self._corrects else None)
@@ -88,7 +92,10 @@ class Chart(Formulation):
             mujoco.set_mjcb_control(None)
 
     def _wall_poser(self, data: Any) -> Callable[[Any, Any, int, int], int]:
-        """Called between kinematics and collision at each stage of RK4; 0 lets the pair collide."""
+        """Contact filter that poses the wall: MuJoCo calls it between kinematics and collision at each stage of RK4.
+
+        It returns 0, which lets the pair collide.
+        """
         # Views of MjData's memory: to look them up at every stage would cost half as much as the stage.
         position, axes = data.geom_xpos[self._wall], data.geom_xmat[self._wall]
         touch, touch_axes = data.site_xpos[self._touch], data.site_xmat[self._touch]
@@ -101,7 +108,7 @@ class Chart(Formulation):
         return pose_wall
 
     def _resister(self, data: Any) -> Callable[[Any, Any], None]:
-        """Called between velocities and accelerations."""
+        """Passive callback that applies rolling resistance: MuJoCo calls it between velocities and accelerations."""
         reaction, axes, velocity = data.qfrc_constraint, data.site_xmat[self._touch], data.cvel[self._ball, 3:]
         torque, depth, apply = data.xfrc_applied[self._ball, 3:], self._depth, self.resistance.apply
 
@@ -113,6 +120,6 @@ class Chart(Formulation):
         return resist
 
     def _correct(self, model: Any, data: Any) -> None:  # noqa: ARG002 -- MuJoCo's signature
-        """Called between the contact's reference accelerations and its forces."""
+        """Control callback that corrects slip: MuJoCo calls it after reference accelerations and before forces."""
         if self._friction is not None:
             self._friction.correct(data, -float(data.qfrc_constraint[self._depth]))

@@ -31,7 +31,7 @@ def contact_force(model: Any, data: Any, geom: int) -> FloatArray:
 
 
 def foreseen_normal_force(data: Any, N: float) -> float:
-    """Normal force at ``data.time`` [N], extrapolated from MuJoCo's own of the two evaluations before.
+    """Normal force at ``data.time`` [N], extrapolated from those that MuJoCo found in the two evaluations before.
 
     The torque of the rolling resistance is needed before MuJoCo solves for the forces of the same instant; holding
     the last value would be an error of first order. The memory lies in ``data.userdata``, so that it is copied with
@@ -48,7 +48,7 @@ def foreseen_normal_force(data: Any, N: float) -> float:
 
 
 def contact_coefficient(model: Any, data: Any, geoms: tuple[int, int]) -> float:
-    """Coefficient of friction of the first contact as MuJoCo combined it [1]; without contact, as it would."""
+    """Coefficient of friction [1] that MuJoCo combined for the first contact; without contact, would combine."""
     if data.ncon:
         contact = data.contact[0]
         return float(contact.friction[0]) if contact.dim > 1 else 0.0
@@ -103,15 +103,15 @@ class Resistance:
         torque[2] = scale * (v0 * e1_ - v1 * e0)
 
     def stop(self, torque: Any, N: float, e1: Sequence[float], v: Sequence[float]) -> None:
-        """Torque as :meth:`apply`, of a ball that stops within the step that begins with the velocity ``v`` [m/s].
+        """Writes the torque (see :meth:`apply`) on a ball of velocity ``v`` [m/s] that it stops within this step.
 
-        The moment is no more than ends the motion with the step, or the ball would go back and forth for ever.
+        The torque is at most the one that brings the ball to rest at the end of the step: more would reverse it.
         """
-        inward = sum(one * other for one, other in zip(self.pull, e1, strict=True))
-        ahead = [one + pull - inward * normal for one, pull, normal in zip(v, self.pull, e1, strict=True)]
-        speed = math.hypot(*ahead)
+        inward = sum(pull * normal for pull, normal in zip(self.pull, e1, strict=True))
+        free = [rate + pull - inward * normal for rate, pull, normal in zip(v, self.pull, e1, strict=True)]
+        speed = math.hypot(*free)
         scale = -min(self.f * N / speed, self.stopping) if speed else 0.0
-        torque[:] = scale * np.cross(ahead, e1)
+        torque[:] = scale * np.cross(free, e1)
 
     def lever(self) -> float:
         """Lever arm of the resistance torque at N = 1 N, at a speed too fast to stop in one step [m]."""

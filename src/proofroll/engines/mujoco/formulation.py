@@ -10,7 +10,7 @@ from proofroll.engines.mujoco.settings import MujocoSettings
 
 
 class Formulation(ABC):
-    """One way to present the wall to MuJoCo, and how it is stepped; ``friction`` watches one that is bounded.
+    """One way to present the wall to MuJoCo, and to step the model; ``friction`` watches stick and slip, if bounded.
 
     Attributes:
         resistance: the torque of rolling resistance that its steps apply.
@@ -30,7 +30,7 @@ class Formulation(ABC):
 
     @property
     def resists(self) -> bool:
-        """True if its steps apply the torque of rolling resistance."""
+        """True if the steps apply the torque of rolling resistance."""
         return self.resistance.f > 0
 
     @abstractmethod

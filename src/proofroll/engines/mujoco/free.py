@@ -35,13 +35,13 @@ class Free(Formulation):
         self._wall = model.geom("wall").id
         self._curvature = settings.curvature
         self._half = settings.velocity_lag
-        # MuJoCo's damping of a velocity that lags by half a step is part of -J̇v; this much is left to add.
+        # MuJoCo's damping of a velocity half a step behind supplies part of -J̇v; this share of it is left to add.
         self._share = 1 - settings.own_share
         self._lead = settings.normal_lead
 
     @staticmethod
     def write(spec: Any, body: RollingBall) -> None:
-        """Puts the wall where the ball starts."""
+        """Puts the ball at its start and the plane tangent to the wall there."""
         spec.body("ball").pos = body.p0
         pose(spec.body("wall"), *tangent_plane(body))
 
@@ -59,9 +59,9 @@ class Free(Formulation):
                 self._friction.observe(data)
 
     def _run_plainly(self, data: Any, steps: int) -> None:
-        """The same where nothing is edited, so that nothing lags: :meth:`_prepare` as plain floats.
+        """Steps without edits of the contact, hence without lag: :meth:`_prepare` written out in plain floats.
 
-        MuJoCo takes some microseconds for a step of this model, and numpy as many for three numbers.
+        MuJoCo takes some microseconds for a step of this model, and numpy as long for an operation on three numbers.
         """
         model, friction, nearby, radius = self._model, self._friction, self._surface.nearby, self._radius
         position, rates, pushed = data.qpos[:3], data.qvel[:3], data.qfrc_constraint[:3]
@@ -97,7 +97,12 @@ class Free(Formulation):
         mujoco.mj_fwdConstraint(self._model, data)
 
     def _prepare(self, data: Any) -> tuple[FloatArray, FloatArray, float]:
-        """Poses the plane, applies the rolling resistance and returns the present rates, their trend and the last N."""
+        """Poses the plane and applies rolling resistance.
+
+        Returns:
+            Velocities at the time of the positions (m/s, rad/s), accelerations and normal force [N] of the evaluation
+            before.
+        """
         p = data.qpos[:3]
         e1 = self._surface.normal(p)
         rates: FloatArray = data.qvel
@@ -121,7 +126,7 @@ class Free(Formulation):
         return rates, trend, N
 
     def _edit(self, data: Any, rates: FloatArray, trend: FloatArray, N: float) -> None:
-        """Changes the contact's reference acceleration as the settings say."""
+        """Adds curvature and the correction of slip to the contact's reference acceleration, if the settings ask."""
         if data.nefc == 0:
             return
         if self._curvature:
@@ -144,7 +149,7 @@ class Free(Formulation):
         rows[0] = v @ gradient @ v
         first = contact.efc_address
         if self._wall_rate is not None:
-            # Damping and rate are meant for the velocity relative to the wall's, W × (p + a e1).
+            # Damping and rate belong to the velocity relative to the wall's, which is W × (p + a e1).
             e1 = -contact.frame[:3] if contact.geom[1] == self._geom else contact.frame[:3]
             velocity = cross(self._wall_rate, data.qpos[:3] + self._radius * e1)
             gained = cross(self._wall_rate, rates[:3] + self._radius * e1_rate)
@@ -176,8 +181,8 @@ class Facets(Formulation):
         How many boxes there are, how thick and how long they are, is the file's.
 
         Raises:
-            Refused: the surface is not one that a rotation slides along itself, so a ring would not enclose it, or the
-                ring is too short for the ball's way along its axis.
+            Refused: no rotation slides the surface along itself, so a ring would not enclose it; or the ring is too
+                short for the ball's way along its axis.
         """
         generators = body.surface.generators
         if generators is None or generators[0].kind != "rotation":
@@ -208,7 +213,7 @@ class Facets(Formulation):
             for _ in range(steps):
                 resist()
                 mujoco.mj_step(self._model, data)
-        # Rolling resistance, and the kicks, take away what holds the ball up: it may fall further than at first.
+        # Rolling resistance and kicks at the edges slow the ball, so it may fall further than ``_reach`` says.
         if abs(float(self._axis @ data.qpos[:3])) > self._half_length:
             raise Diverged(f"the ball has left the ring of boxes, which ends {self._half_length:g} m from its middle")
 

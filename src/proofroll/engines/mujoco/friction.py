@@ -1,4 +1,4 @@
-"""Bounded friction: whether MuJoCo's contact holds or slips, when that changed, and what a slip needs besides."""
+"""Bounded friction of a ball: events of stick and slip, switch of the coefficient, correction of the convex cone."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -13,13 +13,13 @@ from proofroll.elements.ball_on_surface.events import EventKind
 from proofroll.elements.ball_on_surface.model import Contact, RollingBall
 from proofroll.engines.mujoco.settings import LARGEST_PYRAMIDAL_FRICTION, PRELOAD, MujocoSettings
 
-# MuJoCo raises a smaller coefficient to this without a word (mjMINMU), unless the contact has no friction at all.
+# MuJoCo silently raises a smaller coefficient to this (mjMINMU), unless the contact has no friction at all.
 SMALLEST_FRICTION = 1e-5
 # Numbers of user data that BoundedFriction.correct keeps: a Jacobian of three rows and MuJoCo's six velocities.
 SLIP_MEMORY = 18
-# MuJoCo's solver projects a force onto the cone, so one that slips is there to round-off.
+# MuJoCo's solver projects a force onto the cone, so the force of a slipping contact lies on it to round-off.
 _ON_CONE = 1 - 1e-9
-# The correction vanishes with the slip, so it may begin a little before; then the stages of RK4 agree about it.
+# The correction vanishes with the slip, so it may begin a little inside the cone: then all stages of RK4 apply it.
 NEAR_CONE = 1 - 1e-3
 
 
@@ -34,7 +34,7 @@ def corrects(contact: Contact, settings: MujocoSettings) -> bool:
 
 
 def check_coefficients(coefficients: Iterable[float], settings: MujocoSettings, softened: str) -> None:
-    """Rejects coefficients of friction that MuJoCo would silently change, or by which ``softened`` would be soft.
+    """Rejects coefficients of friction that MuJoCo would silently change, or that would make ``softened`` soft.
 
     Raises:
         Refused: the first such coefficient.
@@ -48,19 +48,19 @@ def check_coefficients(coefficients: Iterable[float], settings: MujocoSettings, 
 
 
 class BoundedFriction:
-    """The ball's one contact, where friction is bounded.
+    """Stick, slip and lift-off of the ball's one contact, where friction is bounded.
 
-    MuJoCo knows one coefficient. Where the kinetic one is less, it is switched as a user would do it: to the kinetic
-    one once a force is on the cone, back once a force is inside it again.
+    MuJoCo has one coefficient. If the kinetic one is less than the static one, it is switched as a user would do it: to
+    the kinetic one once the force is on the cone, back once the force is inside it again.
 
-    A contact without a normal force neither sticks nor slips. MuJoCo's cone lifts a slipping ball, which comes back
-    (``correct``): hops of up to 0.05 s, be it 50 steps of 1e-3 s or 130 of 2.5e-4 s, so that no number of steps tells a
-    hop from a flight; the distance does, for a hop is a fraction of the radius high. What was before a hop goes on
-    after it, unless the ball comes back otherwise. A loss that takes the ball further than its radius from the wall is
-    a lift-off: one event, at the beginning of the loss.
+    A contact without a normal force neither sticks nor slips. MuJoCo's cone lifts a slipping ball (:meth:`correct`) in
+    hops of up to 0.05 s: 50 steps of 1e-3 s, or 130 of 2.5e-4 s. So distance, not the number of steps, separates hops
+    from flights: a hop is a fraction of the radius high. A ball that lands as it took off (sticking or slipping) makes
+    no event. One that gets further than its radius from the wall has lifted off: one event, dated at the first step
+    without a normal force.
 
     Attributes:
-        sticking: whether the last step with a normal force began with a force inside the cone.
+        sticking: True if the force was inside the cone at the start of the last step with a normal force.
     """
 
     def __init__(self, model: Any, body: RollingBall, settings: MujocoSettings) -> None:
@@ -79,21 +79,21 @@ class BoundedFriction:
         self._dt = settings.dt
         self._settings = settings
         self._steps = 0
-        self._lost: int | None = None  # first of the steps without a normal force that have not ended
-        self._flies = False  # whether these were told as a lift-off
+        self._lost: int | None = None  # first step without a normal force since the last one with it
+        self._flies = False  # True if a lift-off was recorded for these steps
         self._events: list[Event] = []
         self._wrench = np.zeros(6)
         self._force = self._wrench[:3]
         self.sticking = True
 
     def start(self, data: Any) -> bool:
-        """Takes the state at time 0 with its own forces, and tells whether they hold the ball; if not, it slips."""
+        """True if the forces at time 0 hold the ball; if not, records that it slips from time 0."""
         if not self.holds(data):
             self._change(False, Event("slip", 0.0, 0.0, 0.0))
         return self.sticking
 
     def step(self, data: Any) -> None:
-        """One mj_step, with a look at the forces at its start, before RK4's further stages replace them."""
+        """One mj_step; observes the forces at its start, before RK4's further stages replace them."""
         model = self._model
         if not self._stages:
             mujoco.mj_step(model, data)  # the forces are still those of the start
@@ -107,7 +107,7 @@ class BoundedFriction:
         mujoco.mj_RungeKutta(model, data, 4)
 
     def observe(self, data: Any) -> None:
-        """Takes the forces at the start of a step; once per step."""
+        """Records events from the forces at the start of a step; to be called once per step."""
         if not self._presses(data):
             self._miss(data)
         elif self._inside() != self.sticking:
@@ -120,7 +120,7 @@ class BoundedFriction:
         self._steps += 1
 
     def _miss(self, data: Any) -> None:
-        """One step without a normal force."""
+        """Counts a step without a normal force; records a lift-off if the ball is too far from the wall for a hop."""
         if self._lost is None:
             self._lost = self._steps
         if not self._flies and float(self._surface.gap(data.xpos[self._ball])) > self._radius:
@@ -128,7 +128,7 @@ class BoundedFriction:
             self._change(False, self._event(self._lost, "lift_off"))
 
     def _presses(self, data: Any) -> bool:
-        """True if there is a contact with a normal force; the force goes to ``self._wrench``."""
+        """True if there is a contact with a normal force; stores the force in ``self._wrench``."""
         if data.ncon == 0:
             return False
         mujoco.mj_contactForce(self._model, data, 0, self._wrench)
@@ -153,7 +153,7 @@ class BoundedFriction:
         return [*self._events, self._event(slips_since)]
 
     def coefficients(self, read: Callable[[], float]) -> tuple[float, float]:
-        """Coefficients while the ball sticks and while it slips, with ``read`` giving that of the model as it is."""
+        """Static and kinetic coefficient [1] as ``read`` finds them in the model, after each is written to it."""
         now, coefficients = self._mu, []
         for mu in (self._static, self._kinetic):
             self._write(mu)
@@ -162,12 +162,12 @@ class BoundedFriction:
         return coefficients[0], coefficients[1]
 
     def correct(self, data: Any, N: float) -> None:
-        """Takes the lift that MuJoCo's cone gives to a slipping contact out of its reference acceleration.
+        """Subtracts from the contact's reference acceleration the lift that MuJoCo's cone gives to a slipping contact.
 
-        MuJoCo's friction is the dual of a convex cone, so what slips along the wall also rises from it: the residual r
+        MuJoCo's friction is the dual of a convex cone, so a ball that slips also rises from the wall: the residual r
         of the friction rows (acceleration less reference: damping b times the slip, plus its rate) demands the normal
-        acceleration mu |r|, and the contact chatters. That much less is asked for, with r from the slip now and its
-        rate of the evaluation before. Errors of that rate die out as g / (1 + g) per evaluation, g = mu² (1 + m a²/J).
+        acceleration mu |r|, and the contact chatters. mu |r| is subtracted, with the present slip and its rate from the
+        evaluation before. Errors of that rate die out as g / (1 + g) per evaluation, g = mu² (1 + m a²/J).
 
         A rigid contact is loaded by a depth of almost nothing, so that the least error of r would end it: a preload of
         a hundredth of the normal force, ``N`` [N] of the evaluation before, keeps the contact. To be called after the
@@ -197,7 +197,10 @@ class BoundedFriction:
             aref[0] -= lift
 
     def _near_cone(self, data: Any, N: float) -> bool:
-        """True if the torque of friction was near its bound in the evaluation before; its force needs a frame."""
+        """True if friction was near its bound in the evaluation before.
+
+        Read from its torque, which is known in the world; its force would need the contact frame of that evaluation.
+        """
         t1, t2, t3 = data.qfrc_constraint[self._spin].tolist()
         lever = self._radius + 0.5 * float(data.efc_pos[0])  # MuJoCo's contact point lies midway in the depth
         return math.hypot(t1, t2, t3) >= NEAR_CONE * self._mu * N * lever

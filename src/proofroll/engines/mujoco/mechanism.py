@@ -1,4 +1,4 @@
-"""A mechanism in MuJoCo: start, steps, and what is read back of its model and its states."""
+"""A mechanism in MuJoCo: its start, its steps, samples of its state, and the certificate read from its model."""
 
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -30,7 +30,7 @@ from proofroll.engines.mujoco.settings import MujocoSettings, check
 _CAPABILITY = MechanismCapability
 _ROW = mujoco.mjtConstraint
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
-# The answer of hard loops has round-off of its own, most where rows depend on each other.
+# Factor on tolerances: the response of hard loops has round-off of its own, largest where rows are dependent.
 _MARGIN = 1.1
 PROVIDES = (
     ALL_JOINTS
@@ -49,10 +49,10 @@ LACKING: Mapping[str, str] = {
 
 
 class MujocoMechanism(SteppedModel):
-    """See :class:`proofroll.core.engine.Engine` for the methods.
+    """Run of a mechanism in MuJoCo; see :class:`proofroll.core.engine.Engine` for the methods.
 
     Attributes:
-        provides, lacking: of its formulation.
+        provides, lacking: capabilities of the formulation, and reasons for missing ones.
     """
 
     provides: ClassVar[frozenset[str]] = PROVIDES
@@ -67,7 +67,7 @@ class MujocoMechanism(SteppedModel):
         self._mechanism = mechanism
         self._bodies = [self._model.body(body.name).id for body in mechanism.bodies]
         self._sites = [self._model.site(f"{number}").id for number in range(len(mechanism.joints))]
-        # Sensors tell reactions; in each of the steps between samples they would cost a twentieth to a fifth of it.
+        # Sensors give the reactions, and only samples need them: in every step they would cost 5 to 20 % of it.
         self._model.opt.disableflags |= _NO_SENSORS
         for joint in mechanism.joints:
             self._start(joint)
@@ -82,7 +82,7 @@ class MujocoMechanism(SteppedModel):
         """MjSpec, whose keyframe ``start`` is time 0.
 
         Raises:
-            Refused: a joint has a drive or an actuator a target, which is no part of a model but of its state.
+            Refused: a joint has a drive, or an actuator a changing target: MuJoCo keeps these in the state.
         """
         if self._moving:
             raise Refused("a drive or a target that changes is set from outside in every step, and in no MJCF")
@@ -116,7 +116,7 @@ class MujocoMechanism(SteppedModel):
             self._data.qfrc_applied[first] = joint.torque
 
     def _run(self, steps: int) -> None:
-        """Steps, with drives and targets that change set before each, and with RK4 at each of its stages."""
+        """Makes ``steps`` steps; sets changing drives and targets before each, with RK4 before each of its stages."""
         if not self._moving:
             super()._run(steps)
         elif self._settings.integrator == "RK4":
@@ -131,7 +131,7 @@ class MujocoMechanism(SteppedModel):
                 mujoco.mj_step(self._model, self._data)
 
     def _drive(self, _: Any, data: Any) -> None:
-        """Sets drives and targets to what they are at the time of ``data``."""
+        """Sets drives and targets to their values at the time of ``data``."""
         for signal, field, place in self._moving:
             getattr(data, field)[place] = float(value_at(signal, data.time))
 
@@ -154,7 +154,7 @@ class MujocoMechanism(SteppedModel):
         )
 
     def _along(self, data: Any) -> dict[str, Array]:
-        """Efforts, and forces of couplings, dry friction and stops along coordinates."""
+        """Efforts of actuators, and forces of couplings, dry friction and stops, along coordinates [N or N m]."""
         model, mechanism = self._model, self._mechanism
         gears = [actuator.gear for actuator in mechanism.actuators]
         friction, stop = np.full((2, len(mechanism.joints)), np.nan)
@@ -178,10 +178,10 @@ class MujocoMechanism(SteppedModel):
         return {"effort": data.actuator_force * gears, "coupling": coupling, "friction": friction, "stop": stop}
 
     def _reactions(self, data: Any) -> tuple[Array, Array]:
-        """Forces and moments of joints and loops on the child, about the joint, world axes.
+        """Forces [N] and moments about the joint [N m] of joints and loops on the child, world axes.
 
-        The sensors tell what passes through a joint, with its own spring, damper and drive, but without what tendons
-        and loops carry past it.
+        A sensor reads the load that passes through its joint, including the joint's own spring, damper and drive, but
+        not the load that tendons and loops carry past it.
         """
         force, torque = unsaid(self._mechanism)
         count = len(self._mechanism.joints)
@@ -230,7 +230,7 @@ class MujocoMechanism(SteppedModel):
         )
 
     def _axis(self, data: Any, joint: Joint) -> Array:
-        """Axis of turning or sliding along z of a joint's frame, in the world."""
+        """World direction of the joint axis (z of the joint's frame), shape (3,); NaN if the kind has no axis."""
         if joint.kind not in WITH_AXIS:
             return np.full(3, np.nan)
         names = mechanism_model.part_names(joint)
@@ -251,14 +251,14 @@ class MujocoMechanism(SteppedModel):
         rows = np.zeros((len(self._bodies), 6))
         for row, body in zip(rows, self._bodies, strict=True):
             mujoco.mj_objectAcceleration(self._model, data, mujoco.mjtObj.mjOBJ_XBODY, body, row, 0)
-        # MuJoCo's are those that a sensor feels
+        # MuJoCo reports what an accelerometer would: without gravity.
         return {"acceleration": rows[:, 3:] + self._model.opt.gravity, "angular_acceleration": rows[:, :3].copy()}
 
     def _softened(self, data: Any, rows: Array, soft: dict[str, Array]) -> dict[str, Regularised]:
-        """Tolerances for MuJoCo's soft loops: its answer against that of its own matrices with hard loops.
+        """Tolerances for MuJoCo's soft loops: difference between its response and that of hard loops.
 
-        Hard loops have the accelerations that MuJoCo's own terms want (``efc_aref``), exactly. The tolerance is thus
-        what softness explains and no more: rows that are wrong or missing are so in both answers. Forces of couplings
+        The hard response uses MuJoCo's own matrices and meets its reference accelerations (``efc_aref``) exactly. So
+        the tolerance covers softness and nothing else: a wrong or missing row is in both responses. Forces of couplings
         have tolerances of their own, for a light wheel hardly changes the largest acceleration.
         """
         forces = self._forces(data)

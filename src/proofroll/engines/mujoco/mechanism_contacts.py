@@ -1,4 +1,4 @@
-"""Contacts of a mechanism as geoms and pairs of an MjSpec, and what is read back of them.
+"""Contacts of a mechanism: geoms and pairs of an MjSpec, and the contacts that MuJoCo finds, read back.
 
 A vertex is a sphere of almost no radius, a circle a cylinder of almost no height, and a plane on a moving body, which
 MuJoCo refuses, the top of a wide box.
@@ -30,21 +30,21 @@ from proofroll.engines.mujoco.settings import MujocoSettings
 
 # m; MuJoCo has no sphere of radius 0.
 _VERTEX = 1e-12
-# Part of its radius that a circle's cylinder is high, either way.
+# Half the height of a circle's cylinder, as a part of its radius.
 _FLAT = 1e-10
 # m: half the width and half the depth of the box whose top stands for a plane on a moving body. A sphere that goes
 # deeper than it is wide would be pushed out at its side.
 _WIDE, _DEEP = 1e3, 1.0
-# m: from where on MuJoCo has a contact in its equations. At 0, round-off decides at the start what touches.
+# m: gap below which MuJoCo has a contact in its equations. At 0, round-off would decide what touches at the start.
 _MARGIN = 1e-9
-# m: so far away contacts are looked for, to be read back.
+# m: margin within which contacts are searched to be read back, so large that every one is found.
 _FAR = 1e6
-# A row of slip is corrected above the slip that friction takes in so many steps.
+# A row of slip is corrected only above the speed that friction stops in this many steps.
 _STEPS = 3.5
 
 
 def check_contacts(mechanism: Mechanism, settings: MujocoSettings) -> None:
-    """Refuses the first contact that MuJoCo would change without a word or cannot hold."""
+    """Refuses the first contact that MuJoCo would silently change or cannot represent."""
     moving = _moving(mechanism)
     for contact in mechanism.contacts:
         check_coefficients([contact.friction], settings, "a contact")
@@ -74,8 +74,8 @@ def write_contacts(spec: Any, bodies: dict[str, Any], mechanism: Mechanism, sett
 def _set_pair_law(pair: Any, contact: BodyContact, settings: MujocoSettings) -> None:
     """Sets friction, softness and restitution.
 
-    Restitution is one step of damping in solref's direct format: (1 + e)/dt takes 1 + e times the normal velocity.
-    Friction has a format of its own, or it would throw the slip back too.
+    Restitution is one step of damping in solref's direct format: (1 + e)/dt takes away 1 + e times the normal velocity.
+    Friction has its own ``solreffriction``, or the slip would be reversed too.
     """
     pair.condim = 3 if contact.friction else 1
     pair.friction = (contact.friction, contact.friction, 0.0, 0.0, 0.0)
@@ -110,7 +110,7 @@ def _set_shape(geom: Any, shape: ConvexShape | HalfSpace, moves: bool) -> None:
 
 
 def _moving(mechanism: Mechanism) -> frozenset[str]:
-    """Bodies that some joint lets move."""
+    """Names of the bodies that are not fixed to the world."""
     still = {WORLD}
     for joint in mechanism.joints:  # sorted: the parent comes first
         if not joint.nv and joint.parent in still:
@@ -138,7 +138,7 @@ class Contacts:
     def __init__(self, model: Any, mechanism: Mechanism) -> None:
         self._model, self._mechanism = model, mechanism
         self._geoms = [[model.geom(f"contact{k}{end}").id for end in "ab"] for k in range(len(mechanism.contacts))]
-        # Of each geom: its contact, and the sign of MuJoCo's force on its second geom where that is this one.
+        # Geom -> number of its contact, and 1 if the geom is body a's or -1 if it is body b's.
         self._of_geom = {a: (k, 1.0) for k, (a, _) in enumerate(self._geoms)}
         self._of_geom |= {b: (k, -1.0) for k, (_, b) in enumerate(self._geoms)}
         self._weight = float(np.linalg.norm(mechanism.gravity))
@@ -155,11 +155,11 @@ class Contacts:
         return total
 
     def correct(self, data: Any) -> None:
-        """Takes the lift that MuJoCo's convex cone gives to slip out of the normal rows; the cone is elliptic.
+        """Subtracts from the normal rows the lift that MuJoCo's convex cone gives to slip; the cone must be elliptic.
 
-        MuJoCo's friction is the dual of a convex cone: a row of slip that asks for the deceleration b s makes the
-        normal row ask for mu b s more, and the contact hops. That much less is asked for. To be called after the
-        reference accelerations and before the forces.
+        MuJoCo's friction is the dual of a convex cone: a row that decelerates the slip s by b s adds mu b s to the
+        normal acceleration, and the contact hops; mu b s is subtracted. To be called after the reference accelerations
+        and before the forces.
         """
         dt = self._model.opt.timestep
         for index in range(data.ncon):
@@ -194,7 +194,14 @@ class Contacts:
                 data.efc_aref[row : row + contact.dim] -= along[: contact.dim]
 
     def take_lift(self, data: Any, rates: Array) -> None:
-        """Takes all of the lift where a force is on the cone, by the ``rates`` of all rows; see :meth:`correct`."""
+        """Subtracts the lift of each contact whose force is on the cone, from the residual of its friction rows.
+
+        :meth:`correct` knows the damping alone; this has the whole residual: acceleration of the row less reference.
+
+        Args:
+            data: MuJoCo's data after its forces, whose reference accelerations are edited.
+            rates: accelerations of all rows, J q̈, shape (nefc,).
+        """
         missed = rates - data.efc_aref
         for index in range(data.ncon):
             contact = data.contact[index]
@@ -206,10 +213,9 @@ class Contacts:
                 data.efc_aref[row] -= mu * np.hypot(*missed[row + 1 : row + 3])
 
     def read(self, data: Any, rows_of: Callable[[Any, int], Array]) -> ContactsRead:
-        """All of them, by MuJoCo's own search with a margin so wide that it finds every one; ``data`` is spoiled.
+        """All contacts, by MuJoCo's own search with a margin so wide that it finds every one; overwrites ``data``.
 
-        The coefficients are those of the contacts that it finds, after its own mixing. ``rows_of`` gives the first rows
-        of all constraints.
+        Coefficients are those that MuJoCo combined. ``rows_of(data, n)`` is the Jacobian of the first n rows.
         """
         model, count = self._model, len(self._geoms)
         gap, friction, restitution = np.full((3, count), np.nan)
@@ -225,7 +231,7 @@ class Contacts:
         for index in range(data.ncon):
             contact = data.contact[index]
             number, sign = self._of_geom[int(contact.geom[1])]
-            if not contact.dist >= gap[number]:  # of a cylinder's several the nearest
+            if not contact.dist >= gap[number]:  # a cylinder has several contact points: the nearest is taken
                 gap[number], normal[number] = contact.dist, sign * contact.frame[:3]
                 place[number] = contact.pos + self._to_surface(number) * contact.dist * normal[number]
                 row, dim, damping = int(contact.efc_address), int(contact.dim), float(contact.solref[1])
@@ -243,5 +249,5 @@ class Contacts:
         return ContactsRead(gap, normal, place, friction, restitution, response)
 
     def _to_surface(self, number: int) -> float:
-        """Part of the gap from its middle, where MuJoCo has the place, to a shape that is no plane."""
+        """Signed half: times the gap, the step along the normal from MuJoCo's contact point to the curved shape."""
         return -0.5 if isinstance(self._mechanism.contacts[number].shape_a, HalfSpace) else 0.5

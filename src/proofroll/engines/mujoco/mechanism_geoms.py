@@ -19,10 +19,10 @@ from proofroll.engines.mujoco.mechanism_contacts import Contacts, check_contacts
 from proofroll.engines.mujoco.settings import LARGEST_IMPEDANCE, MujocoSettings, check_restitution
 
 _CAPABILITY = MechanismCapability
-# An error of the lift of slip falls by half or more in each.
+# Rounds for the lift of slip; each at least halves its error.
 _ROUNDS = 40
 _MARGIN = 1.1
-# What impedance leaves of the load acts on the bodies by levers.
+# Factor on the share of the load that the impedance does not carry, for it acts on the bodies with lever arms.
 _OF_LOAD = 10.0
 _SOFT = (
     "contacts are soft, start without load, lift what slips and lack the turning of their normals (J̇v); hard ones "
@@ -33,14 +33,14 @@ LACKING: Mapping[str, str] = mechanism.LACKING
 
 
 def family(settings: MujocoSettings) -> Mapping[str, str]:
-    """See :class:`proofroll.core.engine_abilities.TellsFamily`; balls and bodies have the same."""
+    """See :class:`proofroll.core.engine_abilities.TellsFamily`; the same for balls and for bodies of mechanisms."""
     elliptic = Family.HARD if settings.cone_correction else Family.CONVEX
     kind = Family.PYRAMID if settings.cone == "pyramidal" else elliptic
     return of_contact(kind, time=settings.contact_time if settings.time_constant is None else None)
 
 
 class MujocoGeoms(MujocoMechanism):
-    """See :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a mechanism with contacts; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     provides: ClassVar[frozenset[str]] = PROVIDES
 
@@ -89,9 +89,9 @@ class MujocoGeoms(MujocoMechanism):
         """See :class:`proofroll.core.engine.Engine`."""
         plain = super().built()
         read = self._contacts.read(self._evaluated(), self._rows)
-        told = {f"contact_{name}": value for name, value in read._asdict().items()}
+        contacts = {f"contact_{name}": value for name, value in read._asdict().items()}
         if not self._evaluated().ncon:
-            return replace(plain, **told)
+            return replace(plain, **contacts)
         softened = dict(plain.regularised)
         hard = self._hard(self._evaluated())
         load = (1 - LARGEST_IMPEDANCE) * _OF_LOAD * float(np.linalg.norm(self._mechanism.gravity))
@@ -100,10 +100,13 @@ class MujocoGeoms(MujocoMechanism):
             rest = load / float(np.abs(hard["acceleration"]).max() or np.finfo(float).tiny)
             difference = float(np.abs(wanted - getattr(plain, name)).max()) / size
             softened[name] = Regularised(_MARGIN * difference + rest + DEPENDENT, _SOFT)
-        return replace(plain, **told, regularised=softened)
+        return replace(plain, **contacts, regularised=softened)
 
     def _hard(self, data: Any) -> dict[str, Array]:
-        """Accelerations by MuJoCo's own terms with the hardest contacts, with J̇v and without the cone's lift."""
+        """Accelerations from MuJoCo's own equations with the largest impedance, with J̇v and without the cone's lift.
+
+        The same keys and shapes as :meth:`_accelerations`.
+        """
         model = self._model
         kept = int(model.opt.cone), model.pair_solimp.copy()
         model.opt.cone, model.pair_solimp[:, :2] = mujoco.mjtCone.mjCONE_ELLIPTIC, LARGEST_IMPEDANCE

@@ -4,7 +4,7 @@ A body's frame stands at ``qpos = 0`` where it stands at q = 0. Universal and pl
 slides and a hinge, of one body; a free joint on another body than the world is three slides and a ball. A loop is
 closed by ``connect`` constraints of points (fixed: by a ``weld``). One point holds a spherical loop, and a revolute one
 where the mechanism is planar; in space a revolute loop needs two points of its axis: with one, the bodies turn about
-it freely, without any drift that would tell.
+it freely, and no drift would reveal that.
 """
 
 from collections.abc import Sequence
@@ -50,7 +50,7 @@ _SHORTEST = 1e-9
 
 
 def write(mechanism: Mechanism, settings: MujocoSettings) -> Any:
-    """The MjSpec; a joint has its name, or one for each of :func:`part_names`; joint k a site ``k`` and two sensors."""
+    """MjSpec of a mechanism; joints are named by :func:`part_names`, joint k has a site ``k`` and two sensors."""
     spec = mujoco.MjSpec()
     spec.compiler.degree = False  # or springs of hinges would have their rest in degrees
     option = spec.option
@@ -96,16 +96,16 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, set
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     if np.count_nonzero(body.inertia) == np.count_nonzero(np.diag(body.inertia)):
         moments, axes = np.diag(body.inertia), np.eye(3)
-    # MuJoCo refuses moving bodies below this, also where others give the joint its inertia; it is lost in their digits
+    # MuJoCo refuses a moving body of less mass or inertia, even if its children have enough: theirs outweighs this.
     least = mujoco.mjMINVAL if joint.nv else 0.0
     added.mass, added.inertia = max(body.mass, least), np.maximum(moments, least)
     added.ipos, added.iquat = body.com, to_quaternion(axes)
     for name, (kind, column) in zip(part_names(joint), parts_of(joint), strict=True):
-        made = added.add_joint(name=name, type=kind, pos=joint.child_position, axis=joint.child_frame[:, column])
-        _set_law(made, joint.stiffness, joint.damping)
-        made.springref = joint.rest
-        made.frictionloss, made.armature = joint.friction, joint.armature
-        _set_switches(made, joint, settings)
+        part = added.add_joint(name=name, type=kind, pos=joint.child_position, axis=joint.child_frame[:, column])
+        _set_law(part, joint.stiffness, joint.damping)
+        part.springref = joint.rest
+        part.frictionloss, part.armature = joint.friction, joint.armature
+        _set_switches(part, joint, settings)
     added.add_site(name=f"{number}", pos=joint.child_position)
     for kind in ("FORCE", "TORQUE"):
         spec.add_sensor(
@@ -118,7 +118,7 @@ def _add_body(spec: Any, parent: Any, number: int, joint: Joint, body: Body, set
 
 
 def coupling_name(coupling: Coupling) -> str:
-    """Name of its equality constraint."""
+    """Name of a coupling's equality constraint."""
     return f"coupling.{coupling.name}"
 
 
@@ -144,24 +144,24 @@ def _set_softness(item: Any, settings: MujocoSettings) -> None:
         item.solimp = (*settings.impedances, 1e-3, 0.5, 2.0)
 
 
-def _set_switches(made: Any, joint: Joint, settings: MujocoSettings) -> None:
-    """Stops, and how soft these and dry friction are.
+def _set_switches(part: Any, joint: Joint, settings: MujocoSettings) -> None:
+    """Sets the stops of a joint, and the softness of stops and of dry friction.
 
-    The row of dry friction asks for the acceleration -B v, B = 2/(dmax time constant). A joint slower than its free
-    acceleration over B is pushed along its motion. The shortest time constant makes B the inverse of the step.
+    The row of dry friction has the reference acceleration -B v, B = 2/(dmax time constant). A joint slower than its
+    free acceleration over B is pushed along its motion. The shortest time constant makes B the inverse of the step.
     """
     if joint.limits is not None:
-        made.limited, made.range = True, joint.limits
+        part.limited, part.range = True, joint.limits
         if settings.time_constant is not None:
-            made.solref_limit = (settings.contact_time, 1.0)
+            part.solref_limit = (settings.contact_time, 1.0)
     if settings.time_constant is not None:
-        made.solref_friction = (_SHORTEST, 1.0)
+        part.solref_friction = (_SHORTEST, 1.0)
     if settings.impedance is not None:
-        made.solimp_limit = made.solimp_friction = (*settings.impedances, 1e-3, 0.5, 2.0)
+        part.solimp_limit = part.solimp_friction = (*settings.impedances, 1e-3, 0.5, 2.0)
 
 
 def _set_law(item: Any, stiffness: float, damping: float) -> None:
-    """Linear stiffness and damping: in MuJoCo of today the first of several coefficients, in 3.5 the only one."""
+    """Sets linear stiffness and damping: one number in MuJoCo 3.5, later the first coefficient of a polynomial."""
     for name, value in (("stiffness", stiffness), ("damping", damping)):
         if np.ndim(getattr(item, name)):
             getattr(item, name)[0] = value

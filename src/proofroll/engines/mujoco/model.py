@@ -1,6 +1,6 @@
-"""A scene's model with every physical number set from the scene: structure from its MJCF file, numbers from here.
+"""MuJoCo model of a ball's scene: structure from the scene's MJCF file, all physical numbers from the scene.
 
-A scene without a file has the structure that is written here.
+A scene without a file gets the structure that is written here.
 """
 
 import math
@@ -64,10 +64,10 @@ _JOINTS = {"rotation": "hinge", "translation": "slide"}
 
 
 def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
-    """The scene's file for this formulation, or where it has none a model of the same structure.
+    """MjSpec of the scene's MJCF file for this formulation; without a file, a model of the same structure.
 
     Raises:
-        Refused: the scene does not name the file, MuJoCo cannot read it, or there is no model without one.
+        Refused: the scene does not name the file, MuJoCo cannot read it, or the formulation needs one and has none.
     """
     path = scene.folder / f"mujoco_{formulation}.xml"
     if scene.folder == Path() or not path.is_file():
@@ -81,7 +81,11 @@ def read_spec(scene: Scene, body: RollingBall, formulation: str) -> Any:
 
 
 def _written(body: RollingBall, name: str, formulation: str) -> str:
-    """The model as MJCF; refuses what only a file of an author can say, and motions that the surface does not have."""
+    """MJCF of a model without a file.
+
+    Raises:
+        Refused: the formulation needs a file, or two motions that slide the surface along itself, and there are none.
+    """
     known = {"name": name, "radius": body.ball.radius, "seen": _SEEN * body.ball.radius}
     if formulation == "free":
         return _FREE.format(**known)
@@ -98,7 +102,7 @@ def _written(body: RollingBall, name: str, formulation: str) -> str:
 
 
 def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> None:
-    """Sets what all formulations share: the ball, gravity, contact and solver."""
+    """Sets the numbers that all formulations share: ball, gravity, contact and solver."""
     ball = spec.body("ball")
     ball.explicitinertial = True
     ball.mass = body.ball.mass
@@ -112,7 +116,7 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
     option.cone = getattr(mujoco.mjtCone, f"mjCONE_{settings.cone.upper()}")
     spec.nuserdata = MEMORY if body.contact.rolling_resistance else 0
     spec.nuserdata += SLIP_MEMORY if corrects(body.contact, settings) else 0
-    # A blow-up must be seen: by default MuJoCo puts the model back to its initial state and goes on.
+    # A diverging run must be seen: by default MuJoCo resets the model to its initial state and goes on.
     option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     mu = body.contact.mu_static if math.isfinite(body.contact.mu_static) else settings.friction
     for geom in spec.geoms:
@@ -128,9 +132,9 @@ def write_physics(spec: Any, body: RollingBall, settings: MujocoSettings) -> Non
 
 
 def _write_restitution(spec: Any, body: RollingBall, settings: MujocoSettings, mu: float) -> None:
-    """An impact as one step of damping in solref's direct format: (1 + e)/dt takes 1 + e times the velocity.
+    """Writes an impact as one step of damping, (1 + e)/dt in solref's direct format: it takes 1 + e times the velocity.
 
-    The stiffness, which the format asks for, is too small to matter.
+    The stiffness, without which the format is not valid, is too small to matter.
     """
     for geom in spec.geoms:
         geom.solref = [-1.0, -(1 + (body.contact.restitution or 0.0)) / settings.dt]
@@ -139,7 +143,7 @@ def _write_restitution(spec: Any, body: RollingBall, settings: MujocoSettings, m
 
 
 def _write_pair(spec: Any, settings: MujocoSettings, mu: float, damping: float) -> None:
-    """The contact as a pair, in place of the one that MuJoCo finds itself: only a pair has ``solreffriction``."""
+    """Declares the contact as a pair of geoms, for only a pair has ``solreffriction``; it replaces MuJoCo's own."""
     pair = spec.add_pair(geomname1="wall", geomname2="ball", condim=condim(mu, settings))
     sliding, turning, rolling = settings.friction_coefficients(mu)
     pair.friction = [sliding, sliding, turning, rolling, rolling]

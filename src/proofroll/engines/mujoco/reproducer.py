@@ -1,4 +1,4 @@
-"""Writes the program that shows what MuJoCo does without proofroll: with a ball on a wall, or with a mechanism."""
+"""Source of a program that repeats a run with MuJoCo alone, without proofroll: of a ball on a wall or a mechanism."""
 
 import math
 import textwrap
@@ -53,7 +53,13 @@ def run(times):
 
 
 def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoSettings) -> str:
-    """Program that loads the model as MuJoCo has saved it, at time 0 (``Reproduces`` in ``core.engine_abilities``)."""
+    """Source of a program for a ball: loads the model saved by MuJoCo and its state at time 0, and steps.
+
+    See ``Reproduces`` in ``core.engine_abilities``.
+
+    Raises:
+        Refused: static and kinetic coefficients of friction differ.
+    """
     contact, formulation = body.contact, {"free": Free, "chart": Chart, "facets": Facets}[settings.formulation]
     bounded = math.isfinite(contact.mu_static)
     if bounded and contact.mu_static != contact.mu_kinetic:
@@ -76,7 +82,7 @@ def source(xml: str, model: Any, data: Any, body: RollingBall, settings: MujocoS
 
 
 def mechanism_source(xml: str, mechanism: Mechanism) -> str:
-    """The program's part that runs a mechanism, given as MJCF whose first keyframe is the start."""
+    """Part of the program that runs a mechanism, given as MJCF whose first keyframe is the start."""
     places = [(point.body, [float(x) for x in point.position]) for point in mechanism.points]
     places = places or [(body.name, [0.0, 0.0, 0.0]) for body in mechanism.bodies]
     asks = "# Places that are followed: body, and where on it [m].\n" + assigned(PLACES=places)
@@ -85,7 +91,7 @@ def mechanism_source(xml: str, mechanism: Mechanism) -> str:
 
 
 def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
-    """Numbers of the model, and shortcuts from them, that its file with six digits does not give back."""
+    """Fields of MjModel, by name, whose numbers (given or derived) are rounded or lost in a file with six digits."""
     read = mujoco.MjModel.from_xml_string(xml)
     changed = {}
     for name in dir(model):
@@ -100,7 +106,11 @@ def _rounded(xml: str, model: Any) -> dict[str, FloatArray]:
 
 
 def stepped(model: Any, data: Any, times: Iterable[float]) -> Iterator[float]:
-    """Moves the state to each time [s], from 0 on."""
+    """Steps the state from time 0 to each time [s], which it then yields.
+
+    Raises:
+        RuntimeError: MuJoCo warns.
+    """
     before = 0.0
     for t in times:
         steps = round((t - before) / model.opt.timestep)

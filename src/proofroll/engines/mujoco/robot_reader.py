@@ -1,4 +1,4 @@
-"""MuJoCo's own importer of URDF and MJCF, its compiled model read back."""
+"""MuJoCo's own importer of URDF and MJCF, with the compiled model read back."""
 
 import importlib.metadata
 from collections.abc import Mapping
@@ -35,7 +35,7 @@ class MujocoRobots:
 
     @property
     def tolerances(self) -> dict[str, float]:
-        """Tolerances by layer: up to 3.13 half angles from 1 − cos give principal axes to the root of precision."""
+        """Tolerances by layer; up to 3.13, half angles from 1 − cos leave principal axes half of the digits."""
         if tuple(int(part) for part in self.version().split(".")[:2]) >= (3, 14):
             return {}
         torques = ("mass matrix", "gravity", "bias", "inverse dynamics", "forward dynamics")
@@ -50,13 +50,13 @@ class MujocoRobots:
         return robot_of(mujoco.MjModel.from_xml_path(str(path)))
 
     def expanded(self, path: Path) -> str:
-        """An MJCF with repetitions, attached models and composites written out."""
+        """Text of an MJCF file with repetitions, attached models and composites written out."""
         spec = mujoco.MjSpec.from_file(str(path))
         spec.compile()
         return written(spec)
 
     def as_written(self, request: Request) -> Whole:
-        """Numbers of the file itself, loaded from its path."""
+        """Degrees of freedom and moving mass [kg] of the unchanged file, loaded from its path."""
         spec = mujoco.MjSpec.from_file(str(request.path))
         for option, on in request.options.items():
             if option == "boundmass":
@@ -104,7 +104,7 @@ class MujocoRobots:
 
 
 def _compile(request: Request) -> Any:
-    """The model; options go into the file, where every version reads them."""
+    """MjModel of the request; options are written into the file's text, where every version reads them."""
     text = request.path.read_text(encoding="utf-8")
     written = {key: str(on).lower() for key, on in request.options.items() if key != "boundmass"}
     if request.options.get("boundmass"):
@@ -120,7 +120,7 @@ def _compile(request: Request) -> Any:
 
 
 def _with_base(spec: Any, request: Request) -> Any:
-    """The robot with a free joint below its root where that is asked."""
+    """The robot; for a URDF with a free base, with a free joint between the world and its root."""
     if request.kind == "urdf" and request.base == "free":
         bodies = spec.worldbody.bodies if hasattr(spec.worldbody, "bodies") else [spec.worldbody.first_body()]
         bodies[0].add_freejoint().name = request.base_joint
@@ -159,7 +159,7 @@ def _at(
     def inverse(acceleration: Array) -> Array:
         data.qacc[:] = acceleration
         flags = model.opt.disableflags
-        model.opt.disableflags |= _PASSIVE  # else it is added and taken away again, with round-off of its own size
+        model.opt.disableflags |= _PASSIVE  # else it is added and subtracted again, which leaves round-off
         mujoco.mj_inverse(model, data)
         model.opt.disableflags = flags
         return np.array(data.qfrc_inverse + data.qfrc_passive)
@@ -174,7 +174,7 @@ def _at(
 
 
 def _group(model: Any, body: int) -> RobotBody:
-    """A body with what is welded to it, in its frame."""
+    """Composite of a body and all bodies welded to it, in the body's frame."""
     poses = {body: (np.zeros(3), np.eye(3))}
     parts = []
     for index in range(body, model.nbody):
@@ -196,12 +196,12 @@ _KINDS = {0: "free", 1: "spherical", 2: "prismatic", 3: "revolute"}
 
 
 def robot_of(model: Any) -> Robot:
-    """The robot; a body with several joints is carried by bodies without mass, one for each further joint.
+    """Robot of a compiled model; a body with several joints hangs on massless bodies, one for each further joint.
 
     Coordinates count from ``qpos0``, the pose that the file describes.
 
     Raises:
-        Refused: the model has what is not covered: armature of a tendon, springs or dampers that are not linear.
+        Refused: the model has armature of a tendon, or springs or dampers that are not linear.
     """
     if np.any(getattr(model, "tendon_armature", np.zeros(0))):
         raise Refused("a tendon has armature, which the check does not cover")
@@ -287,7 +287,7 @@ def _joint(
 
 
 def _mimics(model: Any) -> tuple[Mimic, ...]:
-    """Linear couplings of joints; others are constraints that the comparison leaves out."""
+    """Linear couplings of joints; the comparison leaves out other constraints."""
     mimics, coupling = [], int(mujoco.mjtEq.mjEQ_JOINT)
     for index in range(model.neq):
         first, other = int(model.eq_obj1id[index]), int(model.eq_obj2id[index])
@@ -298,10 +298,10 @@ def _mimics(model: Any) -> tuple[Mimic, ...]:
 
 
 def _first(value: Any) -> float:
-    """The linear coefficient, where a version of MuJoCo has a polynomial."""
+    """Linear coefficient; newer versions of MuJoCo have a polynomial, which starts with it."""
     return float(np.ravel(value)[0])
 
 
 def matrix(quaternion: Array) -> Array:
-    """The rotation of a quaternion of MuJoCo's."""
+    """Rotation matrix of a quaternion w, x, y, z, shape (3, 3)."""
     return np.asarray(Rotation.from_quat(quaternion, scalar_first=True).as_matrix())

@@ -1,4 +1,4 @@
-"""Code around the steps that every model in MuJoCo needs."""
+"""Parts that every model in MuJoCo shares: compiling, writing MJCF, stepping, reading a state, fatal warnings."""
 
 import ctypes
 from pathlib import Path
@@ -20,12 +20,12 @@ _FATAL = (
     (mujoco.mjtWarning.mjWARN_CNSTRFULL, "there are more constraints than MuJoCo holds"),
 )
 
-# A function of MuJoCo's library that sets the digits of MJCF; those of a double, and MuJoCo's own.
+# A function of MuJoCo's library that sets the digits of MJCF; digits of a double; MuJoCo's default.
 _DIGITS, _ALL, _USUAL = "_mjPRIVATE__set_xml_precision", 17, 6
 
 
 def compiled(spec: Any) -> Any:
-    """The model, or Refused: MuJoCo takes no mass or inertia below 1e-15, for example, in whatever units."""
+    """Compiles a spec into an MjModel. Raises Refused if MuJoCo does not accept it: a mass below 1e-15, for example."""
     try:
         return spec.compile()
     except ValueError as error:
@@ -51,7 +51,7 @@ def written(spec: Any) -> str:
 
 
 def forget_callbacks() -> None:
-    """Callbacks belong to the process: one that somebody else left would act in our models too."""
+    """Clears MuJoCo's callbacks: they are global to the process, and one left by other code would act here too."""
     for name in ("act_bias", "act_dyn", "act_gain", "contactfilter", "control", "passive", "sensor"):
         getattr(mujoco, f"set_mjcb_{name}")(None)
 
@@ -70,7 +70,7 @@ class silent:  # noqa: N801 -- used as a statement; a generator's context would 
 
 
 class SteppedModel:
-    """A compiled model that MuJoCo steps, and how its state is looked at without being touched."""
+    """A compiled model that MuJoCo steps; samples read a copy of its state."""
 
     def __init__(self, model: Any, settings: MujocoSettings) -> None:
         self._model, self._settings = model, settings
@@ -111,7 +111,7 @@ class SteppedModel:
 
 
 def raise_if_fatal(data: Any, t: float) -> None:
-    """Raises Diverged if MuJoCo's warnings after steps up to ``t`` [s] mean that the state is worthless."""
+    """Raises Diverged if MuJoCo's warnings after steps up to ``t`` [s] mean that the state is no longer valid."""
     warnings = data.warning
     if not any(warnings.number.tolist()):
         return

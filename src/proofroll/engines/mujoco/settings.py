@@ -1,4 +1,4 @@
-"""Settings of MuJoCo, the three presets of each formulation, and the terms of its model that a setting switches."""
+"""Settings of MuJoCo, the presets of each formulation, and the terms of its model that a setting switches."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -15,38 +15,38 @@ from proofroll.core.plugins import release
 from proofroll.elements.ball_on_surface.model import BallCapability
 from proofroll.elements.mechanism.capabilities import ALL_LOOPS, MechanismCapability
 
-# What a MuJoCo model has whose author writes nothing: step, friction, solref [s], solimp (dmin, dmax).
+# MuJoCo's defaults: step [s], friction, solref [s], solimp (dmin, dmax).
 DEFAULT_STEP = 2e-3
 DEFAULT_FRICTION = 1.0
-# Of turning about the normal and of rolling: lengths [m], which no radius scales.
+# Friction against turning about the normal and against rolling: lengths [m], the same for balls of every radius.
 DEFAULT_TURNING, DEFAULT_ROLLING = 5e-3, 1e-4
 DEFAULT_TIME_CONSTANT = 0.02
 DEFAULT_IMPEDANCE = (0.9, 0.95)
-# Of RK4 where joints have quaternions; those without have 4 in every version.
+# Order of RK4 for joints with a quaternion; for other joints it is 4 in every version.
 ORDER_OF_TURNING = 4 if release(mujoco.__version__) >= (4,) else 2
-# Dimensions of a contact (condim) from which on it resists sliding, turning about the normal, and rolling.
+# Least dimensions of a contact (condim) that resist sliding, turning about the normal, and rolling.
 SLIDES, TURNS, ROLLS = 3, 4, 6
-# MuJoCo clips to these without a word: mjMINIMP, mjMAXIMP, and two steps (refsafe).
+# MuJoCo silently clips to these: mjMINIMP, mjMAXIMP, and two steps (refsafe).
 SMALLEST_IMPEDANCE = 1e-4
 LARGEST_IMPEDANCE = 0.9999
 SHORTEST_TIME_CONSTANT = 2.0
 FORCES_TIME_CONSTANT = 10.0
 POSITIONS_TIME_CONSTANT = 2.25
 # MuJoCo has no unbounded friction. With the elliptic cone any coefficient above the needed one gives the same motion
-# to all digits (1 to 10000 tried), so this one is out of reach and costs nothing. A pyramidal cone softens the
+# to all digits (1 to 10000 tried), so this one is never reached and costs nothing. A pyramidal cone softens the
 # contact by the square of the coefficient: at 100 the ball flies through the wall without a warning.
 UNBOUNDED_FRICTION = 1e3
 LARGEST_PYRAMIDAL_FRICTION = 1.0
-# Settings of a contact, of which a mechanism of joints has none.
+# Settings of a contact; the formulation ``joints`` has none of them.
 _OF_CONTACT = ("cone", "friction", "friction_damping", "start", "curvature", "cone_correction", "condim")
 # Formulations of mechanisms, and those of the settings above that each has.
 OF_MECHANISMS: Mapping[str, tuple[str, ...]] = {"joints": (), "geoms": ("cone", "cone_correction")}
-# Part of the normal force by which a corrected contact is pressed deeper, so that the next slip does not end it.
+# Preload of a corrected contact as a part of the normal force, so that the next slip does not end the contact.
 PRELOAD = 0.01
 
 
 def _digits_as_number(value: object) -> object:
-    """Number of a text of digits, as pydantic reads every number but those of a Literal."""
+    """Converts a text of digits to an int; pydantic does that for other numbers, not for those of a Literal."""
     return int(value) if isinstance(value, str) and value.isdecimal() else value
 
 
@@ -72,8 +72,8 @@ class MujocoSettings:
             Where the scene bounds friction, its coefficients are taken instead.
         friction_damping: of the slip, in units of 1/dt (``solreffriction`` of a contact pair in its direct format);
             None: as in the normal direction. An Euler step moves the ball with the velocity at its end, along the wall
-            as it was at its beginning; at a damping of 2/dt, where it would end to be stable, the creep that this gives
-            cancels the one that the missing J̇v leaves (``free`` only).
+            at its beginning, which makes it creep; at a damping of 2/dt, the limit of stability, that creep cancels the
+            creep from the missing J̇v (``free`` only).
         start: ``touching``: at depth zero, where a soft contact is not loaded yet; ``settled``: at the depth at which
             the contact already bends the path as the wall does.
         curvature: whether the adapter adds to the contact's reference acceleration the term J̇v, which MuJoCo leaves
@@ -111,10 +111,11 @@ class MujocoSettings:
 
     @property
     def order(self) -> int | None:
-        """Measured; what in a scene takes it down, :func:`lowered` says.
+        """Measured order of convergence; :func:`lowered` has the capabilities of a scene that lower it.
 
-        A time constant that does not shrink has another limit: such a contact is a smooth spring, which RK4 follows at
-        its own order. The chart's other contacts and J̇v are of order 2.
+        A contact whose time constant does not shrink with the step is a smooth spring, which RK4 follows at its own
+        order (towards the limit of that spring, not of a hard contact). Other contacts of the chart, and contacts with
+        J̇v, are of order 2.
         """
         if self.formulation in OF_MECHANISMS:
             return 4 if self.integrator == "RK4" else 1
@@ -124,7 +125,7 @@ class MujocoSettings:
 
     @property
     def scheme(self) -> Scheme | str:
-        """See :class:`proofroll.core.engine.Settings`; both of first order take the new velocity for the position."""
+        """See :class:`proofroll.core.engine.Settings`; Euler and implicitfast move positions with the new velocity."""
         if self.curvature:
             return Scheme.LEAPFROG
         return {"RK4": Scheme.RK4, "Euler": Scheme.SEMI_IMPLICIT_EULER}.get(self.integrator, self.integrator)
@@ -133,8 +134,8 @@ class MujocoSettings:
     def velocity_lag(self) -> float:
         """Time by which the velocities lag behind the positions [s].
 
-        An Euler step of MuJoCo moves the position with the new velocity: it is a leapfrog, of second order if
-        velocities are read as those of half a step before. Only a contact with J̇v is exact enough to profit from that.
+        An Euler step of MuJoCo moves the position with the new velocity. It is a leapfrog of second order if velocities
+        count as those of half a step before. Only a contact with J̇v is exact enough to gain from that.
         """
         return self.dt / 2 if self.curvature else 0.0
 
@@ -150,7 +151,7 @@ class MujocoSettings:
 
     @property
     def own_share(self) -> float:
-        """Part of J̇v that the contact's damping b J v supplies when v lags by half a step: b dt / 2.
+        """Share of J̇v that the contact's damping b J v supplies when v lags by half a step: b dt / 2 [1].
 
         MuJoCo has b = 2 / (dmax tc).
         """
@@ -158,11 +159,11 @@ class MujocoSettings:
 
     @property
     def normal_lead(self) -> float:
-        """Time after the positions at which the bend of the path is needed [s].
+        """Time after that of the positions, at which the speed V in the added J̇v is evaluated [s].
 
-        To stay on the wall, a leapfrog step has to take e1·v from +h/2 V²/c at -h/2 to -h/2 V²/c at +h/2. The damping
-        gives ``own_share`` of that, for V at -h/2; the rest is to be added for V this much later than the positions.
-        Without the lead a ball that gets slower or faster along the wall loses contact in turns.
+        To stay on a wall of radius of curvature c, a leapfrog step has to take e1·v from +h/2 V²/c at -h/2 to -h/2 V²/c
+        at +h/2. The damping supplies ``own_share`` of that, with V at -h/2; so the rest needs V at this later time.
+        Without the lead, a ball that changes its speed along the wall loses contact again and again.
         """
         return self.velocity_lag * self.own_share / (1 - self.own_share)
 
@@ -180,9 +181,9 @@ _FIRST_ORDER = tuple(
 def lowered(settings: MujocoSettings) -> Mapping[str, int]:
     """See :class:`proofroll.core.engine_abilities.LowersOrder`; measured.
 
-    A soft constraint, as every loop and dry friction is one, leaves velocities of first order; so does a switch between
-    sticking and slipping, which may come anywhere in a step. The torque of rolling resistance uses a normal force
-    that is extrapolated linearly in time.
+    Soft constraints (every loop, dry friction) leave velocities of first order. So does a switch between sticking and
+    slipping, which may happen anywhere in a step. The torque of rolling resistance uses a normal force that is
+    extrapolated linearly in time.
     """
     if settings.formulation not in OF_MECHANISMS:
         return {BallCapability.ROLLING_RESISTANCE: 2, BallCapability.BOUNDED_FRICTION: 1}
@@ -211,9 +212,9 @@ def check(settings: MujocoSettings, *, bounded: bool) -> None:
 
 def _rules_of_mechanism(settings: MujocoSettings) -> Iterator[tuple[bool, str, str]]:
     plain, formulation = MujocoSettings(settings.formulation), settings.formulation
-    said = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
+    reason = "joints has no contact" if formulation == "joints" else f"{formulation} does not use it"
     for name in settings.unused:
-        yield getattr(settings, name) != getattr(plain, name), name, f"{said}; leave it out"
+        yield getattr(settings, name) != getattr(plain, name), name, f"{reason}; leave it out"
     if settings.cone_correction:
         # mj_step1 and mj_step2, between which the contacts are edited, always make an Euler step.
         yield settings.integrator != "Euler", "integrator", "cone_correction=true needs integrator=Euler"
@@ -233,12 +234,12 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
     if settings.friction_damping is not None:
         # MuJoCo asks no contact filter about a pair, so the chart's plane would stay; facets has a pair for each box.
         yield not is_free, "friction_damping", unused
-        # MuJoCo ignores it there, for the pyramid's rows mix normal and friction.
+        # MuJoCo ignores it with a pyramidal cone, whose rows mix normal and friction.
         yield pyramidal, "friction_damping", "it needs cone=elliptic"
-        # What J̇v leaves to be added is reckoned with the damping of the normal direction.
+        # The part of J̇v that the adapter adds is computed with the damping of the normal direction.
         yield curvature, "friction_damping", "curvature=true sets what the slip needs; leave it out"
     if settings.condim > SLIDES:
-        # All of them share one cone: where its bound is, depends on how the ball turns and rolls.
+        # Sliding, turning and rolling share one cone: the bound of sliding depends on how the ball turns and rolls.
         yield bounded, "condim", "with bounded friction stick and slip could not be told apart; set condim=3"
         yield curvature, "condim", "curvature=true is made for sliding alone; set condim=3"
         yield corrects, "condim", "cone_correction=true is made for sliding alone; set condim=3"
@@ -250,7 +251,7 @@ def _rules_of_contact(settings: MujocoSettings, bounded: bool) -> Iterator[tuple
 
 
 def check_restitution(settings: MujocoSettings) -> None:
-    """Refuses settings with which an impact would not follow the law of restitution."""
+    """Raises Refused for settings with which an impact would not follow the law of restitution."""
     if settings.integrator != "Euler" or settings.curvature or settings.cone_correction:
         raise Refused(
             "an impact is one step of damping in MuJoCo, which needs integrator=Euler and a contact as MuJoCo has it "
@@ -259,7 +260,7 @@ def check_restitution(settings: MujocoSettings) -> None:
 
 
 def _obvious(formulation: Literal["chart", "free", "facets"]) -> MujocoSettings:
-    """A model whose author writes no option."""
+    """Settings of a model whose author leaves every option at MuJoCo's default."""
     return MujocoSettings(
         formulation,
         "default",
@@ -275,11 +276,11 @@ def _obvious(formulation: Literal["chart", "free", "facets"]) -> MujocoSettings:
 
 PRESETS: Mapping[str, Mapping[str, MujocoSettings]] = {
     "chart": {
-        # The coordinates and the integrator are the formulation; only the contact is left as MuJoCo has it.
+        # Coordinates and integrator belong to the formulation; only the contact has MuJoCo's defaults.
         "default": replace(_obvious("chart"), integrator="RK4"),
         # In these coordinates J̇v vanishes, so documented options are also the best known ones while the ball rolls.
         "matched": MujocoSettings("chart", "matched"),
-        # Only a slip leaves something to be edited.
+        # Only slip needs a correction.
         "tuned": MujocoSettings("chart", "tuned", cone_correction=True),
     },
     "free": {

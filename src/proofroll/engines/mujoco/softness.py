@@ -1,4 +1,4 @@
-"""Certificate tolerances for MuJoCo's soft contact: changes at time 0, and their bounds."""
+"""Certificate tolerances for MuJoCo's soft contact: bounds of its errors at time 0."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -19,12 +19,12 @@ _SOLVER = 1e-8
 _ROUND_OFF = 1e-12
 # Part of a lift that the solver's tolerance leaves: 3e-5 at most was seen.
 _OF_LIFT = 1e-4
-# What is left where a state at time 0 is the last of a sequence that converges.
+# Error left where a state at time 0 is found by iteration.
 _SEQUENCE = 1e-6
 
 
 def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regularised]:
-    """Names of certificate quantities with tolerance and reason."""
+    """Certificate quantity -> its tolerance with the reason."""
     a, r = body.ball.radius, body.ball.inertia_ratio
     e1 = body.surface.normal(body.p0)
     e1_rate = body.surface.normal_gradient(body.p0) @ body.v0
@@ -34,9 +34,9 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     least, most = settings.impedances
     scale = natural_acceleration(body)
     lacks = settings.formulation != "chart" and not settings.curvature
-    # What is missing along the normal at depth zero: the share 1 - d of the load, which the impedance leaves, and the
-    # bend of the path where J̇v is missing. Along the wall it is a ω × ė1, divided between motion and friction.
-    # How the bend changes until it is needed comes on top.
+    # Normal acceleration missing at depth zero: the share 1 - d of the load, which the impedance does not carry, the
+    # normal acceleration of the path (``bend``) if J̇v is missing, and its change over ``normal_lead``. Along the wall
+    # a ω × ė1 is missing, divided between motion and friction.
     ahead = 2 * settings.normal_lead * abs(float(e1_rate @ initial_response(body)[0]))
     pressed = PRELOAD if corrects(body.contact, settings) else 0.0
     missing = (1 - least + pressed) * load + ahead + (bend if lacks else 0.0)
@@ -45,7 +45,7 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
     why = "the impedance of a soft contact is below 1" + (" and its rows lack J̇v" if lacks else "")
     result = dict(_computed(body, settings))
     if settings.start == "touching":
-        # Only what the unloaded contact supplies is there to hold the friction.
+        # Friction is bounded by the little normal force of a contact at depth zero.
         supplied = least * max(float(body.gravity @ e1) + (0.0 if lacks else bend), 0.0)
         lost = _law_of_friction(body, settings, supplied * body.ball.mass) + _lift_of_slip(body, settings)
         why += "; the ball starts at depth zero, where no depth makes up for it"
@@ -55,8 +55,8 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
         if soft >= 1 and not np.any(body.slip0):
             why += ": accelerations and forces at time 0 are not checked"
         return result | _dynamics(body, settings, soft, why)
-    # A settled start has the depth at which the reference acceleration k depth, k = d / (dmax tc)², supplies it as a
-    # part d of the acceleration.
+    # At the depth of a settled start, the reference acceleration k depth, k = d / (dmax tc)², of which the impedance
+    # turns the part d into acceleration, supplies what is missing.
     depth = _MARGIN * missing * (most * settings.contact_time / least) ** 2 / a
     sunk = f"a soft contact carries the load only at a depth, {depth:.1e} of the radius at most"
     rolls = "MuJoCo's contact point, at which it rolls, lies midway in that depth"
@@ -79,10 +79,11 @@ def softness(body: RollingBall, settings: MujocoSettings) -> Mapping[str, Regula
 
 
 def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str) -> dict[str, Regularised]:
-    """Tolerances of accelerations and forces, where those of the centre are ``soft``.
+    """Tolerances of accelerations and forces; ``soft`` is that of the centre, relative to the natural acceleration.
 
-    An error of the friction per mass, times a, is one of the turning times m a²/J; rolling resistance adds f to a, as
-    does a contact's own friction against turning and rolling, with a largest moment of N times the coefficient.
+    An error of friction changes the angular acceleration, times a, by m a²/J times as much as the acceleration. Rolling
+    resistance lengthens the lever a by f. A contact's own friction against turning and rolling adds moments of at most
+    N times the coefficient.
     """
     a = body.ball.radius
     turning = soft * (1 + body.contact.rolling_resistance / a) / body.ball.inertia_ratio
@@ -96,7 +97,7 @@ def _dynamics(body: RollingBall, settings: MujocoSettings, soft: float, why: str
 
 
 def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str, Regularised]]:
-    """Tolerances of numbers that are exact but for the solver, and of the number that stands for unbounded friction."""
+    """Tolerances of the coefficient that stands for unbounded friction, of rolling resistance and of the velocity."""
     if math.isinf(body.contact.mu_static):
         stands = f"MuJoCo has no unbounded friction: a coefficient of {settings.friction:g} stands for it"
         for name in ("1 / static friction", "1 / kinetic friction"):
@@ -104,15 +105,15 @@ def _computed(body: RollingBall, settings: MujocoSettings) -> Iterator[tuple[str
     if body.contact.rolling_resistance:
         yield "rolling resistance", Regularised(_SOLVER, "its torque uses the normal force of the evaluation before")
     if settings.velocity_lag:
-        # With the correction of a slip, that acceleration is the last of a sequence that converges.
+        # With the correction of a slip, that acceleration is found by iteration.
         share = _SEQUENCE if corrects(body.contact, settings) else _SOLVER
         yield "velocity", Regularised(share, "it is MuJoCo's of half a step before plus half a step's acceleration")
 
 
 def _lift_of_slip(body: RollingBall, settings: MujocoSettings) -> float:
-    """Acceleration that MuJoCo's cone gives a ball that starts slipping, μ times its damping b of the slip [m/s²].
+    """Normal acceleration from MuJoCo's cone on a ball that starts slipping: μ b times the slip, b its damping [m/s²].
 
-    A correction takes it away, but for what the solver leaves of so large a number.
+    The correction of the cone removes it up to the solver's tolerance, a part of so large a number.
     """
     damping = 2 / (settings.impedances[1] * settings.contact_time)
     left = _OF_LIFT if corrects(body.contact, settings) else 1.0
@@ -121,9 +122,9 @@ def _lift_of_slip(body: RollingBall, settings: MujocoSettings) -> float:
 
 
 def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: float | None) -> float:
-    """Error of the acceleration at time 0 from MuJoCo's law of friction, at most [m/s²]; 0 for a ball that holds.
+    """Bound of the error of the acceleration at time 0 from MuJoCo's law of friction [m/s²]; 0 if the ball sticks.
 
-    ``unloaded`` is the normal force of a contact that is not loaded yet [N].
+    ``unloaded`` is the normal force of a contact at depth zero, which has not its full load yet [N].
     """
     ball, contact = body.ball, body.contact
     bounded = math.isfinite(contact.mu_static)
@@ -133,13 +134,13 @@ def _law_of_friction(body: RollingBall, settings: MujocoSettings, unloaded: floa
     loaded = -float(force @ e1)
     needed = float(np.linalg.norm(force + loaded * e1))
     if not bounded and (unloaded is None or needed > static * loaded):
-        return 0.0  # a ball that slips under its full load has not enough friction: nothing to be excused
+        return 0.0  # a ball that slips under its full load shows a coefficient that is too small, not softness
     N = loaded if unloaded is None else unloaded
     pyramidal = settings.cone == "pyramidal"
     if needed * (math.sqrt(2) if pyramidal else 1.0) <= static * N:
         return 0.0
     slip_rate = max(needed - kinetic * N, 0.0) * (1 / ball.mass + ball.radius**2 / ball.inertia)
     lift = 0.0 if corrects(contact, settings) else kinetic * slip_rate
-    # The friction of the unloaded contact is another one altogether, the loaded pyramid's is turned.
+    # Friction of the unloaded contact is wrong altogether; that of a loaded pyramid has a wrong direction.
     wrong = (min(needed, static * loaded) if unloaded is not None else 0.0) + (kinetic * N if pyramidal else 0.0)
     return lift + wrong / ball.mass

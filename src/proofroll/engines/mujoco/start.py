@@ -1,4 +1,4 @@
-"""The initial state, and how deep a soft contact has to be to carry the load."""
+"""Initial state of a ball, and the depth at which a soft contact carries its load."""
 
 import math
 from collections.abc import Callable
@@ -15,25 +15,25 @@ from proofroll.engines.mujoco.formulation import Formulation
 from proofroll.engines.mujoco.friction import corrects
 from proofroll.engines.mujoco.settings import MujocoSettings
 
-# The resistance's torque uses the normal force of the evaluation before: at a standstill in time, repeats converge.
+# Evaluations until the resistance's torque, which uses the normal force of the evaluation before, has converged.
 EVALUATIONS = 3
-# The same where velocities lag; where the contact is soft the rows of friction lag otherwise than the normal one, and
+# Evaluations where velocities lag; more for a soft contact, whose friction rows lag unlike the normal row, so that
 # the extrapolation removes less of the error.
 _ROUNDS_OF_LAG = 13
 _ROUNDS_OF_SOFT_LAG = 25
 _SOFT = 0.9
 # The correction of a slip has converged when this part of its error is left.
 _SEQUENCE = 1e-10
-# To this part of itself the settled depth is found.
+# Relative tolerance of the settled depth.
 _DEPTH = 1e-14
-# So many steps of false position are tried for it.
+# Steps of false position before the search goes on by bisection.
 _FALSE_POSITION = 15
 # A start "at depth zero" is this part of the radius inside: at zero, round-off would decide whether there is a contact.
 _TOUCHING = 1e-13
 
 
 def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
-    """The scene's initial motion with the ball ``depth`` [m] inside the wall, before any forces are known.
+    """Writes the initial state with the ball ``depth`` [m] inside the wall into ``data``; computes no forces.
 
     MuJoCo's contact point lies midway between the two surfaces, at a - depth/2 from the centre; the ball rolls
     without slip there. The orientation is the identity.
@@ -62,13 +62,13 @@ def put_ball(model: Any, data: Any, body: RollingBall, depth: float) -> None:
 def start(
     model: Any, data: Any, body: RollingBall, settings: MujocoSettings, formulation: Formulation, *, slips: bool
 ) -> None:
-    """The state at time 0 with its own forces; ``slips`` if they are known not to hold the ball.
+    """Writes the state at time 0 into ``data`` and computes its forces; ``slips``: the ball is known not to stick.
 
     Raises:
         Refused: the contact is too soft for a settled start.
     """
     lag = settings.velocity_lag
-    # What lags is damped by b = 2 / (d tc), of which a soft contact turns the part d into acceleration.
+    # Lagging velocities are damped by b = 2 / (d tc), of which a soft contact turns the part d into acceleration.
     share = 2 * lag / settings.contact_time
     rounds = _rounds(body, settings, slips)
 
@@ -80,9 +80,9 @@ def start(
             data.qvel[:] = now - lag * before
             formulation.evaluate(data)
             if lag and index % 2:
-                # An error contracts by ``share`` along the contact's rows and vanishes elsewhere. Extrapolation
-                # removes the first and turns the second's sign, so it alternates with plain rounds and the last is
-                # plain.
+                # In a plain round the error contracts by ``share`` along the contact's rows and vanishes elsewhere.
+                # Extrapolation removes the first and brings errors elsewhere back with the other sign, so it
+                # alternates with plain rounds, and the last round is plain.
                 data.qacc[:] = (data.qacc - share * before) / (1 - share)
 
     depth = 0.0 if body.gap0 else _TOUCHING * body.ball.radius
@@ -94,9 +94,9 @@ def start(
 
 
 def _rounds(body: RollingBall, settings: MujocoSettings, slips: bool) -> int:
-    """Evaluations at time 0 until all has converged that uses the evaluation before; odd.
+    """Number (odd) of evaluations at time 0 until all terms converge that use results of the evaluation before.
 
-    These are velocities that lag, the resistance's torque and the correction of a slip.
+    Such terms are lagging velocities, the torque of rolling resistance and the correction of slip.
     """
     rounds = EVALUATIONS
     if settings.velocity_lag:
@@ -137,11 +137,11 @@ def _settled_depth(model: Any, data: Any, body: RollingBall, evaluate_at: Callab
             advice = "take a smaller dt or a larger impedance"
             raise Refused(f"the contact is so soft that the ball would sink into the wall; {advice}")
         low, upper = upper, min(1e3 * upper, body.ball.radius)
-    # Nobody can place the ball closer than the numbers of its centre lie.
+    # The depth has no more digits than the coordinates of the ball's centre.
     closest = max(_DEPTH * upper, float(np.spacing(np.max(np.abs(body.p0)))))
     at_low, at_upper, tries = excess(low), excess(upper), 0
-    # It is nearly linear, so by false position (the Illinois method: Dowell and Jarratt, BIT 11, 1971), but by halves
-    # every third time, and where that does not converge: no switch of friction between two depths leads these astray.
+    # The function is nearly linear, so by false position (the Illinois method: Dowell and Jarratt, BIT 11, 1971). Every
+    # third step, and all later ones, bisect: that converges even if friction switches between two depths.
     before = 0
     while upper - low > closest and at_upper:
         tries += 1

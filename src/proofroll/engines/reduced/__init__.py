@@ -1,4 +1,4 @@
-"""The least model of a ball that rolls on a surface: a closed form, or five equations without constraints."""
+"""Minimal model of a ball that rolls on a surface: a closed form, or five equations without constraints."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,12 +25,12 @@ from proofroll.elements.ball_on_surface.motion import BallMotion, world_motion
 from proofroll.elements.ball_on_surface.rolling_equations import closed_form, placed, reduced_rates, start
 from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample, terms_held
 
-# A step shorter than this part of the way to the next sample leads nowhere.
+# Least step as a part of the interval to the next sample; a shorter one means divergence.
 _STUCK = 1e-12
 
 
 class ReducedModel(ABC):
-    """A run of a model; see :class:`proofroll.core.engine.Engine` for the methods."""
+    """Run of a minimal model; see :class:`proofroll.core.engine.Engine` for the methods."""
 
     def __init__(self, body: RollingBall) -> None:
         self._body = body
@@ -41,14 +41,14 @@ class ReducedModel(ABC):
 
     @abstractmethod
     def motion(self) -> BallMotion:
-        """State and force now, each shape (1, 3)."""
+        """Present state and contact force, each shape (1, 3)."""
 
     def spin_rate(self) -> float | None:
-        """ω̇1 now [rad/s²]; None: the model has no equation for it."""
+        """Present rate of the spin about the normal, ω̇1 [rad/s²]; None: the model has no equation for it."""
         return None
 
     def sample(self) -> BallSample:
-        """See :class:`proofroll.core.engine.Engine`. The orientation is not followed: nothing needs it."""
+        """See :class:`proofroll.core.engine.Engine`. The model has no orientation."""
         motion = self.motion()
         return BallSample(
             p_WB=motion.p_WB[0].copy(),
@@ -74,13 +74,13 @@ class ReducedModel(ABC):
         )
 
     def _turning(self, p: FloatArray, v: FloatArray, w: FloatArray, acceleration: FloatArray) -> FloatArray | None:
-        """ω̇ [rad/s²], shape (3,): rate of ω = ω1 e1 - e1 × v / a."""
+        """Angular acceleration [rad/s²], shape (3,): rate of ω = ω1 e1 - e1 × v / a; None without a rate of ω1."""
         spin_rate, surface = self.spin_rate(), self._body.surface
         if spin_rate is None:
             return None
         e1 = surface.normal(p)
         e1_rate, v0 = surface.normal_gradient(p) @ v, v
-        if (W := self._body.wall_rate) is not None:  # the ball rolls on what the wall does not carry along
+        if (W := self._body.wall_rate) is not None:  # rolling has the velocity relative to the moving wall
             v = v - cross(W, p + self._body.ball.radius * e1)
             acceleration = acceleration - cross(W, v0 + self._body.ball.radius * e1_rate)
         swung = cross(e1_rate, v) + cross(e1, acceleration)
@@ -88,7 +88,7 @@ class ReducedModel(ABC):
 
 
 class ClosedFormModel(ReducedModel):
-    """The closed form."""
+    """Run by the closed form of the motion. Raises Refused where none is known."""
 
     def __init__(self, body: RollingBall) -> None:
         if body.contact.rolling_resistance > 0:
@@ -159,7 +159,7 @@ class Integrated(ReducedModel):
 
 
 class Compiled(ReducedModel):
-    """The reduced equations on a cylinder or plane by compiled Taylor series."""
+    """Reduced equations on a cylinder or plane, by compiled Taylor series. Raises Refused on other surfaces."""
 
     def __init__(self, body: RollingBall, rtol: float) -> None:
         if not supports(body):
@@ -201,16 +201,16 @@ class Compiled(ReducedModel):
         return float(self._evaluate(self._series.x, self._pars)[4])
 
 
-# What double precision, and scipy (it accepts nothing below 100 machine epsilons), leave of each method.
+# Least rtol of each method in double precision; scipy accepts nothing below 100 machine epsilons.
 _TIGHTEST: Mapping[str, float] = {"dop853": 100 * float(np.finfo(float).eps), "taylor": TIGHTEST}
 
 
 @dataclass(frozen=True)
 class ReducedSettings:
-    """Settings of the least model.
+    """Settings of the minimal model.
 
     Attributes:
-        formulation: ``equations``, integrated, or ``closed_form``, where there is one.
+        formulation: ``equations`` (integrated) or ``closed_form`` (where one is known).
         preset: where the other values come from.
         integrator: ``dop853`` (scipy, on any surface) or ``taylor`` (heyoka, compiled, on a cylinder or plane); None
             in ``closed_form``.
@@ -223,7 +223,7 @@ class ReducedSettings:
     rtol: Annotated[float, Gt(0)] | None = _TIGHTEST["dop853"]
 
     def __post_init__(self) -> None:
-        """Raises InputError where the formulation has no such setting, or needs another value."""
+        """Raises InputError if a setting does not belong to the formulation, is missing, or is too small."""
         refuse_first("reduced", self, self._rules())
 
     def _rules(self) -> Iterator[tuple[bool, str, str]]:
@@ -251,7 +251,7 @@ class ReducedSettings:
         return None
 
 
-# There is no default: nobody writes these equations first. tuned is the same model, compiled.
+# There is no default: no user's first model is these equations. ``tuned`` is the same model, compiled.
 PRESETS: Mapping[str, Mapping[str, ReducedSettings]] = {
     "equations": {
         "matched": ReducedSettings(),
@@ -262,10 +262,10 @@ PRESETS: Mapping[str, Mapping[str, ReducedSettings]] = {
 
 
 class Reduced:
-    """The scene's least model: a closed form, or five equations of motion with no constraint left.
+    """Minimal model of a rolling ball: a closed form, or five equations of motion without constraints.
 
-    It shares the closed form and the equations with the truth's first route (:mod:`rolling_equations`), so agreement
-    with the truth is news only as far as the truth's second route, which shares neither, agrees too.
+    The truth's first route uses the same closed form and equations (:mod:`rolling_equations`). So agreement with the
+    truth is evidence only as far as the truth's second route, which shares neither, agrees too.
     """
 
     name: ClassVar[str] = "reduced"
@@ -290,16 +290,16 @@ class Reduced:
         ),
         "closed_form": ("closed form",),
     }
-    terms: ClassVar[Sequence[Term]] = ()  # the least model has nothing left to switch off
+    terms: ClassVar[Sequence[Term]] = ()  # a minimal model has no optional terms
 
     @staticmethod
     def version() -> str:
-        """The equations are part of proofroll; heyoka integrates them where it is installed."""
+        """Version of proofroll, whose part the equations are; with that of heyoka where it is installed."""
         return with_heyoka(proofroll.__version__)
 
     @classmethod
     def build(cls, scene: Scene, settings: ReducedSettings) -> ReducedModel:
-        """See :class:`proofroll.core.engine.Engine`; what it builds is a run of one of the models."""
+        """See :class:`proofroll.core.engine.Engine`; builds a run of one of the three models."""
         require_provided(cls, settings.formulation, scene)
         body = rolling_ball(scene)
         if settings.rtol is None:
