@@ -34,7 +34,7 @@ def test_a_sled_turns_about_a_foot_and_rests() -> None:
     first, *others = run.events()
     assert (first.kind, first.name) == ("stick", "right")
     assert first.time_low <= true["events"][0] <= first.time_high
-    assert {item.name for item in others} == {"left", "back"}
+    assert {(item.kind, item.name) for item in others} == {("rest", "left"), ("rest", "back")}
     N = np.linalg.solve([np.ones(3), (0.15, 0.15, -0.20), (0.10, -0.10, 0.03)], (2 * 9.81, 0, 0))
     np.testing.assert_allclose(run.sample().contact_force[:, 2], N, rtol=1e-6)
 
@@ -177,7 +177,7 @@ def test_a_foot_that_turns_within_a_step_goes_on() -> None:
     run.advance(1.0)
     (true,) = true_values("sled_on_slope")
     assert np.hypot(*(run.sample().p_WB[0, :2] - true["values"]["p_WB"][:2])) < 2e-4
-    assert [event.kind for event in run.events()] == ["stick"] * 3
+    assert [event.kind for event in run.events()] == ["stick", "rest", "rest"]
 
 
 def test_a_ball_that_hardly_falls_comes_to_rest() -> None:

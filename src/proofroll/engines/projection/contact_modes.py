@@ -17,18 +17,19 @@ from proofroll.core.dop853 import Accept
 from proofroll.core.errors import Diverged, Refused
 from proofroll.core.integrators import Integrator
 from proofroll.elements.mechanism import Mechanism
-from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting
+from proofroll.elements.mechanism.contacts.acting import OPEN, Acting, ContactMode, across, acting, changes
 from proofroll.elements.mechanism.contacts.coulomb import PAINLEVE, solved
 from proofroll.elements.mechanism.contacts.start import closed_and_still, natural_scale
 from proofroll.elements.mechanism.contacts.touching import Moving, Touching, touch
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
-from proofroll.elements.mechanism.signal import breaks
+from proofroll.elements.mechanism.signal import breaks, varies
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 from proofroll.engines.projection.elimination import Space
 from proofroll.engines.projection.elimination import solved as divided
 
 _RANK = 1e-10  # of the largest singular value: rows of contacts that depend on each other
+_STANDS = 1e-6  # of a natural acceleration: what is slower will not move
 _REST = 1e-2  # of what gravity makes in a fixed step: slips as slow as this end with another that ends
 
 
@@ -67,7 +68,8 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         self.friction = np.array([contact.friction for contact in self.contacts])
         scale = natural_scale(mechanism)
         self._unit = math.prod(scale)  # a natural speed
-        self._still = scale.speed
+        self._still, self._rate = scale.speed, scale.rate
+        self._timed = any(map(varies, mechanism.signals))
         self._faint = max(self._still, _REST * step * float(np.linalg.norm(mechanism.gravity)))
         self._motors = {k: item for k, item in enumerate(mechanism.actuators) if item.limit is not None}
         start = np.append(equations.start, 0.0)
@@ -243,9 +245,9 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         now, closed = self.at(x), [own.kind != "open" for own in was]
         still = [own.kind == "stick" for own in was]
         if kind == "impact":
-            x, closed = self._struck(x, now, k)
+            x, closed, settles = self._struck(x, now, k)
             self._limit_efforts(x)  # what a servo wants jumps with the velocity
-            happened = [("impact", self.contacts[k].name)]
+            happened = [("settle" if settles else "impact", self.contacts[k].name)]
             now = self.at(x)
             still = [bool(np.linalg.norm(across(each)) <= self._still) for each in now.touching]
         elif kind == "still":
@@ -254,10 +256,20 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         mode = self._leaving(now, k) if kind == "slip" else self._decided(now, closed, still)
         if kind == "still" and slips[k] > self._still and mode[k].kind == "slip":  # it has turned, and not stopped
             mode = self._decided(now, closed, [stands and own != k for own, stands in enumerate(still)])
-        for own, before, contact in zip(mode, was, self.contacts, strict=True):
-            if own.kind != before.kind and (contact.name not in {name for _, name in happened} or own.kind == "stick"):
-                happened.append(("lift_off" if own.kind == "open" else own.kind, contact.name))
+        struck = {name for _, name in happened}
+        happened += [one for one in changes(self.contacts, was, mode, self._stands(x, mode)) if one[1] not in struck]
         return x, mode, happened
+
+    def _stands(self, y: Array, mode: ContactMode) -> bool:
+        """True if nothing moves in a mode, and nothing will."""
+        if self._timed or any(own.kind == "slip" for own in mode):
+            return False
+        now = self.at(y := self._settled(y, mode))
+        load = np.einsum("kin,ki->n", now.J, self.forces(now, mode))
+        n, rate = len(self._equations.mass), self._equations.rates(y[:-1], load)
+        sizes = np.repeat([1.0, self._unit / self._rate], 3 * n)  # of velocities, and of turning
+        moves, will = (float(np.abs(sizes * part[7 * n : 13 * n]).max()) for part in (y, rate))
+        return moves <= self._still and will <= _STANDS * self._unit * self._rate
 
     def _leaving(self, now: ContactsThere, k: int) -> ContactMode:
         """The mode with a contact that slips from now on, against the friction that held it."""
@@ -267,21 +279,21 @@ class ContactMotion(AlternatingMotion[ContactMode]):
         line = None if self.mode[k].along is None else (x, y, z)
         return (*self.mode[:k], Acting("slip", line, (x, y, z)), *self.mode[k + 1 :])
 
-    def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool]]:
-        """The state after an impact, by Newton's law and Coulomb's, and which contacts stay closed."""
+    def _struck(self, x: Array, now: ContactsThere, hit: int) -> tuple[Array, list[bool], bool]:
+        """The state after an impact, by Newton's law and Coulomb's, which contacts stay closed, and if it settles."""
         which = [k for k, own in enumerate(self.mode) if own.kind != "open" or k == hit]
         frames, J, response = self._framed(now, which)
         c = np.concatenate([frame.T @ now.touching[k].slide for frame, k in zip(frames, which, strict=True)])
         speed, e = -c[3 * which.index(hit)], self.contacts[hit].restitution
-        if self._settles(hit, speed / self._unit, e):
-            e = 0.0
+        settles = self._settles(hit, speed / self._unit, e)
+        e = 0.0 if settles else e
         c[3 * which.index(hit)] *= 1 + e
         impulse, _ = self._law(J @ response, c, which, [None] * len(which))
         x = self._pushed(x, response @ impulse.ravel())
         closed = [False] * len(self.mode)
         for place, k in enumerate(which):
             closed[k] = bool(impulse[place, 0] > 0 and not (k == hit and e))
-        return x, closed
+        return x, closed, settles
 
     def _framed(self, now: ContactsThere, which: Sequence[int]) -> tuple[list[Array], Array, Array]:
         """Normal and two directions of some contacts; J along them, and what forces along them do."""

@@ -122,24 +122,3 @@ def refuse_turning_onset(contact: Touchable, own: Acting) -> None:
             f"{contact.name} begins to slip where it could go in any direction of its surface; which it takes at first "
             "hangs on less than the forces tell"
         )
-
-
-def events(
-    contacts: Sequence[Touchable], before: ContactMode, after: ContactMode, stands: bool
-) -> tuple[tuple[str, str], ...]:
-    """Events of a change of mode; ``stands``: nothing moves any more."""
-    found: list[tuple[str, str]] = []
-    for contact, was, now in zip(contacts, before, after, strict=True):
-        if now.kind == "stick" and was.kind != "stick":
-            found.append(("rest" if stands and not contact.bound else "stick", contact.name))
-        elif was.kind == "stick" and now.kind == "slip":
-            found.append(("slip", contact.name))
-        elif was.kind != "open" and now.kind == "open":
-            found.append(("lift_off", contact.name))
-        elif was.kind == now.kind == "slip" and _opposite(was, now):
-            found.append(("turn", contact.name))
-    return tuple(found)
-
-
-def _opposite(was: Acting, now: Acting) -> bool:
-    return was.along is not None and now.along is not None and float(np.dot(was.along, now.along)) < 0

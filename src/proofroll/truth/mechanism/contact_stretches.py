@@ -8,7 +8,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from proofroll.core.arrays import FloatArray
-from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across
+from proofroll.elements.mechanism.contacts.acting import FAINT, OPEN, Acting, ContactMode, across, changes
 from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
@@ -20,7 +20,6 @@ from proofroll.truth.mechanism.contact_guards import (
     STOPPED,
     ContactGuard,
     Touchable,
-    events,
     faint_time,
     guard_value,
     guards_of,
@@ -217,7 +216,7 @@ class ContactStretches(Stretches[ContactMode]):
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
         state = self._given.eliminated(state, held(closed, still))
         mode, sure = self._decided(state, closed, still)
-        changed = events(self.contacts, leg.mode, mode, self._stands(state, mode))
+        changed = changes(self.contacts, leg.mode, mode, self._stands(state, mode))
         struck = {name for _, name in happened}
         said = (*happened, *(item for item in changed if item[1] not in struck))
         return Transition(state, mode, said, np.inf if delay else min(margin, sure), delay)

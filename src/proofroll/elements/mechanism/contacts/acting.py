@@ -1,6 +1,7 @@
 """Mode of a contact between two changes: open, slip or stick."""
 
-from typing import Literal, NamedTuple
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -99,6 +100,35 @@ def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array,
         return Acting("stick", along)
     size = float(np.linalg.norm(heading)) or 1.0
     return Acting("slip", along, _direction(frame[:, 1:] @ (heading / size)))
+
+
+class _Named(Protocol):
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def bound(self) -> float: ...
+
+
+def changes(
+    contacts: Sequence[_Named], before: ContactMode, after: ContactMode, stands: bool
+) -> tuple[tuple[str, str], ...]:
+    """Kind and contact of each event of a change of mode; ``stands``: nothing moves any more."""
+    found: list[tuple[str, str]] = []
+    for contact, was, now in zip(contacts, before, after, strict=True):
+        if now.kind == "stick" and was.kind != "stick":
+            found.append(("rest" if stands and not contact.bound else "stick", contact.name))
+        elif was.kind == "stick" and now.kind == "slip":
+            found.append(("slip", contact.name))
+        elif was.kind != "open" and now.kind == "open":
+            found.append(("lift_off", contact.name))
+        elif was.kind == now.kind == "slip" and _opposite(was, now):
+            found.append(("turn", contact.name))
+    return tuple(found)
+
+
+def _opposite(was: Acting, now: Acting) -> bool:
+    return was.along is not None and now.along is not None and float(np.dot(was.along, now.along)) < 0
 
 
 def _direction(vector: Array) -> Direction:

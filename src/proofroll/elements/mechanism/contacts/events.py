@@ -23,6 +23,8 @@ _States = NDArray[np.bool_]
 _CREEPS = 1e-3
 # Part of a mechanism's size up to which a gap at the start is none.
 _CLOSED = 1e-6
+# Kinds of events that samples do not tell apart: what stands may still begin to move, rebounds may be no end of them.
+_ALIKE = {"rest": "stick", "settle": "impact"}
 
 
 class ContactWatch:
@@ -44,7 +46,7 @@ class ContactWatch:
         self,
         times: FloatArray,
         samples: Sequence[MechanismSample],
-        located: Sequence[Event] | None,  # noqa: ARG002 -- of joints, where an engine has any
+        located: Sequence[Event] | None,
     ) -> SeenInRun:
         """The events, or None where forces of contact are not known all the time."""
         count, mechanism = len(samples), self._element.mechanism
@@ -56,7 +58,20 @@ class ContactWatch:
         placed = placed_from(self._element, times[:count], samples)
         turning = np.abs(placed.w_WB).max(axis=(1, 2)) * self._element.length
         speeds = np.maximum(np.abs(placed.v_WB).max(axis=(1, 2)), turning)
-        return SeenInRun(count, self._events(times[:count], followed(placed), pressed, speeds), None)
+        seen = self._events(times[:count], followed(placed), pressed, speeds)
+        return SeenInRun(count, self._told(located or (), seen), None)
+
+    def _told(self, located: Sequence[Event], seen: Sequence[Event]) -> Sequence[Event]:
+        """The engine's own events of contacts, unless its samples show one that is not among them."""
+        names = {contact.name for contact in self._element.mechanism.contacts}
+        own = [event for event in located if event.name in names]
+        left = list(own)
+        for event in seen:
+            match = next((one for one in left if _alike(one, event)), None)
+            if match is None:
+                return seen
+            left.remove(match)
+        return own
 
     def _events(self, times: FloatArray, found: Followed, pressed: FloatArray, speeds: FloatArray) -> list[Event]:
         presses = normal_forces(found, pressed) > PRESSES * self._element.force
@@ -78,6 +93,13 @@ class ContactWatch:
                     low, high = float(times[k]), float(times[k + 1])
                     events.append(Event(kind, min(max(at, low), high), low, high, contact.name))
         return sorted(events, key=lambda event: event.time)
+
+
+def _alike(one: Event, seen: Event) -> bool:
+    """True if an event may be the one that samples show, to one interval between them."""
+    wide = seen.time_high - seen.time_low
+    near = seen.time_low - wide <= one.time <= seen.time_high + wide
+    return near and one.name == seen.name and _ALIKE.get(one.kind, one.kind) == _ALIKE.get(seen.kind, seen.kind)
 
 
 def _without_lone(states: _States) -> _States:

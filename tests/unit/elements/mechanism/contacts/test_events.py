@@ -22,7 +22,13 @@ def ball(restitution: float = 0.0) -> MechanismElement:
     return the_mechanism(load_scene("spinning_bounce", restitution=restitution))
 
 
-def seen(heights: list[float], speeds: list[list[float]], N: list[float], element: MechanismElement) -> list[Event]:
+def seen(
+    heights: list[float],
+    speeds: list[list[float]],
+    N: list[float],
+    element: MechanismElement,
+    located: list[Event] | None = None,
+) -> list[Event]:
     """Events of samples of a ball that does not turn."""
     q, radius = np.array([1.0, 0, 0, 0]), 0.05
     samples = [
@@ -30,7 +36,7 @@ def seen(heights: list[float], speeds: list[list[float]], N: list[float], elemen
         for h, v, n in zip(heights, speeds, N, strict=True)
     ]
     watch = ContactWatch(element)
-    found = watch.conclude(EVERY * np.arange(len(samples)), samples, None)
+    found = watch.conclude(EVERY * np.arange(len(samples)), samples, located)
     assert found.events is not None
     return list(found.events)
 
@@ -46,6 +52,18 @@ def test_a_slip_that_ends_is_a_stick_and_at_rest_a_rest() -> None:
     assert told(events) == [("rest", 2)]
     assert events[0].time == pytest.approx(0.03)
     assert events[0].name == "contact"
+
+
+@pytest.mark.parametrize(
+    ("kind", "time", "taken"), [("rest", 0.0301, True), ("slip", 0.0301, False), ("rest", 0.06, False)]
+)
+def test_an_engines_own_event_is_taken_unless_samples_contradict_it(kind: str, time: float, taken: bool) -> None:
+    """An event that fits the samples keeps its own bracket; a wrong one is not believed."""
+    own = Event(kind, time, time - 1e-4, time, "contact")
+    slides = [[0.3, 0, 0], [0.2, 0, 0], [0.1, 0, 0], *[[0, 0, 0]] * 4]
+    events = seen([0] * 7, slides, [1.0] * 7, ball(), [own])
+    assert (events == [own]) == taken
+    assert [event.kind for event in events] == ["rest"]
 
 
 def test_what_slides_back_has_turned() -> None:
