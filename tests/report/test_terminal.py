@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import io
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from folded import whole
 from rich.console import Console
 
+from proofroll.core.verdict import Verdict
 from proofroll.report.comparison.records import ReportedComparison
 from proofroll.report.page.records import ReportContent
 from proofroll.report.parts import PartEntry
-from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines, verdict_table
+from proofroll.report.terminal.tables import WIDTH, console, first_lines, part_lines, verdict_parts, verdict_table
 
 
 def test_the_table_of_verdicts_is_plain_where_nobody_watches(content: ReportContent) -> None:
@@ -38,6 +41,23 @@ def test_a_column_without_numbers_is_left_out(content: ReportContent) -> None:
     untimed = replace(found, rows=[replace(row, seconds_per_second=None) for row in found.rows])
     assert "s/s" in head(found)
     assert [name for name in head(found) if name != "s/s"] == head(untimed)
+
+
+@pytest.mark.drill
+def test_a_comparison_without_its_truth_is_one_sentence(everything: Any, tmp_path: Path) -> None:
+    """What the time did not suffice for at all is told once, on the terminal and in each section of the page."""
+    found = everything.content.comparisons[0]
+    unjudged = Verdict.NOT_JUDGED
+    rows = [replace(row, verdict=unjudged, verdicts={unjudged: 2}) for row in found.rows]
+    lacking = replace(found, name="lacking", title="Lacking", rows=rows, beyond_budget=["the truth", "alpha, dt 0.1"])
+    said = "Not judged, for the processor time did not suffice for the truth: 4 settings. The same command goes on."
+    assert list(verdict_parts(lacking)) == ["Lacking", said, ""]
+    content = replace(everything.content, comparisons=[found, lacking])
+    both = replace(everything, content=content, curves=2 * everything.curves)
+    text = whole(both.write(tmp_path / "report.html").read_text(encoding="utf-8"))
+    assert said in text
+    assert "Verdicts: Lacking" not in text
+    assert len(list(verdict_parts(replace(lacking, beyond_budget=["alpha, dt 0.1"])))) > 3, "the truth is there"
 
 
 def test_the_console_is_as_wide_in_a_pipe_as_at_most_on_a_terminal(

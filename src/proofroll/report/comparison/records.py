@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from proofroll.core.comparison import ExceptAt, Row, Tolerance
 from proofroll.core.diagnosis.of_scene import Diagnosis
-from proofroll.core.number_format import number
+from proofroll.core.number_format import counted, number
 from proofroll.core.verdict import Judgement, Verdict
 from proofroll.files.json_data import MERGED
 from proofroll.report.comparison.spread import Spread
@@ -203,6 +203,15 @@ class ReportedComparison:
     beyond_budget: list[str] = field(default_factory=list)
     spread: list[Spread] = field(default_factory=list)
     evidence: ComparisonEvidence | None = field(default=None, metadata=MERGED)
+
+    @property
+    def unreached(self) -> str:
+        """Sentence instead of rows where processor time did not suffice for the truth; empty: something was judged."""
+        lacking = any(name.startswith("the truth") for name in self.beyond_budget)
+        if not lacking or any(row.verdict != Verdict.NOT_JUDGED for row in self.rows):
+            return ""
+        many = counted(len(self.rows), "settings")
+        return f"Not judged, for the processor time did not suffice for the truth: {many}. The same command goes on."
 
     @property
     def laws_alone(self) -> bool:

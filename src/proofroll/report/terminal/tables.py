@@ -108,6 +108,9 @@ def columns(content: ReportedComparison) -> list[tuple[str, str]]:
 
 def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
     """A comparison: the table of verdicts, and what came of it in words."""
+    if content.unreached and content.budget is None:
+        yield from (content.title, content.unreached, "")
+        return
     yield verdict_table(content)
     for item in content.spread:
         yield from spread_parts(item)
