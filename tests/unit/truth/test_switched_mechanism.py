@@ -211,12 +211,12 @@ def test_bad_laws_are_one_line(more: dict[str, object], said: str) -> None:
     assert said in str(raised.value)
 
 
-@pytest.mark.parametrize("round_off", [0.0, 1e-12])
-def test_forces_that_are_not_determinate_are_refused(round_off: float) -> None:
+@pytest.mark.parametrize(("round_off", "second"), [(0.0, 2.0), (1e-12, 2.0), (-1e-12, 3.0)])
+def test_forces_that_are_not_determinate_are_refused(round_off: float, second: float) -> None:
     """Two rows of one velocity have no unique forces, and round-off between them gives the same reason."""
     rows = np.array([[1.0, 1.0], [1.0, 1.0 - round_off]])
-    with pytest.raises(Refused, match="several joints hold one degree of freedom"):
-        complementary(np.array([3.0, 2.0]), rows, -5 * np.ones(2), 5 * np.ones(2))
+    with pytest.raises(Refused, match="hold one degree of freedom"):
+        complementary(np.array([3.0, second]), rows, -5 * np.ones(2), 5 * np.ones(2))
 
 
 def test_complementarity_holds_on_random_problems() -> None:

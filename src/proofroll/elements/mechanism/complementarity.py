@@ -28,27 +28,22 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
         Of each force -1, 0, 1: at its lower bound, between, at its upper bound; the forces; the accelerations.
 
     Raises:
-        Refused: G is singular, so that forces which hold are not determinate.
+        Refused: G is singular but for round-off, so that forces which hold are not determinate.
     """
+    scale = np.sqrt(np.maximum(np.diag(G), 0.0))
+    if np.any(scale <= RANK * scale.max()) or np.linalg.matrix_rank(G / np.outer(scale, scale), tol=RANK) < len(G):
+        raise Refused(REDUNDANT)
     state = np.zeros(len(free), dtype=int)
     for _ in range(_MOST_PIVOTS):
         held = state == 0
         f = np.where(state > 0, high, np.where(state < 0, low, 0.0))
-        try:
-            f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
-        except np.linalg.LinAlgError:
-            raise Refused(REDUNDANT) from None
-        a = free + G @ f
+        f[held] = -np.linalg.solve(G[np.ix_(held, held)], free[held] + G[np.ix_(held, ~held)] @ f[~held])
+        a = np.where(held, 0.0, free + G @ f)
         wrong = np.flatnonzero((held & ((f > high) | (f < low))) | ((state > 0) & (a > 0)) | ((state < 0) & (a < 0)))
         if not len(wrong):
             return state, f, a
         k = int(wrong[0])
         state[k] = 0 if state[k] else (1 if f[k] > high[k] else -1)
-    scale = np.sqrt(np.diag(G))
-    if np.linalg.matrix_rank(G / np.outer(scale, scale), tol=RANK) < len(
-        G
-    ):  # only round-off kept it from being singular
-        raise Refused(REDUNDANT)
     raise Refused("which joints hold is not found: the complementarity problem has no solution by pivots")
 
 

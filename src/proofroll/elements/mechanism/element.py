@@ -54,6 +54,8 @@ OPEN = 0.1
 ENERGY_GAIN, OPENED = "energy gain", "joints opened"
 # An engine without a step is looked at first after this part of the natural time.
 _PART = 1e-4
+# Part of the fastest rate on springs and servos of joints below which a freedom is none that they hold.
+_HELD = 1e-7
 _AXES = "xyz"
 
 
@@ -113,6 +115,10 @@ class MechanismElement:
         return JointCoordinates(self.mechanism)
 
     @cached_property
+    def _law_rates(self) -> tuple[FloatArray, FloatArray]:
+        return self._equations.law_rates()
+
+    @cached_property
     def _solution(self) -> Solution:
         return self._equations.solve(*self.mechanism.start())
 
@@ -151,18 +157,21 @@ class MechanismElement:
         """Largest distance between joints, centres of mass, tracked points and contacts at the start [m]."""
         return extent(self.mechanism, self._solution.motion)
 
-    @property
+    @cached_property
     def natural_time(self) -> float:
-        """Period of a pendulum of its size, else of its mass on its stiffest spring, else of a turn [s]."""
-        gravity = float(np.linalg.norm(self.mechanism.gravity))
+        """Period of a pendulum of its size, or, if shorter, of its slowest motion on springs and servos of joints.
+
+        Without gravity and these it is that of its mass on its stiffest spring between points, else of a turn [s].
+        """
+        gravity, held = float(np.linalg.norm(self.mechanism.gravity)), self._law_rates[1]
+        slowest = float(held.min(initial=np.inf))
+        slowest = slowest if slowest > _HELD * float(held.max(initial=0.0)) and np.isfinite(slowest) else 0.0
         if gravity:
-            return float(2 * np.pi * np.sqrt(self.length / gravity))
+            return 2 * np.pi / max(slowest, float(np.sqrt(gravity / self.length)))
         mass = sum(body.mass for body in self.mechanism.bodies)
         stiffest = max((spring.stiffness for spring in self.mechanism.springs), default=0.0)
-        if stiffest:
-            return float(2 * np.pi * np.sqrt(mass / stiffest))
         spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
-        return 2 * np.pi / spin if spin else 1.0
+        return 2 * np.pi / rate if (rate := slowest or float(np.sqrt(stiffest / mass)) or spin) else 1.0
 
     @cached_property
     def turn_interval(self) -> float | None:
@@ -261,7 +270,7 @@ class MechanismElement:
         spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
         fastest = None if truth is None else float(np.max(np.linalg.norm(truth["w_WB"].to_numpy(), axis=-1)))
         fall = float(np.sqrt(np.linalg.norm(self.mechanism.gravity) / self.length))
-        damper, spring = self._equations.law_rates()
+        damper, spring = (float(rates.max(initial=0.0)) for rates in self._law_rates)
         laws = [
             StepNumber("damper", "hc/m", "step in parts of the time constant of a joint's damper or servo", damper * h),
             StepNumber("servo", "h√(k/m)", "angle [rad] of a joint on its spring or servo in a step", spring * h),

@@ -206,18 +206,29 @@ class JointCoordinates:
         noise = max(float(np.abs(each.acceleration - acceleration).max(initial=0.0)) for each in nudged)
         return max(1.0, float(np.sqrt(slope))), noise
 
-    def law_rates(self) -> tuple[float, float]:
-        """Fastest rate of the dampers and of the springs of joints at the start, servos with them [1/s, rad/s]."""
+    def law_rates(self) -> tuple[Array, Array]:
+        """Rates of dampers and of springs of joints at the start, servos with them, growing [1/s, rad/s], (freedoms).
+
+        Loops and couplings share what each coordinate carries: a servo behind a gear moves the reflected inertia, too.
+        """
         damping, stiffness = self._damping.copy(), np.zeros(self.mechanism.nv)
         for of_joint, _, _, at_v in self._springs:
             stiffness[at_v] += of_joint
         for actuator, _, at in self.actuators:
             damping[at] += actuator.gear**2 * actuator.kd
             stiffness[at] += actuator.gear**2 * actuator.kp
-        M = self.inertial(self.tree.at(*self.mechanism.start()))[1]
+        if not (damping.any() or stiffness.any()):
+            return damping[self.rank :], stiffness[self.rank :]
+        motion = self.tree.at(*self.mechanism.start())
+        M, rows = self.inertial(motion)[1], self.tree.loop_rows(motion).C
+        if self.rank:
+            free = np.linalg.svd(rows)[2][self.rank :].T
+            M, *laws = (free.T @ matrix @ free for matrix in (M, np.diag(damping), np.diag(stiffness)))
+        else:
+            laws = [np.diag(damping), np.diag(stiffness)]
         into = np.linalg.inv(np.linalg.cholesky(M))
-        fastest = [np.linalg.eigvalsh((into * law) @ into.T).max(initial=0.0) for law in (damping, stiffness)]
-        return float(fastest[0]), float(np.sqrt(fastest[1]))
+        dampers, springs = (np.linalg.eigvalsh(into @ law @ into.T) for law in laws)
+        return dampers, np.sqrt(np.maximum(springs, 0.0))
 
     def _least(self, tolerance: float) -> Array:
         """Errors of the coordinates and velocities below which steps only chase the noise of accelerations.

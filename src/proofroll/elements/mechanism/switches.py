@@ -21,8 +21,8 @@ SETTLED = math.exp(-13.5)
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
 REDUNDANT = (
-    "several joints hold one degree of freedom, so that their forces are not determinate: "
-    "keep the friction or the stop of one of them"
+    "friction or stops of several joints hold one degree of freedom, which loops or couplings make them share, so that "
+    "their forces are not determinate: keep the friction or the stop of one of them; damping may stay in all"
 )
 
 

@@ -17,7 +17,7 @@ from proofroll.elements.mechanism.contacts.start import natural_scale
 from proofroll.elements.mechanism.named_forces import on_joint
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
-from proofroll.elements.mechanism.switches import HOLDING, STOPPED, Mode, changes, held_by, switched_joints
+from proofroll.elements.mechanism.switches import HOLDING, REDUNDANT, STOPPED, Mode, changes, held_by, switched_joints
 from proofroll.engines.projection.alternating import AlternatingMotion, Excess, ends_of_efforts
 from proofroll.engines.projection.dependent import DependentCoordinates, SolvedState
 
@@ -209,7 +209,7 @@ def _bounded(free: Array, G: Array, low: Array, high: Array) -> tuple[Array, NDA
 
     sizes = np.linalg.eigvalsh(G)
     if sizes[0] <= _DEPENDENT * sizes[-1]:
-        raise Refused("several joints hold one degree of freedom: their forces are not determinate")
+        raise Refused(REDUNDANT)
     L = np.linalg.cholesky(G)
     least = lsq_linear(L.T, -np.linalg.solve(L, free), (low, high), method="bvls", tol=np.finfo(float).tiny)
     return np.asarray(least.x), np.asarray(least.active_mask)

@@ -13,6 +13,7 @@ from proofroll.core.observable import Role
 from proofroll.elements.mechanism.certificate import CAPS
 from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 from proofroll.elements.mechanism.dataset import UNDETERMINED, UNSAID
+from proofroll.elements.mechanism.drives import Actuator
 from proofroll.elements.mechanism.element import ENERGY_GAIN, OPENED, MechanismElement
 from proofroll.elements.mechanism.report.drawing import drawn
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
@@ -311,3 +312,16 @@ def test_shapes_that_may_touch_are_drawn(scene: str, shapes: int, names: list[st
     letters = ["".join(part.text for part in mark.parts) for mark in full.marks if isinstance(mark, Lettering)]
     assert set(names) <= set(letters)
     assert len(full.marks) - len(bare.marks) == shapes + len(names)
+
+
+def test_the_natural_time_knows_servos_and_what_they_move() -> None:
+    """A stiff servo sets the pace, with the inertia that a coupling reflects; one of several joints free does not."""
+    assert element_of("servo", kp=1e6).natural_time == pytest.approx(2 * np.pi * 1e-3)
+    gears = element_of("gear_pair").mechanism
+    servo = Actuator("servo", gears.joints[0].name, "position", kp=90.0, gear=2.0)
+    geared = MechanismElement(dataclasses.replace(gears, actuators=(servo,)))
+    first, second, ratio = (load_scene("gear_pair").parameters[key] for key in ("first", "second", "ratio"))
+    assert geared.natural_time == pytest.approx(2 * np.pi * np.sqrt((first + ratio**2 * second) / (4 * 90.0)))
+    pair = element_of("double_pendulum").mechanism
+    servo = Actuator("servo", pair.joints[0].name, "position", kp=1e6)
+    assert MechanismElement(dataclasses.replace(pair, actuators=(servo,))).natural_time > 1.0
