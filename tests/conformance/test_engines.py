@@ -42,7 +42,7 @@ KNOWN: Mapping[str, Mapping[str, str]] = {
 
 # Of what hangs on a formulation's model or adapter, not on its step, and of what is held against truths, one preset is
 # asked on every scene in every run of the tests; in the drills each scene is asked of one other preset, in turns. What
-# is known to fail is asked wherever it is. Each preset's order, and what needs no scene of its own, is in every run.
+# is known to fail is asked wherever it is. Each preset's order and the effect of its tolerance are in every run.
 OF_MODELS = (
     "builds_or_refuses",
     "builds_only_what_is_required",
@@ -51,6 +51,12 @@ OF_MODELS = (
     "samples_cost_the_same",
     "engines_do_not_disturb_each_other",
     "moves_as_the_truth",
+    "samples_are_well_formed",
+    "reading_back_changes_nothing",
+    "advance_is_repeatable",
+    "advance_in_two_parts",
+    "sampling_changes_nothing",
+    "velocities_are_the_rates",
 )
 
 
@@ -66,7 +72,7 @@ def marks(engine: Any, check: Check) -> tuple[pytest.MarkDecorator, ...] | None:
     first, *others = sorted(engine.presets[formulation], key=lambda preset: preset != "matched")
     if preset == first:
         return ()
-    turn = SCENES.index(scene[0]) if scene else 0
+    turn = SCENES.index(scene[0]) if scene else OF_MODELS.index(name)
     return (pytest.mark.drill,) if check.known or preset == others[turn % len(others)] else None
 
 

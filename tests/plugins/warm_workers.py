@@ -23,7 +23,7 @@ from proofroll.running.process import Worker
 from proofroll.running.worker_pool import Workers
 
 # Idle ones that are kept, some hundred MB each; of more, the one that has waited longest is ended.
-_MOST = 8
+_MOST = 12
 # What every test has otherwise, and no worker reads.
 _PASSING = {"PYTEST_CURRENT_TEST", "COLUMNS"}
 

@@ -39,7 +39,9 @@ def test_a_comparison(
     command_line: Proofroll, install_engines: Callable[[Mapping[str, str]], None], scene: str
 ) -> None:
     """A new comparison is sound, of balls and of mechanisms, and has a row for each engine that can."""
-    install_engines({"absent": "no_such_module_anywhere:Engine"})
+    install_engines(
+        {"oracle": "hostile:Oracle", "absent": "no_such_module_anywhere:Engine"}
+    )  # as tests/test_json.py: workers are shared
     assert command_line("new", "scene", "rod")[0] == 0
     text = Path("rod/scene.toml").read_text(encoding="utf-8")
     Path("rod/scene.toml").write_text(f"duration = 0.8\n{text}", encoding="utf-8")
