@@ -12,14 +12,14 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, cross
 
 # At a pose closed to 1e-12 a dependent row shows as a relative singular value near 1e-12 or below, an independent one
-# of the mechanisms seen so far above 1e-3; the square-root middle leaves room to both.
+# of the mechanisms seen so far above 1e-3; 1e-8 lies between, with room on both sides.
 RANK = 1e-8
 NEARBY = 0.05  # rad or m: far enough from a singular start to see the rank that holds in general
-# Part of its usual size at which the least singular value of a loop's rows is one of a singular pose: the root of 1e-9,
-# for a length that differs by that part leads there, and no file is surer of a length.
+# A pose counts as singular if the least singular value of its rows, relative to the usual one, is below this. It is
+# the root of 1e-9: a length changed by 1e-9 of itself makes such a pose singular, and no file is surer of a length.
 BRANCHES = 3e-5
 State = TypeVar("State")
-_FOLLOWED = 0.3  # least determinant of a space's turn: 1 where it stays, 0 where a direction of it left
+_FOLLOWED = 0.3  # least determinant between bases of a space at two poses; 1: unchanged, 0: a direction left it
 _ZERO = 1e-9  # relative: a component of a null vector that is zero but for round-off
 
 
@@ -33,8 +33,8 @@ class Analysis:
         rank_at_start: at the start; smaller where the start is a singular pose.
         redundant: rows that follow from the others.
         mobility: degrees of freedom at a general pose.
-        singular_start: whether the start is a singular pose, or as near to one as lengths are known.
-        determinate: whether the equations of motion alone determine each component (Fx, Fy, Fz, Mx, My, Mz in world
+        singular_start: True if the start is a singular pose, or too near to one for lengths to tell.
+        determinate: True where the equations of motion alone determine a component (Fx, Fy, Fz, Mx, My, Mz in world
             axes, at the joint) of the wrench of each joint and then each loop, (joints + loops, 6).
     """
 
@@ -86,20 +86,20 @@ def singular_values(C: Array) -> Array:
 
 
 def least(matrix: Array, right: Array) -> Array:
-    """The smallest x for which matrix·x is as near as can be to ``right``; weak directions (RANK) are left alone."""
+    """Vector x of least norm that minimises abs(matrix·x − right); singular values below RANK count as zero."""
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=RANK)[0], dtype=np.float64)
 
 
 def rank_of(values: Array) -> int:
-    """Number of singular values that are not zero but for round-off."""
+    """Number of singular values above round-off."""
     return int((values > RANK * values.max(initial=0.0)).sum())
 
 
 class RowSign:
     """Sign of the product of the singular values of rows along a motion; it changes where the rows lose rank.
 
-    One matrix has none. From pose to pose the spaces of the singular vectors turn little, and carry it on. ``rank`` is
-    that of the rows at a general pose.
+    One matrix alone has no such sign: the singular vectors, which turn little from pose to pose, carry it along the
+    motion. ``rank`` is that of the rows at a general pose.
     """
 
     def __init__(self, rank: int) -> None:
@@ -107,10 +107,10 @@ class RowSign:
         self._usual, self.least = 0.0, 1.0
 
     def changes(self, C: Array) -> bool:
-        """True if rank was lost between the pose before and that of these rows, (rows, velocities).
+        """True if the rows, (rows, velocities), lost rank between the pose before and this one.
 
-        False also where the spaces turned too far in between. ``least`` is then the least singular value here, in parts
-        of the largest that it had.
+        Also False where the singular vectors turned too far to be followed. Sets ``least``: the least singular value
+        relative to its largest so far.
         """
         U, S, Vt = np.linalg.svd(C, full_matrices=False)
         self._usual = max(self._usual, float(S[self._rank - 1]))
@@ -144,15 +144,15 @@ def freedom(tree: Tree, motion: BodyMotion, rows: Rows, rank: int) -> Array:
 
 
 def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, loads: Array) -> tuple[Array, Array]:
-    """Wrenches that joints and loops transmit, from what else acts on the bodies.
+    """Wrenches that joints and loops transmit, from the other loads on the bodies.
 
     Args:
         tree: the mechanism's.
         motion: pose of all bodies.
         rows: constraints of the loops there.
         multipliers: one per row.
-        loads: force and moment about the world's origin that the joints must bring to each body but for the loops':
-            its inertia's minus gravity's and springs', N and N m, (bodies + 1, 6).
+        loads: force and moment about the world's origin that joints and loops together must bring to each body (its
+            inertial wrench minus gravity and springs), N and N m, (bodies + 1, 6).
 
     Returns:
         Force and moment in world axes on the child at the joint (joints, 6), on body_b at the loop's point (loops, 6).
@@ -180,11 +180,11 @@ def reactions(tree: Tree, motion: BodyMotion, rows: Rows, multipliers: Array, lo
 def general_place(
     start: State, rows: Callable[[State], tuple[Array, Array]], moved: Callable[[State, Array], State]
 ) -> State:
-    """Place near the start that the constraints allow and no symmetry distinguishes: a start may be singular.
+    """State near the start that fulfils the constraints and is in no special position; a start may be a singular pose.
 
     Args:
         start: a state, in any representation.
-        rows: residuals, shape (rows,), and rows on the velocities, shape (rows, velocities), at a state.
+        rows: function of a state: residuals, (rows,), and constraint matrix, (rows, velocities).
         moved: the state after a small displacement, shape (velocities,).
     """
     _, C = rows(start)

@@ -1,4 +1,4 @@
-"""The start of a mechanism: loops closed, velocities consistent, able to move."""
+"""Assembly and checks of a mechanism's start: loops closed, velocities consistent, able to move."""
 
 from dataclasses import replace
 
@@ -13,21 +13,21 @@ from proofroll.elements.mechanism.kinematics import Rows, Tree
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
-CLOSED = 1e-12  # of the size of a mechanism, rad, of its speeds: what round-off leaves of a loop that closes
-_AWAY = 8 * np.finfo(float).eps  # of the distance from the world's origin: round-off of places there
+CLOSED = 1e-12  # largest gap of a closed loop, by round-off: relative to the mechanism's size or speeds, or rad
+_AWAY = 8 * np.finfo(float).eps  # round-off of positions, relative to their distance from the world's origin
 _ROUNDS = 50  # Newton's steps; from a fair guess it needs five
-_STILL = 1e-12  # least eigenvalue of a mass matrix with ones on its diagonal: below it, round-off decides
-_PART = 1e-6  # of the largest velocity in a motion: less is round-off
-_LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation says nothing
+_STILL = 1e-12  # least eigenvalue of a mass matrix scaled to a diagonal of ones; below, it counts as singular
+_PART = 1e-6  # velocities below this, relative to the largest in a motion, are round-off
+_LARGEST = 0.5  # rad or m in one step: beyond it, the linearisation does not hold
 IMMOBILE = "it cannot move; free a joint or a loop"
 ADVICE = "correct q0, or give the joints that follow from the loops dependent = true and q0 as a guess"
 
 
 def assembled(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with q0 and v0 of the dependent joints found from its loops; their own q0 are guesses.
+    """Mechanism with q0 and v0 of the dependent joints found from its loops; their own q0 are guesses.
 
     Raises:
-        InputError: one of them has coordinates that cannot be found.
+        InputError: there is no loop or coupling to find them from, or a number overflows.
     """
     dependent = [joint.name for joint in mechanism.joints if joint.dependent]
     if not dependent:
@@ -55,14 +55,14 @@ def assembled(mechanism: Mechanism) -> Mechanism:
 
 
 def _finite(rows: Rows) -> Rows:
-    """The rows of loops; InputError if they are beyond all numbers."""
+    """Returns the rows unchanged; raises InputError if a number in them is not finite."""
     if not all(np.isfinite(part).all() for part in rows):
         raise InputError("loops", "infinite", "lengths, coordinates or velocities are too large to be computed with")
     return rows
 
 
 def _check_inertia(mechanism: Mechanism, M: Array) -> None:
-    """Raises InputError unless every velocity moves something that has inertia."""
+    """Raises InputError if some velocity moves nothing that has inertia."""
     if not np.isfinite(M).all():
         raise InputError("mass matrix", "infinite", "masses, moments or lengths are too large to be computed with")
     size = np.sqrt(np.where(np.diag(M) > 0, np.diag(M), 1.0))
@@ -76,10 +76,10 @@ def _check_inertia(mechanism: Mechanism, M: Array) -> None:
 
 
 def check_start(mechanism: Mechanism) -> None:
-    """The loops close at the start, the velocities keep them closed, springs have a direction, something can move.
+    """Checks that loops close, velocities keep them closed, springs have a direction, and something can move.
 
     Raises:
-        InputError: one of this is not so.
+        InputError: one of these checks fails.
     """
     if not mechanism.nv:
         raise InputError("mechanism", f"{len(mechanism.joints)} joints", IMMOBILE)
@@ -129,6 +129,6 @@ def check_start(mechanism: Mechanism) -> None:
 
 
 def _opening(C: Array, v: Array, away: float) -> tuple[float, float]:
-    """Rate at which rows open, and what round-off leaves of it in rows of places known to ``away`` [m/s, rad/s]."""
+    """Rate at which rows open, and the largest rate that round-off explains if positions are known to ``away`` [m]."""
     fastest = np.abs(v).max(initial=0.0)
     return float(np.abs(C @ v).max(initial=0.0)), float((CLOSED * np.abs(C).max(initial=0.0) + away) * fastest)

@@ -47,7 +47,7 @@ FORCES = frozenset({MechanismCapability.SPRINGS, MechanismCapability.JOINT_SPRIN
 
 
 def required(mechanism: Mechanism) -> frozenset[str]:
-    """Capabilities that a mechanism requires; redundancy of its rows, which is found by analysis, is not among them."""
+    """Capabilities that a mechanism requires, but for redundant constraints, which only an analysis finds."""
     capability = MechanismCapability
     needs: set[str] = {*mechanism.unmodelled}
     needs |= {capability[joint.kind.upper()] for joint in mechanism.joints}
@@ -68,15 +68,15 @@ def required(mechanism: Mechanism) -> frozenset[str]:
         capability.COUPLINGS: bool(mechanism.couplings),
         capability.SIGNALS: any(map(varies, mechanism.signals)),
     }
-    needs |= {need for need, here in asked.items() if here}
+    needs |= {need for need, applies in asked.items() if applies}
     return frozenset(needs)
 
 
 def require(mechanism: Mechanism, provided: Collection[str], reasons: Mapping[str, str]) -> None:
-    """Compares what a mechanism asks with what a formulation provides.
+    """Checks that a formulation provides all that a mechanism requires.
 
     Raises:
-        Refused: it lacks something; the text says what, and why where a reason is given.
+        Refused: capabilities are missing; the text names them, with a reason where ``reasons`` has one.
     """
     missing = sorted(required(mechanism) - set(provided))
     if missing:

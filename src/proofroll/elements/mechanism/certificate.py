@@ -21,23 +21,23 @@ from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSampl
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
 
-# Engines compose poses and inertias of chains of bodies by themselves; each product costs some machine epsilons.
+# Engines compose poses and inertias of chains of bodies by themselves; each product costs a few machine epsilons.
 COMPOSED = 1e-9
-# Least angular acceleration over the natural one, to which differences are relative: a pose may have none.
+# Least scale of differences of angular acceleration, relative to the natural one: a pose may have no acceleration.
 _LEAST = 1e-2
 _COMPOSED = "composed along the tree by the engine's own arithmetic"
-# Three evaluations show the noise, they do not bound it; each side has its own.
+# Three evaluations sample the noise without bounding it, and the engine's own is as large.
 _MARGIN = 10.0
 _NOISY = "round-off of the scene's own accelerations, which many bodies in a row magnify"
 _FORCES = ("forces", "torques", "couplings", "forces of contact")
 _FROM_ACCELERATIONS = ("acceleration", "angular acceleration", *_FORCES)
-# What a model may soften: quantity -> largest relative difference that any reason explains, and why.
+# Quantities that a model may soften -> largest relative difference that is accepted for any reason, and why.
 CAPS: Mapping[str, Regularised] = {
-    # with all of it allowed, a mechanism that does not set off at all would pass
+    # with a tolerance of 1, a mechanism that does not set off at all would pass
     name: Regularised(0.5, "a loop that is held by a stiff spring pulls by what it is open")
     for name in _FROM_ACCELERATIONS
 }
-# Of what an engine built, which may have lost bodies or joints; of one body the index may be left out.
+# Accepted shapes: -1 is any number, for bodies or joints may be missing; of one body the index may be left out.
 _SHAPES = {
     "mass": ((-1,), ()),
     **dict.fromkeys(("com", "acceleration", "angular_acceleration", "joint_position", "joint_axis"), ((-1, 3), (3,))),
@@ -53,12 +53,12 @@ _Compare = Callable[[str, str, Any, Any, float], None]
 
 
 def _require_readable(built: MechanismBuilt) -> None:
-    """Raises Diverged, with the name of the field, for what is of another shape or kind than the protocol says."""
+    """Raises Diverged, naming the field, if a field has another shape or type than the protocol requires."""
     require_shapes(built, _SHAPES)
 
 
 def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismSample) -> list[Line]:
-    """Compares what was built, and the sample at time 0, with the mechanism; silence has a line that says so."""
+    """Lines that compare what was built, and the sample at time 0, with the mechanism; a missing value has one too."""
     _require_readable(built)
     mechanism, start, found = element.mechanism, element.start, element.first_motion
     lines: list[Line] = []
@@ -66,7 +66,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
     def compare(quantity: str, unit: str, expected: Any, given: Any, scale: float) -> None:
         want = np.asarray(expected, dtype=np.float64)
         if want.size and np.all(np.isnan(want)):
-            return  # no law says: a line would hold with nothing compared
+            return  # nothing is known: a line would pass without any comparison
         if given is None or np.all(np.isnan(given)):
             lines.append(Line(quantity, unit, tuple(np.ravel(want).tolist()), (), None, COMPOSED))
             return
@@ -116,7 +116,7 @@ def certify(element: MechanismElement, built: MechanismBuilt, sample: MechanismS
 
 
 def _first(element: MechanismElement, built: MechanismBuilt, name: str) -> FloatArray | None:
-    """A first acceleration; None where bodies touch so softly that the first step of a hop shows nothing of a model."""
+    """First acceleration that the engine gives; None if contacts are too soft for a first step to show the model."""
     soft = built.regularised.get(name)
     hop = element.mechanism.contacts and soft is not None and soft.tolerance > CAPS["acceleration"].tolerance
     return None if hop else getattr(built, name)
@@ -139,11 +139,11 @@ def _compare_contacts(element: MechanismElement, built: MechanismBuilt, compare:
 
 
 def _compare_response(element: MechanismElement, built: MechanismBuilt, compare: _Compare) -> None:
-    """Compares the Delassus matrix of what touches, along the directions in which the pairs have forces."""
+    """Compares the Delassus matrix of closed contacts, along the directions in which the pairs have forces."""
     mechanism = element.mechanism
     try:
         dynamics = ContactDynamics(mechanism)
-    except Refused:  # ours, of a joint with stops and dry friction, which an engine may have
+    except Refused:  # our equations refuse a joint with stops and dry friction; an engine may have one
         return
     state = dynamics.at(*mechanism.start())
     shut = [k for k, _ in enumerate(mechanism.contacts) if state.touching[k].gap <= TOUCHING * element.length]
@@ -161,7 +161,7 @@ def _compare_response(element: MechanismElement, built: MechanismBuilt, compare:
 def _compare_press(
     element: MechanismElement, built: MechanismBuilt, sample: MechanismSample, compare: _Compare
 ) -> None:
-    """Compares the first forces of contacts, as far as they are determinate; a first step as soft as a hop has none."""
+    """Compares first contact forces where they are determinate; those of a very soft model count as not given."""
     if not element.mechanism.contacts:
         return
     wanted, given = element.first_press, sample.contact_force
@@ -175,7 +175,7 @@ def _compare_press(
 def _compare_reactions(
     element: MechanismElement, built: MechanismBuilt, sample: MechanismSample, compare: _Compare
 ) -> None:
-    """Named forces, and forces and moments as far as they are determinate; models without them are not asked."""
+    """Compares named forces, and determinate forces and moments of joints if the model gives them."""
     _compare_press(element, built, sample, compare)
     _compare_named(element, sample, compare)
     if sample.joint_force is None or sample.joint_torque is None:
@@ -190,7 +190,7 @@ def _compare_reactions(
 
 
 def _compare_named(element: MechanismElement, sample: MechanismSample, compare: _Compare) -> None:
-    """Efforts and forces of couplings."""
+    """Compares efforts of actuators and forces of couplings."""
     names, natural = named_forces(element.mechanism), element.first_motion.scale * element.length
     natural *= sum(body.mass for body in element.mechanism.bodies)
     for key, quantity in (("effort", "efforts"), ("coupling", "couplings")):
@@ -202,14 +202,14 @@ def _compare_named(element: MechanismElement, sample: MechanismSample, compare: 
 
 
 def _turning(element: MechanismElement, soft: bool) -> float:
-    """Scale of angular accelerations [rad/s²]; of a soft model the natural one, as for accelerations."""
+    """Scale of angular accelerations [rad/s²]: the largest, at least a part of the natural one (all, if soft)."""
     found = element.first_motion
     least = (1.0 if soft else _LEAST) * found.scale / element.length
     return max(float(np.nanmax(np.abs(found.angular_acceleration), initial=0.0)), least)
 
 
 def _axis(element: MechanismElement, joint: Joint) -> FloatArray:
-    """The axis of a joint in the world at the start; NaN where it has none."""
+    """Axis of a joint in the world at the start; NaN where the joint has none."""
     if joint.kind not in WITH_AXIS:
         return np.full(3, np.nan)
     parent = element.mechanism.body_index[joint.parent]

@@ -1,4 +1,4 @@
-"""Checks of what a user gives: numbers, vectors, axes, inertias; each failure is one clear line."""
+"""Checks of user input: numbers, vectors, axes, inertias; each failure is one clear line."""
 
 from typing import Annotated, Any
 
@@ -9,7 +9,7 @@ from proofroll.core.errors import InputError
 
 
 def _diagonal(value: Any) -> Any:
-    """Rows of a diagonal matrix for a list of three numbers, anything else as it is."""
+    """Diagonal matrix for a list of three numbers; any other value unchanged."""
     if (
         isinstance(value, list | tuple)
         and len(value) == 3
@@ -34,20 +34,20 @@ Z: Vector = (0.0, 0.0, 1.0)
 
 
 def assign(item: object, **values: Any) -> None:
-    """Set fields of a frozen dataclass while it is made."""
+    """Sets fields of a frozen dataclass during its construction."""
     for key, value in values.items():
         object.__setattr__(item, key, value)
 
 
 def name(value: Any, kind: str) -> str:
-    """The value as a name. Raises InputError if it is empty or cannot be printed."""
+    """The value as a name. Raises InputError if it is empty or not printable."""
     if not isinstance(value, str) or not value.isprintable() or not value.strip():
         raise InputError(f"{kind}.name", value, "give a name")
     return value
 
 
 def number(field: str, value: Any, *, at_least: float | None = None) -> float:
-    """The value as a finite float. Raises InputError if it is none, or lies below ``at_least``."""
+    """The value as a finite float. Raises InputError if it is not one, or lies below ``at_least``."""
     try:
         return numbers(field, [value], 1, at_least=at_least)[0]
     except InputError as error:
@@ -58,7 +58,7 @@ def numbers(field: str, value: Any, count: int, *, at_least: float | None = None
     """The value as ``count`` finite floats; a single number stands for a list of one.
 
     Raises:
-        InputError: it is not that, or a number lies below ``at_least``.
+        InputError: it is not ``count`` finite numbers, or one lies below ``at_least``.
     """
     try:
         found = np.atleast_1d(np.asarray(value))
@@ -76,13 +76,13 @@ def numbers(field: str, value: Any, count: int, *, at_least: float | None = None
 
 
 def vector(field: str, value: Any) -> Vector:
-    """The value as three finite floats. Raises InputError if it is not that."""
+    """The value as three finite floats. Raises InputError if it is not."""
     x, y, z = numbers(field, value, 3)
     return x, y, z
 
 
 def axis(field: str, value: Any) -> Vector:
-    """The value as a unit vector. Raises InputError if it is no vector, or zero."""
+    """The value as a unit vector. Raises InputError if it is not three finite numbers, or zero."""
     found = np.array(vector(field, value))
     length = float(np.linalg.norm(found))
     if length == 0.0:
@@ -92,7 +92,7 @@ def axis(field: str, value: Any) -> Vector:
 
 
 def inertia(field: str, value: Any) -> Matrix:
-    """The value, three principal moments or a symmetric 3×3 matrix, as a matrix that a rigid body can have.
+    """Inertia matrix of a rigid body, from three principal moments or a symmetric 3×3 matrix [kg m²].
 
     Raises:
         InputError: it is not symmetric, has a negative principal moment, or breaks the triangle inequality.

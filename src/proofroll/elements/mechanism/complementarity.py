@@ -1,6 +1,6 @@
-"""Modes of joints by complementarity, and the smooth integration that refuses them: route 1 of the truth.
+"""Modes of joints by complementarity, for route 1 of the truth; refusal of laws that switch.
 
-Engines decide modes in their own way: agreement with code that they share would be no evidence.
+Engines decide modes with code of their own: sharing this code would make their agreement worthless as evidence.
 """
 
 import math
@@ -16,19 +16,19 @@ from proofroll.elements.mechanism.rotations import Array
 from proofroll.elements.mechanism.signal import breaks
 from proofroll.elements.mechanism.switches import REDUNDANT, Mode, SwitchedJoint, held_by
 
-_MOST_PIVOTS = 1000  # of the complementarity problem; a few joints take as many as they are
+_MOST_PIVOTS = 1000  # of the complementarity problem; usually about one for each joint
 
 
 def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArray[np.int_], Array, Array]:
-    """Forces that hold where they can: a = free + G f is zero where f lies between its bounds.
+    """Solves a = free + G f, with a = 0 where f is between its bounds.
 
     At the lower bound a ≥ 0, at the upper one a ≤ 0. G is positive definite; pivots by least index (Murty, 1974).
 
     Returns:
-        Of each force -1, 0, 1: at its lower bound, between, at its upper bound; the forces; the accelerations.
+        Side of each force (-1 at its lower bound, 0 between, 1 at its upper bound), the forces f, the accelerations a.
 
     Raises:
-        Refused: G is singular but for round-off, so that forces which hold are not determinate.
+        Refused: G is singular but for round-off, so that the forces are not determinate, or the pivots do not end.
     """
     scale = np.sqrt(np.maximum(np.diag(G), 0.0))
     if np.any(scale <= RANK * scale.max()) or np.linalg.matrix_rank(G / np.outer(scale, scale), tol=RANK) < len(G):
@@ -48,10 +48,10 @@ def complementary(free: Array, G: Array, low: Array, high: Array) -> tuple[NDArr
 
 
 def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -> float:
-    """Least distance of a solution of :func:`complementary` from a change of mode, relative to the forces in play.
+    """Margin of a solution of :func:`complementary` to the nearest change of mode, relative to the forces in play.
 
-    A force between its bounds is as far from a change as from the nearer bound. A force at a bound is as far from it as
-    the further force that would stop the motion.
+    For a force between its bounds it is the distance to the nearer bound; for a force at a bound, the additional force
+    that would stop the motion.
     """
     least = math.inf
     for k in range(len(free)):
@@ -64,22 +64,23 @@ def margin(free: Array, G: Array, low: Array, high: Array, f: Array, a: Array) -
 
 
 def load_of(joints: Sequence[SwitchedJoint], mode: Mode, nv: int) -> Array:
-    """Kinetic friction along the velocities of the tree, (nv); further modes are those of efforts."""
+    """Kinetic friction along the velocities of the tree [N, N m], (nv); modes of efforts come last and are ignored."""
     load = np.zeros(nv)
     for joint, own in zip(joints, mode, strict=False):
         load[joint.velocity] += joint.push(own)
     return load
 
 
-# Accelerations (nv) of the velocities in a mode, and what unit forces along some of them add, (nv, forces).
+# Function of a mode and some velocities: accelerations in this mode, (nv), and how much a unit force along each of
+# these velocities adds, (nv, forces).
 Responses = Callable[[Mode, Sequence[int]], tuple[Array, Array]]
 
 
 def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Responses) -> tuple[Mode, float]:
-    """Mode of the switched joints that follows from the forces, and how far from another one it is, relative.
+    """Mode of the switched joints that follows from the forces, and its relative margin to another mode.
 
-    A joint at rest is held where the force that this needs lies between its bounds; all at once, for they feel each
-    other.
+    A joint at rest stays at rest if the force that this needs lies between its bounds. All joints at rest are solved
+    together, for they affect each other.
     """
     mode = [
         joint.resting(q[joint.coordinate]) if v[joint.velocity] == 0 else joint.moving(v[joint.velocity])
@@ -99,15 +100,15 @@ def decided(joints: Sequence[SwitchedJoint], q: Array, v: Array, responses: Resp
 
 
 def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, responses: Responses) -> tuple[Array, float]:
-    """Velocities after an impact of one switched joint on its stop, by Newton's law of impact.
+    """Velocities after switched joint number ``hit`` strikes its stop, by Newton's law of impact.
 
-    Other joints that rest at a stop are pressed or set free by it; friction is no impulse.
+    Other joints that rest at a stop take part; friction has no impulse.
 
     Returns:
-        The velocities, and how far from another outcome it is, relative.
+        The velocities, (nv), and the relative margin to another outcome.
 
     Raises:
-        NotUnique: several stops share the impact and one of them returns speed, so that its order decides.
+        NotUnique: several stops share the impact and one of them has restitution, so that their order decides.
     """
     resting = [k for k, j in enumerate(joints) if v[j.velocity] == 0 and j.resting(q[j.coordinate]) in {"low", "high"}]
     at_stop = sorted({hit, *resting})
@@ -128,7 +129,7 @@ def struck(joints: Sequence[SwitchedJoint], q: Array, v: Array, hit: int, respon
 
 
 def refuse_switching(mechanism: Mechanism) -> None:
-    """Refuses laws that switch where nothing follows it.
+    """Refuses laws that switch, for an integration that cannot follow them.
 
     Raises:
         Refused: a joint has dry friction, an effort a limit, or a drive or a target is a table.

@@ -29,15 +29,15 @@ from proofroll.elements.mechanism.sampling import MechanismSample
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
 
-# Why a variable has no value.
+# Reasons why a variable has no value.
 UNDETERMINED, UNSAID = "not determined by the equations", "not given by the engine"
 
 
 def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Columns:
-    """The variables of a run, from one sample per time [s].
+    """Variables of a run, from one sample per time [s].
 
     Raises:
-        Diverged: the engine does not give what all variables follow from.
+        Diverged: the orientation of bodies is missing, or a field has a wrong shape or type.
     """
     if lacking := element.lacks(samples, ()):
         raise Diverged(lacking)
@@ -48,7 +48,7 @@ def from_samples(element: MechanismElement, times: FloatArray, samples: Sequence
 
 
 def placed_from(element: MechanismElement, times: FloatArray, samples: Sequence[MechanismSample]) -> Placed:
-    """The motion that samples at these times [s] tell."""
+    """Motion of the bodies in samples at these times [s]."""
 
     def stacked(name: str, width: int) -> FloatArray:
         return np.array([np.reshape(getattr(sample, name), (len(element.bodies), width)) for sample in samples])
@@ -64,7 +64,7 @@ def _named(element: MechanismElement, sample: MechanismSample) -> FloatArray:
 
 
 def along(sample: MechanismSample, name: str, count: int) -> FloatArray:
-    """A field of a sample with a force for each actuator, coupling or joint [N, N m]; NaN where it is None.
+    """Array of a sample's field with a force for each actuator, coupling or joint [N, N m]; NaN where it is None.
 
     Raises:
         Diverged: it has another shape, or is not of numbers.
@@ -82,7 +82,7 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
     """``joint_force`` [N] or ``joint_torque`` [N m] of a sample, shape (joints + loops, 3); NaN where it is None.
 
     Raises:
-        Diverged: it is not of numbers, or has another shape; one after the other in a row they may be.
+        Diverged: it is not of numbers, or has neither this shape nor its flat form, (3 (joints + loops),).
     """
     shape, given = (len(element.mechanism.connections), 3), getattr(sample, name)
     if given is None:
@@ -99,7 +99,7 @@ def reactions(element: MechanismElement, sample: MechanismSample, name: str) -> 
 def columns(
     element: MechanismElement, placed: Placed, wrench: FloatArray, pressed: FloatArray, named: FloatArray
 ) -> Columns:
-    """All variables of a run, from where the bodies are and the forces and moments on them.
+    """Variables of a run, from the motion of the bodies and the forces and moments on them.
 
     ``wrench``: of joints and loops, shape (time, 2, joints + loops, 3); ``pressed``: of contacts, (time, contacts, 3);
     ``named``: see :func:`~proofroll.elements.mechanism.named_forces.named_forces`, (time, forces).
@@ -109,7 +109,7 @@ def columns(
     world axes, NaN with a reason in the attribute ``absent``; ``forces``, ``torques``: the
     determinate components of all; ``effort.<actuator>``, ``coupling.<name>``, ``friction.<joint>``, ``stop.<joint>``
     [N, N m] along coordinates; ``force.<pair>.x|y|z`` [N] on the body of its first geometry, ``gap.<pair>`` [m],
-    ``slip.<pair>`` [m/s], and what the forces leave of Coulomb's law, see
+    ``slip.<pair>`` [m/s], and residuals of Coulomb's law, see
     :data:`~proofroll.elements.mechanism.contacts.observables.RESIDUALS`; ``energy`` [J], ``drift`` [m], and
     ``energy_error`` [J], or ``energy_change`` [J] of what is driven or damped.
     """
@@ -118,7 +118,7 @@ def columns(
     found: dict[str, Variable] = {}
 
     def put(name: str, values: FloatArray, unit: str, meaning: str, *dims: str, **more: Any) -> None:
-        attributes = {"units": unit, "long_name": meaning} | {key: said for key, said in more.items() if said}
+        attributes = {"units": unit, "long_name": meaning} | {key: value for key, value in more.items() if value}
         found[name] = Variable(("time", *dims), values, attributes)
 
     put("p_WB", placed.p_WB, "m", "origin of each body's frame in the world", "body", "xyz")
@@ -170,7 +170,7 @@ def columns(
 
 
 def _put_contacts(element: MechanismElement, placed: Placed, pressed: FloatArray, put: Callable[..., None]) -> None:
-    """Gaps, slip and forces of contacts, each by its name and all together, and what forces leave of Coulomb's law."""
+    """Puts gaps, slips, forces and residuals of Coulomb's law, of each contact and of all together."""
     found = followed(placed)
     for index, contact in enumerate(placed.mechanism.contacts):
         for axis, letter in enumerate("xyz"):
@@ -192,20 +192,20 @@ def _put_contacts(element: MechanismElement, placed: Placed, pressed: FloatArray
 
 
 def _doubts(placed: Placed, interval: float | None) -> dict[str, dict[str, Any]]:
-    """Joint whose angles may be off by whole turns -> what is to be said, see :func:`proofroll.core.turns.doubt`."""
+    """Warnings of joints whose angles may be off by whole turns, by joint; see :func:`proofroll.core.turns.doubt`."""
     found: dict[str, dict[str, Any]] = {}
     if placed.known_q is not None:
         return found
     for joint in placed.mechanism.joints:
         if joint.kind in TURNING:
             for angle, rate in zip(*(values.T for values in placed.along(joint)), strict=True):
-                if said := doubt(placed.time, angle, rate, TURN, interval):
-                    found[joint.name] = said
+                if warning := doubt(placed.time, angle, rate, TURN, interval):
+                    found[joint.name] = warning
     return found
 
 
 def _continuous(q_WB: FloatArray, start: FloatArray) -> FloatArray:
-    """Quaternions of the sign that is nearest to the one before, from the scene's own start on."""
+    """Quaternions with signs chosen for continuity, the first nearest to the scene's start."""
     before = np.concatenate([start[None], q_WB[:-1]])
     signs = np.where(np.sum(before * q_WB, axis=-1, keepdims=True) < 0, -1.0, 1.0)
     return np.asarray(q_WB * np.cumprod(signs, axis=0))

@@ -13,15 +13,15 @@ from proofroll.elements.mechanism.joint import LAWS, Joint
 from proofroll.elements.mechanism.signal import Formula, Table, checked, value_at
 
 ActuatorKind = Literal["torque", "velocity", "position"]
-# Which gains a kind has.
+# Gains of each kind.
 _GAINS: Mapping[str, tuple[str, ...]] = {"torque": (), "velocity": ("kd",), "position": ("kp", "kd")}
-# Units that a target can have, about an axis or along one; a gear may turn one into the other.
+# Units of a target of a turning and of a sliding motor; a gear may turn one motion into the other.
 TARGET_UNITS: Mapping[str, tuple[str, ...]] = {
     "torque": ("N m", "N"),
     "velocity": ("rad/s", "m/s"),
     "position": ("rad", "m"),
 }
-MODES = ("least", "linear", "greatest")  # of an effort with a limit
+MODES = ("least", "linear", "greatest")  # of an effort with a limit: at its lower limit, between, at its upper limit
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,10 @@ class Actuator:
         return math.inf if self.limit is None else self.limit
 
     def wanted(self, time: Any, q: Any, v: Any, functions: Mapping[str, Any] | None = None) -> Any:
-        """Effort at the joint before it is clamped, for numbers, arrays or symbols [N m, N]."""
+        """Effort at the joint before it is clamped [N m, N]; time, q and v are numbers, arrays or symbols.
+
+        ``functions``: those that a formula of t may call, for symbols.
+        """
         n, given = self.gear, () if functions is None else (functions,)
         target = value_at(self.target, time, *given)
         if self.kind == "torque":
@@ -92,18 +95,18 @@ class Actuator:
         return effort - (n * n * self.kd) * v if self.kind == "position" and self.kd else effort
 
     def effort(self, time: float, q: float, v: float, mode: str | None = None) -> float:
-        """Effort at the joint [N m, N]; clamped by its own size where no mode is given."""
+        """Effort at the joint in a mode of :data:`MODES`, or without one clamped to its limit [N m, N]."""
         if mode in {"least", "greatest"}:
             return -self.bound if mode == "least" else self.bound
         wanted = float(self.wanted(time, q, v))
         return wanted if mode == "linear" else min(max(wanted, -self.bound), self.bound)
 
     def mode(self, time: float, q: float, v: float) -> str:
-        """Mode, of :data:`MODES`, by the size of what is wanted."""
+        """Mode, of :data:`MODES`, at a time [s], for coordinate and rate of the joint."""
         return self.mode_of(float(self.wanted(time, q, v)))
 
     def mode_of(self, wanted: float) -> str:
-        """Mode, of :data:`MODES`, of an effort that is wanted [N m, N]."""
+        """Mode, of :data:`MODES`, for an effort before it is clamped [N m, N]."""
         return "least" if wanted < -self.bound else "greatest" if wanted > self.bound else "linear"
 
 
@@ -137,10 +140,10 @@ class Coupling:
 
 
 def check_drives(joints: Sequence[Joint], actuators: Sequence[Actuator], couplings: Sequence[Coupling]) -> None:
-    """Check of all actuators and couplings: at joints with one coordinate, and none against another.
+    """Checks that actuators and couplings act on joints with one coordinate and do not contradict each other.
 
     Raises:
-        InputError: one is not.
+        InputError: a joint is unknown or has several coordinates, has two servos, or couplings form a ring.
     """
     kinds = {joint.name: joint.kind for joint in joints}
     named = [(f"actuators.{item.name}.joint", item.joint) for item in actuators]

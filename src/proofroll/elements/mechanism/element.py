@@ -1,4 +1,4 @@
-"""A mechanism as an element of a scene: what the harness asks of it."""
+"""A mechanism as an element of a scene: what the harness calls."""
 
 from __future__ import annotations
 
@@ -44,17 +44,17 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism.contacts.acting import ContactMode
     from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics, ContactSolution
 
-# Least size of an observable over its natural one, as for balls: less is stillness to the eye.
+# Least scale of an observable, relative to its natural size, as for balls: smaller changes count as stillness.
 _LEAST = 1e-2
-# Part of the largest kinetic energy by which the energy of a mechanism that nothing drives may grow; all of it is the
-# engine's, and runs that hold 1 % of the path stay far below.
+# Growth of energy that is a failure, relative to the largest kinetic energy, where nothing drives the mechanism: all
+# growth is then the engine's error, and runs within 1 % of the path stay far below.
 GAIN = 0.1
-# Part of the mechanism's size by which joints and loops may open: beyond, it is another mechanism.
+# Opening of joints and loops that is a failure, relative to the mechanism's size: beyond, it is another mechanism.
 OPEN = 0.1
 ENERGY_GAIN, OPENED = "energy gain", "joints opened"
-# An engine without a step is looked at first after this part of the natural time.
+# Time of the first look at an engine without a step, relative to the natural time.
 _PART = 1e-4
-# Part of the fastest rate on springs and servos of joints below which a freedom is none that they hold.
+# Rate of a freedom on springs and servos of joints, relative to the fastest, below which they do not hold it.
 _HELD = 1e-7
 _AXES = "xyz"
 
@@ -69,9 +69,9 @@ class MechanismElement:
 
     mechanism: Mechanism
 
-    name: ClassVar[str] = "mechanism"  # there is one in a scene
+    name: ClassVar[str] = "mechanism"  # a scene has at most one
     sample_type: ClassVar[type[MechanismSample]] = MechanismSample
-    askable: ClassVar[Mapping[str, str]] = {}  # all is given
+    askable: ClassVar[Mapping[str, str]] = {}  # every sample has all fields
     softened: ClassVar[frozenset[str]] = frozenset(CAPS)
     failures: ClassVar[Mapping[str, str]] = {
         OPENED: f"joints or loops opened by more than {OPEN:.0%} of the mechanism's size",
@@ -97,7 +97,7 @@ class MechanismElement:
 
     @cached_property
     def start(self) -> Placed:
-        """The mechanism at time 0."""
+        """Motion of the mechanism at time 0."""
         motion = self._solution.motion
         from scipy.spatial.transform import Rotation
 
@@ -129,9 +129,9 @@ class MechanismElement:
 
     @cached_property
     def _touching(self) -> tuple[ContactDynamics, ContactMode] | None:
-        """Equations of contacts with laws of joints, and what these do at the start.
+        """Equations of contacts with laws of joints, and the mode of all of them at the start.
 
-        None: no contacts, or their laws leave it open.
+        None: there are no contacts, or the mode is not unique.
         """
         from proofroll.elements.mechanism.contacts.dynamics import ContactDynamics
 
@@ -149,7 +149,7 @@ class MechanismElement:
 
     @property
     def length(self) -> float:
-        """Its :attr:`extent`, or where that is zero 1 m."""
+        """The :attr:`extent`, or 1 m if that is zero."""
         return self.extent or 1.0
 
     @cached_property
@@ -159,9 +159,9 @@ class MechanismElement:
 
     @cached_property
     def natural_time(self) -> float:
-        """Period of a pendulum of its size, or, if shorter, of its slowest motion on springs and servos of joints.
+        """Period [s] of a pendulum of its size, or if shorter of its slowest motion on springs and servos of joints.
 
-        Without gravity and these it is that of its mass on its stiffest spring between points, else of a turn [s].
+        Without gravity and these, of its mass on its stiffest spring between points, or else of a turn; at rest 1 s.
         """
         gravity, held = float(np.linalg.norm(self.mechanism.gravity)), self._law_rates[1]
         slowest = float(held.min(initial=np.inf))
@@ -179,27 +179,27 @@ class MechanismElement:
         if not any(joint.kind in TURNING for joint in self.mechanism.joints):
             return None
         spin = float(np.max(np.linalg.norm(self.start.w_WB, axis=-1)))
-        # What turns alone does so evenly, however fast; samples no rarer than usual then tell its turns.
+        # A body that turns freely does so evenly, however fast; samples at the usual rate then show its turns.
         fast = max(EVERY, PART * 2 * np.pi / spin) if spin else np.inf
         loaded = np.any(self.mechanism.gravity) or self.mechanism.springs
         return float(min(fast, PART * self.natural_time if loaded or not spin else np.inf))
 
     @cached_property
     def speed(self) -> float:
-        """Largest speed at the start or after a fall by its length; without both its length over natural time [m/s]."""
+        """Largest speed at the start or after a fall by its length; if none, length over natural time [m/s]."""
         moving = max(float(np.max(np.abs(self.start.v_WB))), float(np.max(np.abs(self.start.w_WB))) * self.length)
         fall = float(np.sqrt(self.length * np.linalg.norm(self.mechanism.gravity)))
         return max(moving, fall) or self.length / self.natural_time
 
     @property
     def force(self) -> float:
-        """Weight, or what turns its mass at its speed [N]."""
+        """Weight, or if larger the centripetal force of its mass at its speed and length [N]."""
         mass = sum(body.mass for body in self.mechanism.bodies)
         return mass * max(float(np.linalg.norm(self.mechanism.gravity)), self.speed**2 / self.length)
 
     @cached_property
     def _sizes(self) -> dict[str, float]:
-        """Natural size of what has one of these units."""
+        """Natural size of a quantity, by its unit."""
         length, speed, force = self.length, self.speed, self.force
         momentum = sum(body.mass for body in self.mechanism.bodies) * speed
         sizes = {"m": length, "m/s": speed, "N": force, "J": force * length}
@@ -207,7 +207,7 @@ class MechanismElement:
 
     @cached_property
     def conservative(self) -> bool:
-        """True if nothing in it drives or damps."""
+        """True if nothing in it drives or dissipates."""
         if self.mechanism.actuators:
             return False
         laws = [(j.damping, j.friction, j.torque, j.limits and j.restitution < 1) for j in self.mechanism.joints]
@@ -311,7 +311,7 @@ class MechanismElement:
 
     @cached_property
     def first_named(self) -> FloatArray:
-        """The named forces at the start, see :mod:`proofroll.elements.mechanism.named_forces`."""
+        """The named forces at the start [N, N m], see :mod:`proofroll.elements.mechanism.named_forces`."""
         named: FloatArray = self._first["named"]
         return read_only(named)
 
@@ -370,7 +370,7 @@ class MechanismElement:
     def common_span(
         self, truth: xr.Dataset, runs: Mapping[Any, xr.Dataset]
     ) -> tuple[xr.Dataset, dict[Any, xr.Dataset]]:
-        """All of each: no event of a mechanism ends a run."""
+        """Truth and runs unchanged: no event of a mechanism ends a run."""
         return truth, dict(runs)
 
     def certify(self, built: Any, sample: MechanismSample) -> list[Line]:
@@ -396,7 +396,7 @@ class MechanismElement:
 
 
 def the_mechanism(scene: Scene) -> MechanismElement:
-    """The mechanism of a scene that holds nothing else."""
+    """The mechanism of a scene that has no other element."""
     (element,) = scene.elements
     assert isinstance(element, MechanismElement)
     return element

@@ -1,4 +1,4 @@
-"""The text of programs that show a failure of a mechanism: an engine's part, what it is held against, the check."""
+"""Text of programs that show a failure of a mechanism: the engine's part, the reference values, the check."""
 
 from __future__ import annotations
 
@@ -31,9 +31,10 @@ def signs(stopped, points, energy, drift):
 
 
 def program(element: MechanismElement, failed: FailedRun, engine: str | None, gain: float, opened: float) -> str:
-    """The whole file; see :class:`proofroll.core.element_abilities.WritesPrograms`.
+    """Text of the program; see :class:`proofroll.core.element_abilities.WritesPrograms`.
 
-    The element may gain energy [J], 0 where it is driven or damped, and its joints and loops may be open so far [m].
+    ``gain``: energy that the element may gain [J], 0 where it is driven or damped; ``opened``: distance by which its
+    joints and loops may be open [m].
     """
     if engine is None:
         engine = "import numpy as np\nfrom proofroll import load_scene, simulate\n\n"

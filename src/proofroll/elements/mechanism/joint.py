@@ -49,18 +49,21 @@ FACTS: dict[str, Facts] = {
 
 
 def rows_of(kinds: Sequence[str]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of connections of some kinds, (2, points) and (3, angles): each with its connection, then its axes."""
+    """Indices of the constraint rows of connections: points, (2, points), and angles, (3, angles).
+
+    Each column is the number of a connection, then its axis of A (points), or its axes of A and of B (angles).
+    """
     points = [(number, k) for number, kind in enumerate(kinds) for k in FACTS[kind].translations]
     angles = [(number, *pair) for number, kind in enumerate(kinds) for pair in FACTS[kind].rotations]
     return np.array(points, dtype=np.intp).reshape(-1, 2).T, np.array(angles, dtype=np.intp).reshape(-1, 3).T
 
 
-TURNING = ("revolute", "universal")  # whose coordinates are angles that go on beyond a turn
+TURNING = ("revolute", "universal")  # coordinates are angles that may exceed a turn
 WITH_AXIS = ("revolute", "prismatic", "universal", "planar")
 WITH_QUATERNION = ("spherical", "free")
 _O, _UNIT = np.zeros(3), np.eye(3)
-# Of each velocity: whether its axis is one of B, not of A; which; whether it turns about it; whether the child carries
-# the axis round, not the parent. Of three turns about axes of the child the sum does not turn itself: ω × ω = 0.
+# For each velocity: (its axis belongs to B, not to A; number of the axis; it is a rotation; the child carries the axis,
+# not the parent). The sum of three rotations about axes of the child does not turn with it, for ω × ω = 0.
 AXES: dict[str, tuple[tuple[bool, int, bool, bool], ...]] = {
     "fixed": (),
     "revolute": ((False, 2, True, False),),
@@ -70,7 +73,7 @@ AXES: dict[str, tuple[tuple[bool, int, bool, bool], ...]] = {
     "planar": ((False, 0, False, False), (False, 1, False, False), (False, 2, True, False)),
     "free": tuple((True, axis, turns, not turns) for turns in (False, True) for axis in range(3)),
 }
-# which kinds may have a law along their coordinates: there a coordinate, a rate or a unit is missing elsewhere
+# Kinds that may have a law along their coordinates; other kinds lack the coordinate, the rate or a unit for it.
 LAWS: dict[str, tuple[str, ...]] = {
     "stiffness": ("revolute", "prismatic", "universal"),
     "rest": ("revolute", "prismatic", "universal"),
@@ -79,7 +82,7 @@ LAWS: dict[str, tuple[str, ...]] = {
     "torque": ("revolute", "prismatic"),
     "armature": ("revolute", "prismatic"),
 }
-AT_STOP = 1e-9  # of the way between stops: digits of a file, by which a joint may start beyond one
+AT_STOP = 1e-9  # relative to the range between stops: a joint may start so far beyond a stop, by rounding in a file
 _LENGTHS, _SPEEDS = ("m", "m", "m"), ("m/s", "m/s", "m/s")
 _ABOUT: dict[str, dict[str, Unit]] = {
     "q": {"spherical": "1", "planar": ("m", "m", "rad"), "free": (*_LENGTHS, "1", "1", "1", "1")},
@@ -90,7 +93,7 @@ _ABOUT: dict[str, dict[str, Unit]] = {
     },
     "damping": {"spherical": "N m s/rad"},
 }
-# Of what lies along a coordinate, by the kind of joint: about an axis, along one, otherwise.
+# Units along a coordinate, by kind of joint: turning, sliding, other.
 _UNITS: dict[str, dict[str, dict[str, Unit]]] = {
     name: {"unit": {"revolute": turning, "universal": turning, "prismatic": sliding, **_ABOUT.get(name, {})}}
     for name, turning, sliding in (
@@ -111,7 +114,7 @@ class Joint:
 
     At q = 0 the child's axes are the parent's turned by ``orientation``. Two frames meet in the joint: A on the parent
     and B on the child, both with z along the axis (:attr:`parent_frame`, :attr:`child_frame`). Coordinates, and
-    velocities as their rates where nothing else is said:
+    velocities, which are their rates unless noted:
 
     * revolute: angle about z; prismatic: B's origin along z of A;
     * universal: angle about z of A (``axis``, fixed in the parent), then angle about x of B (``second_axis``, fixed in
@@ -123,7 +126,7 @@ class Joint:
 
     Attributes:
         name: unique among joints and loops.
-        kind: what its two bodies can do against each other.
+        kind: relative motion of its two bodies that it allows.
         parent, child: names of bodies; the parent may be ``world``.
         position: of the joint in the parent's frame [m].
         orientation: roll, pitch, yaw (fixed axes x, y, z) of the child's frame against the parent's at q = 0 [rad].
@@ -131,16 +134,16 @@ class Joint:
         second_axis: in the child's frame, perpendicular to ``axis``: second axis of a universal joint, x of a planar
             one; None: any perpendicular (x of the child, where it can be).
         child_position: of the joint in the child's frame [m].
-        q0, v0: start; none given: zero.
+        q0, v0: coordinates and velocities at the start; default: zero.
         stiffness, damping: of a spring and damper along each coordinate.
-        rest: coordinate at which the spring is at rest.
-        friction: dry friction.
+        rest: coordinate at which the spring has no force.
+        friction: largest dry friction.
         torque: drive; a number, a formula ``"= 0.3*sin(2*pi*t)"``, or a table ``{times = [..], values = [..]}``.
-        armature: inertia of the drive, added to the coordinate's own.
-        limits: least and greatest coordinate of a revolute or prismatic joint, where stops hold it, or None.
+        armature: inertia of the drive along the coordinate, added to that of the bodies.
+        limits: least and greatest coordinate of a revolute or prismatic joint, where stops are; None: no stops.
         restitution: speed after an impact on a stop over the speed before it, from 0 to 1.
-        dependent: q0 and v0 are to be found from the loops, with q0 as a guess; no joint of a mechanism that has
-            started is.
+        dependent: q0 and v0 are to be found from the loops, with q0 as a guess; False for all joints of a mechanism
+            that is assembled.
     """
 
     name: str
@@ -256,7 +259,7 @@ def _none(values: object) -> bool:
 
 
 def child_in_parent(kind: str, q: Array) -> tuple[Array, Array]:
-    """Pose of the frame B of a joint of this kind in A: its origin, m, and its rotation."""
+    """Pose of frame B in frame A for a joint of this kind at q, (nq): origin [m] and rotation matrix."""
     origin, rotation = _O, _UNIT
     if kind == "revolute":
         rotation = rotations.about(2, q[0])
@@ -274,7 +277,7 @@ def child_in_parent(kind: str, q: Array) -> tuple[Array, Array]:
 
 
 def coordinate_rate(kind: str, q: Array, v: Array) -> Array:
-    """Rate of a joint's coordinates."""
+    """Rate of a joint's coordinates, (nq), for coordinates q and velocities v, (nv)."""
     if kind == "spherical":
         return rotations.quaternion_rate(q, v)
     if kind == "free":

@@ -25,22 +25,23 @@ from proofroll.elements.mechanism.rotations import Array, skews, to_quaternion
 from proofroll.elements.mechanism.signal import value_at, varies
 from proofroll.elements.mechanism.switches import REDUNDANT, STOPPED, Mode, held_by, switched_joints
 
-_NEAR = 1e-7  # m, 1: how far coordinates are moved to see how accelerations hang on them
+_NEAR = 1e-7  # displacement of coordinates for finite differences of accelerations [m, 1]
 _EQUAL_STEP = 2e-3  # s
-_STEP = 0.05  # of DOP853, over the time in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
+_STEP = 0.05  # of DOP853, in times in which the fastest mode turns by 1 rad; chains of 5 to 80 links need no less
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Accelerations at one instant, with what they were found from.
+    """Accelerations at one instant, with intermediate results.
 
     Attributes:
         acceleration: v̇, (nv).
         multipliers: of the rows of loops and couplings, the smallest in norm where they are redundant.
-        motion, rows: kinematics.
-        split: (L⁻ᵀV, Uᵀ/S) of the locked directions: −product with a residual is the correction that removes it.
-        C: rows of the loops, then of what holds, (rows, nv).
-        holding: forces of what holds switched joints along their coordinates, in the order of these.
+        motion: of the bodies.
+        rows: constraints of loops and couplings.
+        split: (A, B) = (L⁻ᵀV, Uᵀ/S) of the locked directions: −A B r is the correction that removes a residual r.
+        C: rows of the loops, then of switched joints that are held, (rows, nv).
+        holding: forces that hold switched joints, along their coordinates, in the order of ``held_by``.
     """
 
     acceleration: Array
@@ -53,9 +54,9 @@ class Solution:
 
 
 class JointCoordinates:
-    """Equations of motion of a mechanism in the coordinates of its tree; ``rank`` is that of the loops' rows.
+    """Equations of motion of a mechanism in the coordinates of its tree.
 
-    Without it the rank is that of a general pose.
+    ``rank`` is that of the loops' rows; None: their rank at a general pose.
     """
 
     def __init__(self, mechanism: Mechanism, rank: int | None = None) -> None:
@@ -83,11 +84,12 @@ class JointCoordinates:
     ) -> Solution:
         """Accelerations and multipliers for coordinates (nq) and velocities (nv), with drives at ``time`` [s].
 
-        Without a ``mode`` of the switched joints it follows from the forces, see :meth:`decided`; a ``load`` (nv) acts
-        along the velocities.
+        ``mode``: of switched joints and limited efforts; None: it follows from the forces, see :meth:`decided`.
+        ``load``: additional force along the velocities, (nv).
 
         Raises:
             Diverged: a velocity moves nothing with inertia in this pose.
+            Refused: joints that are held and loops lock the same direction, so that their forces are not determinate.
         """
         if mode is None:
             mode = self.decided(q, v, time)[0] if self.switched else ()
@@ -137,11 +139,11 @@ class JointCoordinates:
         )
 
     def rows(self, q: Array) -> Rows:
-        """Constraints of the loops for coordinates (nq), at rest."""
+        """Constraints of loops and couplings for coordinates (nq), at rest."""
         return self.tree.loop_rows(self.tree.at(q, np.zeros(self.mechanism.nv)))
 
     def efforts(self, time: float, q: Array, v: Array, mode: Mode = ()) -> list[float]:
-        """Effort of each actuator at its joint, by its mode where there is one, else clamped by its size."""
+        """Effort of each actuator at its joint [N m, N], by its mode if ``mode`` has one, else clamped to its limit."""
         modes = iter(mode[len(self.switched) :])
         return [
             actuator.effort(time, float(q[at_q]), float(v[at_v]), next(modes, None) if clamped else "linear")
@@ -149,7 +151,7 @@ class JointCoordinates:
         ]
 
     def decided(self, q: Array, v: Array, time: float = 0.0) -> tuple[Mode, float]:
-        """Modes of joints by complementarity, of efforts by their own sizes; how far they are from others, relative."""
+        """Mode, of joints by complementarity and of limited efforts by size; relative margin of the joints."""
         mode, apart = decided(self.switched, q, v, partial(self._responses, time, q, v))
         return mode + tuple(item.mode(time, float(q[at_q]), float(v[at_v])) for item, at_q, at_v in self.limited), apart
 
@@ -158,16 +160,16 @@ class JointCoordinates:
         return struck(self.switched, q, v, hit, partial(self._responses, 0.0, q, v))
 
     def _responses(self, time: float, q: Array, v: Array, mode: Mode, at: Sequence[int]) -> tuple[Array, Array]:
-        """Accelerations without further forces, (nv), and what unit forces along velocities add, (nv, forces)."""
+        """Accelerations in a mode, (nv), and how much a unit force along each velocity ``at`` adds, (nv, forces)."""
         free = self.solve(q, v, mode, time=time).acceleration
         unit = np.eye(self.mechanism.nv)
         return free, np.array([self.solve(q, v, mode, unit[k], time).acceleration - free for k in at]).T
 
     def run(self, times: Array, tolerance: float = 1e-14) -> Record:
-        """The motion at the given times, s, by DOP853.
+        """Record of the motion at the given times [s], by DOP853.
 
         Raises:
-            Refused: the mechanism has dry friction, which switches.
+            Refused: a law switches, see :func:`~proofroll.elements.mechanism.complementarity.refuse_switching`.
             Diverged: the integration stops, e.g. at a singular pose, or stepped over one.
         """
         refuse_switching(self.mechanism)
@@ -176,9 +178,9 @@ class JointCoordinates:
         return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in zip(times, states, strict=True)])
 
     def followed(self, mode: Mode | None = None) -> Callable[[Array], Array]:
-        """Elimination of violations after each step of one motion, which ends at a singular pose of the loops.
+        """Correction of the state after each step of one motion, by elimination of violations.
 
-        It raises Diverged where a step has passed one, or has come as near to one as lengths are known.
+        It raises Diverged where a step passes a singular pose of the loops, or comes too near to one to tell.
         """
         sign = RowSign(self.rank)
 
@@ -194,8 +196,8 @@ class JointCoordinates:
         """Sensitivity of the accelerations to the state at the start.
 
         Returns:
-            Rate of the fastest mode [rad/s], at least 1; and their round-off: that of the state, times
-            that rate's square and the condition of the mass matrix.
+            Rate of the fastest mode [rad/s], at least 1; and the change of accelerations if the state moves by its
+            round-off.
         """
         q, v = self.mechanism.start()
         acceleration = self.solve(q, v).acceleration
@@ -207,9 +209,9 @@ class JointCoordinates:
         return max(1.0, float(np.sqrt(slope))), noise
 
     def law_rates(self) -> tuple[Array, Array]:
-        """Rates of dampers and of springs of joints at the start, servos with them, growing [1/s, rad/s], (freedoms).
+        """Rates of the joints' dampers [1/s] and springs [rad/s] at the start, servos included; ascending, (freedoms).
 
-        Loops and couplings share what each coordinate carries: a servo behind a gear moves the reflected inertia, too.
+        Loops and couplings are taken into account: a servo behind a gear moves the reflected inertia, too.
         """
         damping, stiffness = self._damping.copy(), np.zeros(self.mechanism.nv)
         for of_joint, _, _, at_v in self._springs:
@@ -231,9 +233,9 @@ class JointCoordinates:
         return dampers, np.sqrt(np.maximum(springs, 0.0))
 
     def _least(self, tolerance: float) -> Array:
-        """Errors of the coordinates and velocities below which steps only chase the noise of accelerations.
+        """Error tolerances of coordinates and velocities, (nq + nv): the level of the noise of accelerations.
 
-        A step's share of it in the velocities shrinks with the step itself, not with its ninth power.
+        Noise enters the velocities in proportion to the step, not to its ninth power as the error of the method does.
         """
         fastest, noise = self.sensitivity()
         unavoidable = _STEP * noise / fastest
@@ -245,21 +247,21 @@ class JointCoordinates:
         )
 
     def rate(self, time: float, y: Array, mode: Mode | None = None) -> Array:
-        """Right-hand side for the state (q, v)."""
+        """Right-hand side for the state (q, v), (nq + nv)."""
         q, v = y[: self.mechanism.nq], y[self.mechanism.nq :]
         return np.concatenate([self.tree.rate(q, v), self.solve(q, v, mode, time=time).acceleration])
 
     def run_rk4(self, times: Array) -> Record:
-        """The motion at the given times, s, by Runge-Kutta 4 in equal steps of at most 2 ms.
+        """Record of the motion at the given times [s], by Runge-Kutta 4 in equal steps of at most 2 ms.
 
-        Equal steps pass singular poses, before which an error control shrinks its steps for ever.
+        Equal steps pass singular poses; error control would shrink its steps there for ever.
         """
         nq = self.mechanism.nq
         states = zip(times, self.rk4_states(times, _EQUAL_STEP), strict=True)
         return gathered(times, [self.sample(y[:nq], y[nq:], None, t) for t, y in states])
 
     def rk4_states(self, times: Array, step: float) -> Iterator[Array]:
-        """The states (q, v) at the given times, s, by Runge-Kutta 4 in equal steps of at most ``step``, s."""
+        """States (q, v) at the given times [s], by Runge-Kutta 4 in equal steps of at most ``step`` [s]."""
         y, now = np.concatenate(self.mechanism.start()), 0.0
         for time in times:
             steps = int(np.ceil((time - now) / step - 1e-9))
@@ -273,7 +275,7 @@ class JointCoordinates:
             yield y
 
     def eliminated(self, y: Array, mode: Mode | None = None) -> Array:
-        """The state with violations of the loops, of what holds and of unit quaternions removed."""
+        """The state with violations of loops, of held joints and of unit quaternions removed."""
         nq = self.mechanism.nq
         q, v = self.tree.normalised(y[:nq]), y[nq:]
         if self.rank or self.switched:
@@ -296,8 +298,8 @@ class JointCoordinates:
     ) -> dict[str, Any]:
         """Fields of a :class:`~proofroll.elements.mechanism.record.Record` at one time.
 
-        ``load`` are further forces along the velocities, (nv), by what is ``applied`` to the bodies and the world:
-        forces and moments about the world's origin, (bodies + 1, 6).
+        ``load``: additional forces along the velocities, (nv). ``applied``: the wrenches on bodies and world that
+        ``load`` comes from, about the world's origin, (bodies + 1, 6).
         """
         if mode is None and self.switched:
             mode = self.decided(q, v, time)[0]
@@ -331,7 +333,7 @@ class JointCoordinates:
         return taken(self.mechanism, fields)
 
     def inertial(self, motion: BodyMotion) -> tuple[Array, Array, Array]:
-        """Jacobians at the centres of mass, mass matrix, inertial and gravity wrenches at v̇ = 0."""
+        """Jacobians at the centres of mass, (bodies, 6, nv), mass matrix, inertial minus gravity wrenches at v̇ = 0."""
         n = len(self._mass)
         R, w = motion.R_WB[:n], motion.w_WB[:n]
         arm = (R @ self._com[:, :, None])[..., 0]
@@ -344,7 +346,7 @@ class JointCoordinates:
         return J, M, self._wrenches(motion.bias[:n], arm, inertia, w)
 
     def _wrenches(self, acceleration: Array, arm: Array, inertia: Array, w: Array) -> Array:
-        """Force and moment about the centre of mass that move each body so, beyond gravity, (bodies, 6)."""
+        """Force and moment about the centre of mass that accelerate each body so, beyond gravity, (bodies, 6)."""
         alpha, turn = acceleration[:, 3:, None], skews(w)
         at_com = acceleration[:, :3] + (turn @ (turn @ arm[:, :, None]) - skews(arm) @ alpha)[..., 0]
         moment = inertia @ alpha + turn @ (inertia @ w[:, :, None])

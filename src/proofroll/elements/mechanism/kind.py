@@ -1,4 +1,4 @@
-"""Tables of a mechanism in a scene file, and the mechanisms on which engines are checked."""
+"""Tables of a mechanism in a scene file, and the scenes of mechanisms on which engines are checked."""
 
 from __future__ import annotations
 
@@ -20,33 +20,34 @@ if TYPE_CHECKING:
     from proofroll.core.diagnosis import Hypothesis
 
 
-# A mechanism without laws of joints, and one of each that changes its motion by far more than any step does [SI].
+# A mechanism without laws of joints, and a law of each kind, which changes its motion by far more than a step does
+# [SI].
 _PLAIN = "double_pendulum"
 _LAWS: Mapping[str, float] = {"damping": 2.0, "torque": 3.0, "armature": 0.3, "friction": 0.7}
 _SPEED = 1.0  # rad/s, at which a damper acts
 
 
 def _changed(scene: Scene, name: str, **parts: Any) -> Scene:
-    """The scene with other parts of its mechanism."""
+    """Copy of a scene with a new name and some parts of its mechanism replaced."""
     element = the_mechanism(scene)
     return replace(scene, name=name, elements=(replace(element, mechanism=replace(element.mechanism, **parts)),))
 
 
 def _with_law(scene: Scene, law: str, value: float) -> Scene:
-    """A scene of hinges whose joints all move, with the law in each."""
+    """Copy of a scene of hinges with a law of that size in each joint, and all joints moving."""
     changes: dict[str, Any] = {law: value, "v0": (_SPEED,)}
     joints = tuple(replace(joint, **changes) for joint in the_mechanism(scene).mechanism.joints)
     return _changed(scene, f"{scene.name}-{law}", joints=joints)
 
 
 def _falling(scene: Scene) -> Scene:
-    """A scene of a free body, with gravity and a centre of mass outside the origin of its frame."""
+    """Copy of a scene of one free body with gravity and a centre of mass outside the origin of its frame."""
     (body,) = the_mechanism(scene).mechanism.bodies
     return _changed(scene, "falling_body", bodies=(replace(body, com=(0.1, -0.2, 0.3)),), gravity=(0.0, 0.0, -9.81))
 
 
 def _with_drive(scene: Scene, drive: str) -> Scene:
-    """A scene of two hinges that both move, with an actuator at the second or a coupling of the two."""
+    """Copy of a scene of two hinges, both moving, with an actuator at the second or a coupling of the two."""
     joints = one, two = tuple(replace(joint, v0=(_SPEED,)) for joint in the_mechanism(scene).mechanism.joints)
     servo = Actuator("servo", two.name, "position", 1.0, kp=30.0, kd=2.0, gear=2.0)
     of_time = replace(servo, target=Formula("cos(5*t)"))
@@ -59,13 +60,13 @@ def _with_drive(scene: Scene, drive: str) -> Scene:
     return _changed(scene, f"{scene.name}-{drive}", joints=joints, **drives[drive])
 
 
-# s: the spheres then stick as they hit at 0.03822 s, which half a step sees sooner than a step of 2e-3 s or less.
+# s: the spheres then hit and stick at 0.03822 s, an impact that half a step resolves better than a step of 2e-3 s does.
 _SOONER = 0.06178
 _DRIVES = ("servo", "limit", "target", "coupling")
 
 
 def _sooner(scene: Scene, time: float) -> Scene:
-    """A scene of spheres that fly freely, with what happens so much sooner [s]."""
+    """Copy of a scene of freely flying spheres that starts ``time`` [s] later on their path."""
     joints = tuple(
         replace(joint, q0=(*(x + time * v for x, v in zip(joint.q0[:3], joint.v0[:3], strict=True)), *joint.q0[3:]))
         for joint in the_mechanism(scene).mechanism.joints
@@ -84,7 +85,7 @@ class MechanismKind:
     def read(
         tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str
     ) -> Sequence[MechanismElement]:
-        """All bodies, joints, loops and springs of a file are one mechanism."""
+        """One mechanism from all bodies, joints, loops, springs and other tables of a file."""
         x, y, z = gravity.vector.tolist()
         try:
             return [MechanismElement(made_mechanism(tables, (x, y, z), numbers))]
@@ -93,7 +94,7 @@ class MechanismKind:
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """A loop with inertia that changes, a chain, a top, a slide, a free body, sliding feet: the hardest first."""
+        """A loop with varying inertia, a chain, a top, a slide, a free body, sliding feet: the hardest first."""
         from proofroll.files.scene_file import load_scene
 
         names = ("slider_crank", "double_pendulum", "heavy_top", "pendulum", "oscillators", "free_body", "sled")
@@ -101,10 +102,10 @@ class MechanismKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Mechanisms with a loop, oblique axes, a top, springs, feet that slide, an impact, each law and each drive.
+        """Mechanisms with a loop, oblique axes, a top, springs, sliding feet, an impact, each law and each drive.
 
-        In the two hinges, the falling body and the slow top all that a model holds changes the first acceleration,
-        gravity, too.
+        In the two hinges, the falling body and the slow top every number of the model, gravity included, changes the
+        first acceleration.
         """
         from proofroll.files.scene_file import load_scene
 

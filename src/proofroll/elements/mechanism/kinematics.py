@@ -1,4 +1,4 @@
-"""Forward kinematics of a mechanism's tree in joint coordinates, and the rows of its loops."""
+"""Forward kinematics of a mechanism's tree in joint coordinates, and the constraint rows of its loops."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Points that close a loop, for engines whose constraints hold points together and nothing else."""
+"""Points that close a loop, for engines whose only constraints hold two points together."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.parts import Loop
 from proofroll.elements.mechanism.rotations import Array
 
-# Part of the mechanism's size by which the two points on the axis of a revolute loop are apart.
+# Distance of the two points on the axis of a revolute loop, relative to the mechanism's size.
 _APART = 0.3
 _PARALLEL = 1e-9  # round-off of directions
 
@@ -15,17 +15,17 @@ _PARALLEL = 1e-9  # round-off of directions
 def held_points(mechanism: Mechanism, loop: Loop) -> tuple[float, ...]:
     """Points that a loop holds together, as distances from its position along its axis [m].
 
-    In space a revolute loop needs two points; with one, the bodies turn about it freely, and no drift would tell.
-    Where everything moves in parallel planes the second would hold nothing that is not held already.
+    In space a revolute loop needs two points: with one alone the axes could part without any drift of the point. Where
+    all bodies move in parallel planes a second point would be redundant.
     """
     return (0.0, _APART * _size(mechanism)) if loop.kind == "revolute" and not is_planar(mechanism) else (0.0,)
 
 
 def is_planar(mechanism: Mechanism) -> bool:
-    """True if all joints and loops let the bodies move in parallel planes alone, by their axes at the start.
+    """True if the axes of joints and loops at the start restrict all bodies to motion in parallel planes.
 
-    Slides must lie in that plane and turns stand on it; what has other axes is taken to be spatial, but for a loop that
-    has none.
+    Prismatic axes must lie in that plane and revolute axes be normal to it. Spherical loops have no axis and count as
+    planar; every other joint or loop with more axes counts as spatial.
     """
     motion = Tree(mechanism).at(*mechanism.start())
     axes = [(joint.kind, A[:, 2]) for joint, A in zip(mechanism.joints, motion.R_parent, strict=True)]
@@ -44,7 +44,7 @@ def is_planar(mechanism: Mechanism) -> bool:
 
 
 def _size(mechanism: Mechanism) -> float:
-    """The longest distance of a joint or loop from its body's frame [m]."""
+    """Longest distance of a joint or loop from the origin of its body's frame [m]."""
     places: list[Array] = [np.array(joint.position) for joint in mechanism.joints]
     for loop in mechanism.loops:
         places += [np.array(loop.position_a), np.array(loop.position_b)]

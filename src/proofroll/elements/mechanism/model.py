@@ -26,7 +26,7 @@ from proofroll.elements.mechanism.signal import Signal
 
 
 class JointOrLoop(NamedTuple):
-    """Connection of the bodies a and b, the child of a joint: places [m] and frames, as columns, in their own axes."""
+    """Connection of bodies a and b (b: a joint's child): places [m] and frames, as columns, in each body's axes."""
 
     name: str
     kind: str
@@ -40,7 +40,7 @@ class JointOrLoop(NamedTuple):
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Bodies and what connects them.
+    """Bodies, their connections, what acts on them, and gravity.
 
     Attributes:
         bodies: in the order of the scene; arrays over bodies have this order.
@@ -49,7 +49,8 @@ class Mechanism:
         gravity: acceleration in the world's axes, m/s².
         actuators: motors of joints.
         couplings: pairs of joints that move together.
-        unmodelled: further things in its source, in a few words each, for which every route and engine refuses it.
+        unmodelled: features of its source that no model here has, in a few words each; with any of them every route and
+            engine refuses the mechanism.
     """
 
     bodies: tuple[Body, ...]
@@ -85,12 +86,12 @@ class Mechanism:
 
     @cached_property
     def contacts(self) -> tuple[BodyContact, ...]:
-        """Every place where two bodies may touch; arrays over contacts have this order."""
+        """Places where two bodies may touch; arrays over contacts have this order."""
         return contacts_of(self.geometries, self.pairs)
 
     @cached_property
     def body_index(self) -> dict[str, int]:
-        """Position of each body in :attr:`bodies`; the world is at -1."""
+        """Index of each body in :attr:`bodies`; -1 for the world."""
         return {WORLD: -1} | {body.name: index for index, body in enumerate(self.bodies)}
 
     @cached_property
@@ -111,9 +112,9 @@ class Mechanism:
 
     @property
     def fastened(self) -> dict[str, list[Vector]]:
-        """Fastening points of each body, and of the world at the end, in its own frame [m].
+        """Points of each body, and of the world, to which joints, loops, springs or tracked points are attached [m].
 
-        A free joint fastens nothing.
+        In the frame of the body; the world comes last. A free joint attaches nothing.
         """
         found: dict[str, list[Vector]] = {name: [] for name in [*(body.name for body in self.bodies), WORLD]}
         for connection in self.connections:
@@ -149,7 +150,7 @@ class Mechanism:
 
     @cached_property
     def joint_index(self) -> dict[str, int]:
-        """Position of each joint in :attr:`joints`."""
+        """Index of each joint in :attr:`joints`."""
         return {joint.name: number for number, joint in enumerate(self.joints)}
 
     @cached_property
@@ -158,7 +159,7 @@ class Mechanism:
         return tuple(joint.torque for joint in self.joints) + tuple(item.target for item in self.actuators)
 
     def place_of(self, joint: str) -> tuple[int, int]:
-        """Places in q and v of a joint with one coordinate."""
+        """Indices in q and v of a joint with one coordinate."""
         number = self.joint_index[joint]
         return self.q_slices[number].start, self.v_slices[number].start
 
@@ -210,7 +211,7 @@ def _depth_first(bodies: Sequence[Body], joints: Sequence[Joint]) -> tuple[Joint
 
 
 def _check_masses(bodies: Sequence[Body], joints: Sequence[Joint]) -> None:
-    """Raises InputError unless all that a joint moves has a mass, in the body itself or in one that it carries."""
+    """Raises InputError unless everything that a joint moves has a mass: the child itself or a body that it carries."""
     carried = {body.name: body.mass for body in bodies} | {WORLD: 0.0}
     for joint in reversed(joints):  # sorted: the children come last
         carried[joint.parent] += carried[joint.child]

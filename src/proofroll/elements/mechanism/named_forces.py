@@ -1,4 +1,4 @@
-"""Forces along coordinates that have names: efforts of actuators, of couplings, of dry friction and of stops."""
+"""Named forces along coordinates: of actuators, couplings, dry friction and stops."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -15,8 +15,8 @@ class NamedForce(NamedTuple):
 
     Attributes:
         name: as files and commands write it, e.g. ``effort.motor``.
-        field: of a sample that has it: ``effort``, ``coupling``, ``friction`` or ``stop``.
-        place: in that field.
+        field: field of a sample that holds it: ``effort``, ``coupling``, ``friction`` or ``stop``.
+        place: index in that field.
         unit: N m about an axis, N along one.
         meaning: one line for a person.
     """
@@ -28,7 +28,7 @@ class NamedForce(NamedTuple):
     meaning: str
 
 
-# Fields of a sample, in the order of the names.
+# Fields of a sample that hold named forces, in the order of :func:`named_forces`.
 FIELDS = ("effort", "coupling", "friction", "stop")
 
 
@@ -56,20 +56,20 @@ def named_forces(mechanism: Mechanism) -> tuple[NamedForce, ...]:
 
 
 def lengths(mechanism: Mechanism) -> Mapping[str, int]:
-    """Length of each field of a sample: actuators, couplings, joints, joints."""
+    """Length of each field of a sample in :data:`FIELDS`."""
     counts = (len(mechanism.actuators), len(mechanism.couplings), len(mechanism.joints), len(mechanism.joints))
     return dict(zip(FIELDS, counts, strict=True))
 
 
 def taken(mechanism: Mechanism, fields: Mapping[str, Array]) -> Array:
-    """The named forces from the fields of a sample, in order."""
+    """Named forces [N, N m] picked from the fields of a sample, in the order of :func:`named_forces`, (forces,)."""
     return np.array([fields[item.field][item.place] for item in named_forces(mechanism)], dtype=float)
 
 
 def on_joint(at_stop: bool, friction: float, force: float) -> tuple[float, float]:
-    """Parts of the force that holds or rubs on a joint: that of dry friction, and that of a stop.
+    """Shares (dry friction, stop) of the force that holds or rubs on a joint.
 
-    Where a stop and friction hold together, neither is determinate.
+    Both are NaN where a stop and friction hold together, for then neither is determinate.
     """
     if not at_stop:
         return force, 0.0

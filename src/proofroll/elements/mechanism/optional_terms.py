@@ -1,4 +1,4 @@
-"""Parts of the model of a mechanism that a scene can have or not, for the ladder of models."""
+"""Parts of a mechanism's model that the ladder of models can leave out."""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,12 +10,15 @@ from proofroll.elements.mechanism.model import Mechanism
 # Laws of joints and of contacts that the ladder of models can leave out, by their key.
 _OF_JOINTS = {"armature": "armature of joints", "friction": "dry friction of joints", "damping": "damping of joints"}
 _OF_PAIRS = {"friction": "friction of contacts", "restitution": "restitution of contacts"}
-_FAR = 1000.0  # limits of efforts times this bound nothing
-_ROLLS = 10.0  # friction times this leaves little slip; with much more some solvers do not end
+_FAR = 1000.0  # factor on limits of efforts with which they bound nothing
+_ROLLS = 10.0  # factor on friction with which little slip is left; with much more some solvers do not end
 
 
 def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> list[OptionalTerm]:
-    """Laws of joints and contacts and limits of efforts whose parameter has the name of their key."""
+    """Terms that a parameter of the scene switches off: laws of joints and contacts, limits of efforts, slip.
+
+    The name of the parameter is, or ends with, the key of the law.
+    """
     because = "the scene has it"
     terms = [
         OptionalTerm(name, because, {}, {key: 0.0})
@@ -23,23 +26,27 @@ def optional_terms(mechanism: Mechanism, parameters: Mapping[str, float]) -> lis
         if key in _owned(parameters, key, mechanism.joints, mechanism.pairs)
     ]
     if "limit" in parameters and any(item.limit is not None for item in mechanism.actuators):
-        said = f"the scene has them; here without, as {_FAR:g} times what they are"
-        terms.append(OptionalTerm("limits of efforts", said, {}, {"limit": _FAR * parameters["limit"]}))
+        meaning = f"the scene has them; here without, as {_FAR:g} times what they are"
+        terms.append(OptionalTerm("limits of efforts", meaning, {}, {"limit": _FAR * parameters["limit"]}))
     rubbing: dict[str, float] = {}
     for key, name in _OF_PAIRS.items():
         if own := _owned(parameters, key, mechanism.pairs, mechanism.joints):
             terms.append(OptionalTerm(name, because, {}, dict.fromkeys(own, 0.0)))
             rubbing = rubbing or {parameter: _ROLLS * value for parameter, value in own.items() if key == "friction"}
     if rubbing:
-        said = f"friction is bounded; here by {_ROLLS:g} times as much, with which what touches sticks or rolls"
-        terms.append(OptionalTerm("slip of contacts", said, {}, rubbing))
+        meaning = f"friction is bounded; here by {_ROLLS:g} times as much, with which what touches sticks or rolls"
+        terms.append(OptionalTerm("slip of contacts", meaning, {}, rubbing))
     return terms
 
 
 def _owned(
     parameters: Mapping[str, float], key: str, parts: Sequence[Joint | Pair], others: Sequence[Joint | Pair]
 ) -> dict[str, float]:
-    """Parameters, not zero, whose names end with a key and which some parts have; where others have it, by value."""
+    """Nonzero parameters that set ``key`` of some ``parts``, by their name.
+
+    A parameter's name must end with the key. If ``others`` have that key too, the value decides: it must be one of the
+    parts and not of the others.
+    """
     own, theirs = ({getattr(part, key, 0.0) for part in group} - {0.0} for group in (parts, others))
     return {
         name: value

@@ -45,11 +45,11 @@ class Body:
 class Loop:
     """A connection between two bodies of the tree that closes a loop; it has the kinds of joints, but no coordinates.
 
-    Its wrench is that on ``body_b``, as a joint's is that on its child.
+    Its wrench acts on ``body_b``, as that of a joint acts on its child.
 
     Attributes:
         name: unique among joints and loops.
-        kind: what the loop holds, as a joint of that kind does; any but free.
+        kind: kind of joint whose constraints it has; any but free.
         body_a, body_b: names of bodies, or ``world``.
         position_a, position_b: the point of each body that the loop holds together, in its frame [m].
         axis_a, axis_b: axis in the frame of each body; revolute, planar: parallel; universal: perpendicular;
@@ -81,12 +81,12 @@ class Loop:
 
     @cached_property
     def frame_a(self) -> Array:
-        """Axes of the loop's frame on body_a in its axes, as columns; z is the axis."""
+        """Axes of the loop's frame on body_a, in that body's axes, as columns; z is the axis."""
         return read_only(rotations.frame_of_axis(self.axis_a))
 
     @cached_property
     def frame_b(self) -> Array:
-        """Axes of the loop's frame on body_b in its axes; it obeys the same rows with frame_a as a joint's frames."""
+        """Axes of the loop's frame on body_b, as columns; chosen so that a joint's rows hold between it and frame_a."""
         if self.kind in {"fixed", "prismatic"}:
             return read_only(rotations.from_rpy(self.orientation).T @ self.frame_a)
         if self.kind == "universal":  # the joint's row is: z of A perpendicular to x of B
@@ -96,7 +96,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class Spring:
-    """A straight spring and damper between two points; its force is stiffness·(L − length) + damping·L̇, as a pull.
+    """A straight spring and damper between two points; it pulls with stiffness·(L − length) + damping·L̇.
 
     Attributes:
         name: unique among springs.
@@ -104,7 +104,7 @@ class Spring:
         position_a, position_b: its ends in the frame of each body [m].
         stiffness: of the pull along the line [N/m].
         damping: of the pull along the line [N s/m].
-        length: at which the spring is free [m].
+        length: free length, at which the spring does not pull [m].
     """
 
     name: str

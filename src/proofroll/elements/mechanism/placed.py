@@ -1,4 +1,4 @@
-"""Poses and velocities of everything in a mechanism, from those of its bodies at many times."""
+"""Poses and velocities of everything in a mechanism at many times, derived from those of its bodies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,15 +16,15 @@ TURN = 2 * np.pi
 
 @dataclass(frozen=True)
 class Placed:
-    """A motion of all bodies, and what follows from it.
+    """Motion of all bodies of a mechanism, and quantities derived from it.
 
     Attributes:
-        mechanism: whose.
+        mechanism: the mechanism that moves.
         time: [s], shape (time,).
         p_WB, v_WB, w_WB: of each body's frame in the world [m, m/s, rad/s], shape (time, bodies, 3).
         q_WB: unit quaternions, scalar first, shape (time, bodies, 4).
-        known_q: coordinates of the tree where they were integrated, shape (time, nq); they tell how often an angle
-            turned. None: the rates at the samples tell it.
+        known_q: coordinates of the tree where they were integrated, shape (time, nq); whole turns of angles are then
+            counted from them. None: whole turns are counted from the rates at the samples.
     """
 
     mechanism: Mechanism
@@ -49,13 +49,13 @@ class Placed:
         return read_only(np.concatenate([turned.reshape(count, bodies, 3, 3), world], 1))
 
     def point(self, body: str, position: Sequence[float]) -> FloatArray:
-        """A point of a body or of the world in the world [m], shape (time, 3)."""
+        """Position in the world of a point fixed to a body or to the world [m], shape (time, 3)."""
         index = self.mechanism.body_index[body]
         origin = np.zeros((len(self.time), 3)) if index < 0 else self.p_WB[:, index]
         return np.asarray(origin + self.R_WB[:, index] @ np.asarray(position, dtype=np.float64))
 
     def velocity(self, body: str, position: Sequence[float]) -> FloatArray:
-        """Velocity of a point of a body [m/s], shape (time, 3)."""
+        """Velocity of a point fixed to a body or to the world [m/s], shape (time, 3)."""
         index = self.mechanism.body_index[body]
         if index < 0:
             return np.zeros((len(self.time), 3))
@@ -69,12 +69,12 @@ class Placed:
 
     @cached_property
     def points(self) -> FloatArray:
-        """The tracked points, or where there are none the origins of the bodies [m], shape (time, points, 3)."""
+        """Tracked points, or without any the origins of the bodies [m], shape (time, points, 3)."""
         tracked = [self.point(point.body, point.position) for point in self.mechanism.points]
         return read_only(np.stack(tracked, axis=1)) if tracked else self.p_WB
 
     def coordinates(self) -> dict[str, tuple[FloatArray, FloatArray]]:
-        """Coordinate and rate of each joint with one coordinate [rad or m, and per s], angles counted in turns."""
+        """Coordinate and rate of joints with one coordinate, by name [rad or m, per s]; angles count whole turns."""
         found = {joint.name: self.along(joint) for joint in self.mechanism.joints if joint.nq == 1}
         return {name: (q[:, 0], v[:, 0]) for name, (q, v) in found.items()}
 
@@ -84,7 +84,7 @@ class Placed:
         return np.concatenate(q, axis=1), np.concatenate(v, axis=1)
 
     def along(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
-        """Coordinates of a joint, angles counted in turns, and its velocities, shapes (time, nq) and (time, nv)."""
+        """Coordinates and velocities of a joint, shapes (time, nq) and (time, nv); angles count whole turns."""
         parent, child = (self.mechanism.body_index[name] for name in (joint.parent, joint.child))
         A, B = self.R_WB[:, parent] @ joint.parent_frame, self.R_WB[:, child] @ joint.child_frame
         turned, turning = A.swapaxes(1, 2) @ B, self.spin(joint.child) - self.spin(joint.parent)
@@ -109,14 +109,14 @@ class Placed:
         return np.reshape(q, (joint.nq, count)).T, np.reshape(v, (joint.nv, count)).T
 
     def _on_turns(self, joint: Joint, number: int, angle: FloatArray, rate: FloatArray) -> FloatArray:
-        """An angle of a joint, counted in turns."""
+        """Angle of a joint with whole turns added [rad], shape (time,)."""
         if self.known_q is None:
             return on_turns(self.time, angle, rate, joint.q0[number], TURN)
         known = self.known_q[:, self.mechanism.q_slices[self.mechanism.joints.index(joint)].start + number]
         return np.asarray(angle + TURN * np.round((known - angle) / TURN))
 
     def _apart(self, joint: Joint) -> tuple[FloatArray, FloatArray]:
-        """Vector between the joint's points on parent and child [m], and its rate as seen from the parent [m/s]."""
+        """Vector from a joint's point on the parent to that on the child [m]; its rate seen from the parent [m/s]."""
         there = self.point(joint.child, joint.child_position)
         carried = cross(self.spin(joint.parent), there - self.point(joint.parent, ZERO))
         rate = self.velocity(joint.child, joint.child_position) - self.velocity(joint.parent, ZERO) - carried
@@ -127,7 +127,7 @@ class Placed:
         return np.asarray(self.energies().sum(-1))
 
     def energies(self) -> FloatArray:
-        """Parts of the energy [J], shape (time, parts): heights may take away what motion adds."""
+        """Parts of the energy [J], shape (time, parts); they may cancel in the sum, as height and motion do."""
         found: list[FloatArray] = []
         for body in self.mechanism.bodies:
             R, w = self.R_WB[:, self.mechanism.body_index[body.name]], self.spin(body.name)
@@ -155,7 +155,7 @@ class Placed:
         return linear, angular
 
     def drift(self) -> FloatArray:
-        """Largest separation [m] or cosine [1] that a joint or a loop should not have, shape (time,)."""
+        """Largest violation of a joint's or loop's constraints, separation [m] or cosine [1], shape (time,)."""
         worst = np.zeros(len(self.time))
         for _, kind, a, at_a, frame_a, b, at_b, frame_b in self.mechanism.connections:
             A = self.R_WB[:, self.mechanism.body_index[a]] @ frame_a

@@ -35,14 +35,14 @@ KINDS: dict[str, type[Any]] = {
 }
 strict(*KINDS.values(), Table)
 _SIGNALS = {kind: {item.name for item in fields(made) if "signal" in item.metadata} for kind, made in KINDS.items()}
-_MOST = 10_000  # repetitions: beyond it, a slip of the pen
+_MOST = 10_000  # largest number of repetitions: more are taken for a typing error
 
 
 def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: Parameters) -> Mechanism:
-    """The mechanism of a scene file, its loops closed, able to move.
+    """Mechanism of a scene file, its loops closed, able to move.
 
     Args:
-        content: the tables of :data:`KINDS`, repeat, and the list of texts unmodelled.
+        content: the tables of :data:`KINDS`, ``repeat``, and the list of texts ``unmodelled``.
         gravity: acceleration in the world's axes [m/s²].
         numbers: the parameters.
 
@@ -66,7 +66,7 @@ def made_mechanism(content: Mapping[str, Any], gravity: checks.Vector, numbers: 
 
 
 def _repeated(field: str, repeat: Any, numbers: Parameters) -> Iterator[tuple[str, Any]]:
-    """Kind and part of the mechanism of every table that a [[repeat]] stands for."""
+    """(kind, part) of the mechanism for every table that a [[repeat]] stands for."""
     if not isinstance(repeat, Mapping):
         raise InputError(field, repeat, "give a table with count and what repeats")
     index, known = repeat.get("index", "i"), ("index", "from", "count", *KINDS)
@@ -90,7 +90,7 @@ def _repeated(field: str, repeat: Any, numbers: Parameters) -> Iterator[tuple[st
 
 
 def _made(kind: str, field: str, table: Any, numbers: Parameters) -> Any:
-    """The part of a mechanism that a table says."""
+    """Part of a mechanism that a table describes. Raises InputError if the table is wrong."""
     if not isinstance(table, Mapping):
         raise InputError(field, table, "give a table")
     made = KINDS[kind]

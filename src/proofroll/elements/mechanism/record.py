@@ -1,4 +1,4 @@
-"""Record of a route of the truth on a mechanism, in an order that both routes keep, and its steps."""
+"""Record of a mechanism's motion, the same for both routes of the truth, and the integration that makes it."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
@@ -13,7 +13,7 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import Array
 
-_MOST_STEPS = 200_000  # of the whole way
+_MOST_STEPS = 200_000  # of a whole integration
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class Record:
 
     def placed(self, mechanism: Mechanism) -> Placed:
         """The recorded motion of the mechanism."""
-        known_q = self.q if self.q.shape[1] else None  # a route that follows poses alone has none at first
+        known_q = self.q if self.q.shape[1] else None  # a route that integrates poses has no coordinates at first
         return Placed(mechanism, self.time, self.p_WB, self.v_WB, self.w_WB, self.q_WB, known_q)
 
 
 def gathered(time: Array, samples: list[dict[str, Any]]) -> Record:
-    """The record of samples that hold its other fields at each time."""
+    """Record of samples; each is a dictionary of the record's other fields at one time."""
     names = [item.name for item in fields(Record) if item.name != "time"]
     return Record(time=time, **{name: np.array([sample[name] for sample in samples]) for name in names})
 
@@ -63,10 +63,10 @@ def integrated(
     corrected: Callable[[Array], Array],
     least: Array | None = None,
 ) -> Iterator[Array]:
-    """The state at each time by DOP853; the solver steps exactly onto it, for its interpolation is of lower order.
+    """States at the times by DOP853; the solver steps exactly onto each time, for its interpolation is of lower order.
 
-    What round-off takes from a step is put to the next (W. Kahan, Comm. ACM 8, 1965, 40): a body that turns about its
-    intermediate axis would lose ten times the digits otherwise.
+    The round-off of a step is added to the next step (W. Kahan, Comm. ACM 8, 1965, 40): otherwise a body that turns
+    about its intermediate axis would lose ten times the digits.
 
     Args:
         rate: right-hand side.

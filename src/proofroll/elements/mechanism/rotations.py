@@ -19,7 +19,7 @@ def cross(a: Any, b: Any) -> Array:
 
 
 def skew(a: Any) -> Array:
-    """The matrix that multiplies a vector by ``a`` from the left as a cross product."""
+    """Matrix of the cross product: ``skew(a) @ b = a × b``."""
     x, y, z = a
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
@@ -28,7 +28,7 @@ _SKEW = np.array([skew(e) for e in _UNIT]).reshape(3, 9)
 
 
 def skews(a: Array) -> Array:
-    """:func:`skew` of each vector of a list, (n, 3, 3)."""
+    """:func:`skew` of each of n vectors, (n, 3, 3)."""
     matrices: Array = (a @ _SKEW).reshape(-1, 3, 3)
     return matrices
 
@@ -49,7 +49,7 @@ def from_rpy(rpy: ArrayLike) -> Array:
 
 
 def to_rpy(R: Array) -> tuple[float, float, float]:
-    """Roll, pitch, yaw (rad) of a rotation; roll is 0 where pitch is ±π/2, for there only one combination counts."""
+    """Roll, pitch, yaw (rad) of a rotation; roll is 0 where pitch is ±π/2, for only yaw ± roll is determinate there."""
     cosine = math.hypot(R[0, 0], R[1, 0])
     pitch = math.atan2(-R[2, 0], cosine)
     if cosine < 1e-9:
@@ -90,7 +90,7 @@ def quaternion_rate(q: Any, w: Any) -> Array:
 
 
 def frame_of_axis(z: ArrayLike, x: ArrayLike | None = None) -> Array:
-    """Right-handed frame (columns x, y, z) whose z is the axis; x as near as it can be to ``x``, or to a default."""
+    """Right-handed frame (columns x, y, z) with the axis ``z``; x is as near as possible to ``x``, or to a default."""
     e3 = np.asarray(z, dtype=float) / np.linalg.norm(z)
     if x is None:
         x = (1.0, 0.0, 0.0) if abs(e3[0]) < 0.9 else (0.0, 1.0, 0.0)

@@ -1,4 +1,4 @@
-"""Sample of a mechanism besides its motion, and the mechanism of a scene."""
+"""Fields of a sample and of a built model that engines give of a mechanism, and the mechanism of a scene."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -13,8 +13,8 @@ from proofroll.elements.mechanism.analysis import State, general_place
 from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 
-# Relative singular value below which a constraint row of an engine depends on the others; see analysis.RANK, of which
-# it is independent: an engine's rows have other units and weights.
+# Relative singular value below which a constraint row of an engine depends on the others. It does not follow
+# analysis.RANK: an engine's rows have other units and weights.
 DEPENDENT = 1e-9
 WITH_AXIS = joint.WITH_AXIS
 
@@ -25,13 +25,13 @@ class MechanismSample(Sample):
 
     Attributes:
         joint_force, joint_torque: on the child of each joint, then on body_b of each loop, at the joint, world axes
-            [N, N m], shape (joints + loops, 3); NaN where the engine cannot say one of them.
+            [N, N m], shape (joints + loops, 3); NaN where the engine does not know them.
         contact_force: on the body of the first geometry of each contact, world axes [N], shape (contacts, 3); zero
-            where nothing touches, NaN where the engine cannot say.
+            where nothing touches, NaN where the engine does not know it.
         effort: of each actuator at its joint, clamped [N m, N], shape (actuators,).
         coupling: of each coupling on its joint_b [N m, N], shape (couplings,).
         friction, stop: of dry friction and of a stop along each joint's coordinate [N m, N], shape (joints,); NaN for
-            joints that the engine cannot say it of.
+            joints where the engine does not know them.
     """
 
     joint_force: Array | None = None
@@ -45,7 +45,7 @@ class MechanismSample(Sample):
 
 @dataclass(frozen=True)
 class MechanismBuilt:
-    """Model read back from the engine at time 0 (never from the scene). None: the engine cannot say.
+    """Model read back from the engine at time 0 (never from the scene). None: the engine does not know it.
 
     Attributes:
         mass: of the bodies [kg], shape (bodies,).
@@ -56,17 +56,18 @@ class MechanismBuilt:
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         contact_gap: of each contact [m], shape (contacts,).
         contact_normal: unit vectors from b to a in the world, shape (contacts, 3).
-        contact_place: in the world, on the shape that is no plane, on a of two spheres [m], shape (contacts, 3).
+        contact_place: point of contact in the world [m], shape (contacts, 3): on the shape that is not a plane, for two
+            spheres on a.
         contact_friction, contact_restitution: coefficients that the engine made of the pair's, shape (contacts,).
-        contact_response: what unit forces on body a of each contact do to the rates of all slides, world axes [1/kg]
-            (the Delassus matrix), shape (contacts, 3, contacts, 3); of a pair without friction along normals alone.
+        contact_response: rates of all slides caused by unit forces on body a of each contact, world axes [1/kg] (the
+            Delassus matrix), shape (contacts, 3, contacts, 3); for a pair without friction only along normals.
         rows: number of the engine's constraint rows.
         rank: number of independent ones among them.
         mobility: velocities of the engine's model less ``rank``.
         acceleration: of the origin of each body's frame [m/s²], shape (bodies, 3).
         angular_acceleration: of each body in the world [rad/s²], shape (bodies, 3).
-        mass_matrix_error: largest difference between the engine's mass matrix and what its inverse dynamics needs for
-            unit accelerations, relative to its largest element; for an engine that has both.
+        mass_matrix_error: largest difference between the engine's mass matrix and the forces of its inverse dynamics
+            for unit accelerations, relative to the matrix's largest element; for an engine that has both.
         regularised: names of these quantities that the model softens, with tolerance and reason; the tolerance of
             ``acceleration`` and of ``angular_acceleration`` is relative to the largest component of any body.
     """
@@ -93,10 +94,10 @@ class MechanismBuilt:
 
 
 def mechanism_of(scene: Any) -> Mechanism:
-    """The mechanism of a scene that holds nothing else, or the mechanism itself.
+    """Mechanism of a scene with one element, or the given mechanism itself.
 
     Raises:
-        Refused: the scene holds something else.
+        Refused: the scene has other elements.
     """
     if isinstance(scene, Mechanism):
         return scene
@@ -124,6 +125,6 @@ def independent_anywhere(
 
 
 def unsaid(mechanism: Mechanism) -> tuple[Array, Array]:
-    """Forces and moments of joints and loops that are not known yet, shape (joints + loops, 3) each."""
+    """Unknown forces and moments of joints and loops: NaN, shape (joints + loops, 3) each."""
     count = len(mechanism.joints) + len(mechanism.loops)
     return np.full((count, 3), np.nan), np.full((count, 3), np.nan)

@@ -1,4 +1,4 @@
-"""Numbers that may change in time: a number, a smooth formula of the time t, or a table with straight lines between."""
+"""Signals of time: a number, a smooth formula of the time t, or a table with linear interpolation."""
 
 import ast
 import math
@@ -17,7 +17,7 @@ from proofroll.core.quantity import Quantity
 from proofroll.elements.mechanism import checks
 
 TIME = "t"
-# Smooth functions that a formula may call; others evaluate them on arrays, on symbols, or in their own code.
+# Smooth functions that a formula may call; other modules map their names to functions of symbols or of compiled code.
 FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {
     name: getattr(np, {"asin": "arcsin", "atan": "arctan"}.get(name, name))
     for name in ("sin", "cos", "tan", "asin", "atan", "exp", "log", "sqrt", "tanh")
@@ -50,7 +50,7 @@ class Formula:
             raise InputError("formula", f"= {self.text}", advice)
 
     def at(self, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
-        """Value at a time [s], an array of them, or a symbol, with what the functions are there."""
+        """Value at a time [s], which may be an array or a symbol; ``functions`` evaluates the calls for that type."""
         names = {"pi": math.pi, **dict(self.numbers), TIME: time}
         with np.errstate(all="ignore"):
             return evaluator(names, functions, _power).eval("", previously_parsed=self._parsed)
@@ -65,11 +65,11 @@ class Formula:
 
 @dataclass(frozen=True)
 class Table:
-    """Values at times, with straight lines between; before the first and after the last they stay.
+    """Values at times, with linear interpolation; constant before the first and after the last time.
 
     Attributes:
         times: growing [s].
-        values: as many.
+        values: one for each time.
     """
 
     times: tuple[float, ...]
@@ -93,29 +93,29 @@ Signal = float | Formula | Table
 
 
 def value_at(signal: Signal, time: Any, functions: Mapping[str, Callable[[Any], Any]] = FUNCTIONS) -> Any:
-    """Value of a signal at a time [s]; of a formula also where the time is an array or a symbol."""
+    """Value of a signal at a time [s]; for a formula the time may be an array or a symbol."""
     if isinstance(signal, Formula):
         return signal.at(time, functions)
     return signal.at(time) if isinstance(signal, Table) else signal
 
 
 def varies(signal: Signal) -> bool:
-    """True if it changes in time."""
+    """True if the signal changes in time."""
     return not isinstance(signal, float | int)
 
 
 def breaks(signals: Sequence[Signal]) -> list[float]:
-    """Times at which one of them is not smooth [s]."""
+    """Times at which one of the signals is not smooth [s], sorted."""
     return sorted({time for signal in signals if isinstance(signal, Table) for time in signal.times})
 
 
 def checked(field: str, given: Any) -> Signal:
-    """Signal of a part of a mechanism. Raises InputError if the value is none."""
+    """Signal of a part of a mechanism. Raises InputError if the value is not a signal."""
     return given if isinstance(given, Formula | Table) else checks.number(field, given)
 
 
 def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str] = ()) -> Any:
-    """Signal of a file, in one of these units; a number or a formula without time stays what it is.
+    """Signal of a file, in one of these units; a number or a formula without time is returned unchanged.
 
     Raises:
         InputError: a formula or a table is wrong, or a formula has another unit.
@@ -149,7 +149,7 @@ def read_signal(field: str, given: Any, numbers: Parameters, units: Sequence[str
 
 
 def _check_unit(field: str, text: str, numbers: Parameters, units: Sequence[str]) -> None:
-    """Check of a formula's unit, with the time in seconds, or as a plain number beside other plain numbers."""
+    """Raises InputError if a formula has none of the units, with t as seconds or as a plain number."""
     wrong: InputError | None = None
     for unit in filter(None, units):
         for time in (Quantity(0.0, {"s": 1.0}), Quantity(0.0)):
@@ -164,7 +164,7 @@ def _check_unit(field: str, text: str, numbers: Parameters, units: Sequence[str]
 
 
 def _names(text: str) -> set[str]:
-    """Names in a formula; none where it cannot be read, which its evaluation tells."""
+    """Names in a formula; empty if it cannot be parsed, an error that its evaluation reports."""
     try:
         nodes = ast.walk(ast.parse(text.replace("^", "**").strip(), mode="eval"))
         return {node.id for node in nodes if isinstance(node, ast.Name)}

@@ -1,4 +1,4 @@
-"""Start of a mechanism, in words for the author of the scene."""
+"""Start of a mechanism in sentences for the author of the scene."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from proofroll.elements.mechanism.kinematics import Tree
 if TYPE_CHECKING:
     from proofroll.elements.mechanism.element import MechanismElement
 
-# Bodies whose places are told.
+# Largest number of bodies whose places are listed.
 _MOST = 8
 
 
 def start_facts(element: MechanismElement) -> Sequence[str]:
-    """Degrees of freedom, what the loops repeat, a singular pose, where the bodies are, and how far what may touch."""
+    """Sentences on degrees of freedom, redundant constraints, a singular pose, places of bodies, and gaps of pairs."""
     found, mechanism = element.analysis, element.mechanism
     said = [f"degrees of freedom: {found.mobility}"]
     if found.rows:

@@ -1,8 +1,8 @@
-"""Laws that switch in a mechanism, as its scene states them: which forces hold, which push, and what events are called.
+"""Switching laws of a mechanism's joints, as its scene states them: forces that hold or push, and names of events.
 
-A switched joint has one coordinate. Its mode is ``free``; ``forward`` or ``backward`` where it moves against dry
-friction; ``stick`` where friction holds it; ``low`` or ``high`` where a stop does, with its friction. An effort with a
-limit is ``least``, ``linear`` or ``greatest``.
+A switched joint has one coordinate. Its mode is ``free``; ``forward`` or ``backward`` while it slides against dry
+friction; ``stick`` while friction holds it; ``low`` or ``high`` while a stop holds it, with its friction. The mode of
+an effort with a limit is ``least``, ``linear`` or ``greatest``.
 """
 
 import math
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from proofroll.core.errors import Refused
 from proofroll.elements.mechanism.model import Mechanism
 
-# Of the switched joints, then of the actuators whose effort has a limit.
+# Modes of the switched joints, then of the actuators whose effort has a limit.
 Mode = tuple[str, ...]
-# Part of the largest speed at which a joint hit its stop, or two bodies each other, below which only the time of
-# rebounds is summed: they have 1e-12 of the way of the first, which drowns in the round-off of the coordinate. It is no
-# power of a restitution that a file would have, or round-off would decide which rebound is the last.
+# Speed of an impact, relative to the largest at the same stop or contact, below which only the total time of the
+# further rebounds is summed: their height is 1e-12 of the first, less than the round-off of the coordinate. It is no
+# power of a restitution that a file is likely to have, or round-off would decide which rebound is the last.
 SETTLED = math.exp(-13.5)
 STOPPED = frozenset({"low", "high"})
 HOLDING = STOPPED | {"stick"}
@@ -54,13 +54,13 @@ class SwitchedJoint:
         return low, math.inf if mode == "low" else self.friction
 
     def moving(self, direction: float) -> str:
-        """The mode in which the joint moves in a direction."""
+        """Mode in which the joint moves in a direction, by its sign."""
         if not self.friction:
             return "free"
         return "forward" if direction > 0 else "backward"
 
     def resting(self, q: float) -> str:
-        """The mode that holds the joint at a coordinate, if any can."""
+        """Mode that can hold the joint at a coordinate; ``free`` if none can."""
         return "low" if q <= self.low else "high" if q >= self.high else "stick" if self.friction else "free"
 
     def push(self, mode: str) -> float:
@@ -69,15 +69,16 @@ class SwitchedJoint:
 
 
 class Settling:
-    """Impacts on each stop or contact so far."""
+    """Largest impact speed at each stop or contact so far, which decides when rebounds are summed."""
 
     def __init__(self) -> None:
         self._fastest: dict[int, float] = {}
 
     def __call__(self, which: int, speed: float, restitution: float) -> bool:
-        """True if of the rebounds after an impact only the time is summed.
+        """True if only the total time of the rebounds that follow this impact is summed.
 
-        Speeds are in natural units: the first, too, may come from a fall that is hardly more than round-off.
+        ``which`` is the number of the stop or contact. ``speed`` is in natural units; the largest speed counts as at
+        least 1, for the first impact itself may come from a fall of round-off.
         """
         fastest = self._fastest[which] = max(speed, self._fastest.get(which, 1.0))
         return 0.0 < restitution < 1.0 and speed < SETTLED * fastest
@@ -102,12 +103,12 @@ def switched_joints(mechanism: Mechanism) -> tuple[SwitchedJoint, ...]:
 
 
 def left_by(mode: str) -> str:
-    """The event of a joint that leaves what held it."""
+    """Event that ends the mode of a held joint."""
     return "slip" if mode == "stick" else "lift_off"
 
 
 def changes(joints: Sequence[SwitchedJoint], before: Mode, after: Mode) -> tuple[tuple[str, str], ...]:
-    """Events of joints that come to be held, turn, or are set free by a change of mode."""
+    """Events (kind, joint) of joints that become held, reverse, or are set free by a change of mode."""
     found = []
     for joint, was, now in zip(joints, before, after, strict=False):
         if now in HOLDING and was not in HOLDING:
@@ -120,5 +121,5 @@ def changes(joints: Sequence[SwitchedJoint], before: Mode, after: Mode) -> tuple
 
 
 def held_by(mode: Mode) -> list[int]:
-    """Numbers, among the switched joints, of those that are held."""
+    """Indices, among the switched joints, of those that are held."""
     return [number for number, own in enumerate(mode) if own in HOLDING]

@@ -1,4 +1,4 @@
-"""Mode of a contact between two changes: open, slip or stick."""
+"""Mode of a contact between two events: open, slip or stick."""
 
 from collections.abc import Sequence
 from typing import Literal, NamedTuple, Protocol
@@ -10,11 +10,11 @@ from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 
 Direction = tuple[float, float, float]
-# m/s, in the truth a natural speed: a slower slip in two dimensions has no direction that is known well; the rest of it
-# is a straight line.
+# Slip speed in the plane below which the direction of slip is not well known; the rest of the slip is followed as a
+# straight line [m/s; in the truth in natural units].
 FAINT = 1e-8
-_LINE = 1e-9  # part of what a force across does of what one along does: the contact can slide along a line only
-_TURNED = 0.5  # cosine by which the line of a slip may turn
+_LINE = 1e-9  # response across over response along, below which a contact can slide along a line only
+_TURNED = 0.5  # least length of the line of a slip after projection on the surface
 
 
 class Acting(NamedTuple):
@@ -22,8 +22,8 @@ class Acting(NamedTuple):
 
     Attributes:
         kind: ``open``, ``slip`` or ``stick``.
-        along: direction of the line along which alone it can slide, where there is one; of a slip, its own.
-        heading: direction in which a slip begins, where it begins from rest.
+        along: direction of the only line along which it can slide, if there is one; in a slip, its sense too.
+        heading: initial direction of a slip that begins from rest.
     """
 
     kind: Literal["open", "slip", "stick"]
@@ -41,12 +41,12 @@ def kinds(mode: ContactMode) -> tuple[str, ...]:
 
 
 def across(found: Touching) -> Array:
-    """Slip of a contact, along its surfaces [m/s]."""
+    """Slip velocity of a contact, tangential to its surfaces [m/s], shape (3,)."""
     return np.asarray(found.slide - found.normal * (found.normal @ found.slide))
 
 
 def heading_of(own: Acting, found: Touching) -> Array:
-    """Direction of a slip; friction is against it.
+    """Unit direction of a slip, shape (3,); friction acts against it.
 
     Raises:
         Refused: the line of a slip has turned too far to be known.
@@ -64,10 +64,10 @@ def heading_of(own: Acting, found: Touching) -> Array:
 
 
 def held_directions(own: Acting, found: Touching, presses: bool) -> Array:
-    """Directions that a contact holds, (directions, 3).
+    """Directions in which a contact permits no motion, (directions, 3).
 
-    A slip holds its normal, if the contact ``presses``; what sticks holds all directions, or its normal and its line
-    where it can slide along one only.
+    A slip holds its normal, if it ``presses`` (dry friction of a joint does not). A sticking contact holds all
+    directions, or its normal and its line if it can slide along one line only.
     """
     if own.kind == "open":
         return np.zeros((0, 3))
@@ -86,8 +86,9 @@ def acting(kind: Literal["open", "slip", "stick"], frame: Array, heading: Array,
     Args:
         kind: see :class:`Acting`.
         frame: its normal and two directions along the surface, as columns.
-        heading: of its slip, along these two; of any size.
-        G: accelerations along the columns by unit forces along them, (3, 3); it tells whether there is a line.
+        heading: direction of its slip in the two surface directions, of any length.
+        G: accelerations along the columns by unit forces along them, (3, 3); a singular tangential part means that the
+            contact can slide along one line only.
     """
     if kind == "open":
         return OPEN

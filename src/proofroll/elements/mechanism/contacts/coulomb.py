@@ -1,9 +1,9 @@
 """Coulomb's law at several contacts at once: forces f with w = G f + c, by Gauss-Seidel over the contacts.
 
-Of each contact the components are normal and two along the surface. N ≥ 0, w_n ≥ 0 and N w_n = 0; the friction is at
-most μN, and μN against w_t where w_t is not zero. In accelerations c are those without the forces; in an impact they
-are speeds, with what the law of impact returns. A friction without a normal has a bound of its own: it acts along the
-surface alone, where its force moves anything.
+The components of a contact are one normal and two tangential ones. N ≥ 0, w_n ≥ 0 and N w_n = 0; friction is at most
+μN, and is μN against w_t where w_t is not zero. For accelerations, c is the acceleration without contact forces; for
+an impact, the velocity before it plus what restitution returns. Dry friction of a joint has no normal force but a
+bound of its own; it acts along the coordinate alone.
 """
 
 from collections.abc import Sequence
@@ -16,15 +16,15 @@ from proofroll.elements.mechanism.rotations import Array
 
 Outcome = Literal["open", "stick", "slip"]
 _SWEEPS = 1000
-_SETTLED = 1e-12  # of the largest force: a sweep that changes less is the last
-_RESTS = 1e-10  # of the loads: a contact that moves less does not move
-# Part of friction's bound beyond which a contact slides: nearer to it round-off decides, and no direction of slip is
-# found; that it hangs on less than parameters are known to is :func:`sure`'s to say.
+_SETTLED = 1e-12  # largest change in the last sweep, relative to the largest force
+_RESTS = 1e-10  # motion of a contact that counts as none, relative to the loads
+# Margin, relative to friction's bound, above which a contact slides: closer to the bound round-off decides, and no
+# direction of slip would be found. :func:`sure` tells if an outcome depends on less than the parameters are known to.
 _AT_BOUND = 1e-9
-# Part of the loads and of friction by which an outcome is tried on both sides; if it changes, it hangs on nothing. Each
-# further contact takes another part more, of no ratio to the first: equal ones cancel between two walls.
+# Relative change of loads and friction with which an outcome is tried on both sides; an outcome that changes is not
+# unique. Each further contact gets an extra 0.382 of it: equal changes would cancel between two walls.
 _NUDGE, _APART = 1e-6, 0.382
-# Between two of them the direction of slip is looked for; those of the axes lie in between.
+# Angles between which the direction of slip is searched; the offset keeps the axes inside an interval.
 _DIRECTIONS = np.linspace(-np.pi, np.pi, 73) + 0.01
 PAINLEVE = (
     "its normal force would not press but tear: friction at {name} makes what follows not unique or not possible "
@@ -40,18 +40,19 @@ def solved(
     names: Sequence[str],
     bounds: Array | None = None,
 ) -> tuple[Array, list[Outcome]]:
-    """The forces of all contacts, shape (contacts, 3), and what each contact does.
+    """Forces of all contacts, shape (contacts, 3), and outcome of each contact.
 
     Args:
         G: (3 contacts, 3 contacts).
         c: (3 contacts).
         friction: coefficient of each.
-        sliding: unit vector along the surface, shape (2,), of a contact that slides already; friction is against it.
+        sliding: unit vector of slip along the surface, shape (2,), or None for a contact that does not slide yet;
+            friction acts against it.
         names: for messages.
-        bounds: of each friction without a normal; 0, or none given: it has one.
+        bounds: largest friction of each contact without a normal force; 0, or None: a contact with one.
 
     Raises:
-        NotUnique: a contact's force has no unique answer.
+        NotUnique: the force of a contact is not unique.
         Refused: no answer is found.
     """
     f, done = np.zeros(len(c)), list[Outcome](["open"] * len(friction))
@@ -71,7 +72,7 @@ def solved(
             for k, along in enumerate(sliding):
                 rubs = friction[k] or bounds[k]
                 if done[k] == "slip" and along is None and rubs and np.linalg.norm(w[k, 1:]) <= least:
-                    done[k] = "stick"  # of several that hold together one may reach its bound, and nothing moves
+                    done[k] = "stick"  # one of several holding contacts may reach its bound while nothing moves
             return f.reshape(-1, 3), done
     raise Refused(f"the forces of the contacts {', '.join(names)} are not found in {_SWEEPS} sweeps")
 
@@ -85,14 +86,14 @@ def sure(
     bounds: Array | None = None,
     least: float = 0.0,
 ) -> tuple[Array, list[Outcome], bool]:
-    """Solution as :func:`solved`, and True if a little less pressure and friction, or more, gives the same outcome.
+    """Solution as of :func:`solved`, and True if slightly changed pressure and friction give the same outcomes.
 
-    A contact that presses by no more than a ``least`` part of the largest force does what an open one does.
+    A contact whose force is at most a ``least`` part of the largest force counts as open.
     """
     bounds = np.zeros(len(friction)) if bounds is None else bounds
     force, done = solved(G, c, friction, sliding, names, bounds)
     own = np.diag(G)[::3]
-    # as a force of each contact, which what holds the others takes up
+    # as a force at each contact, which the holds of the other contacts balance
     lift = np.where(own > 0, (1 + _APART * np.arange(len(own))) / np.where(own > 0, own, 1), 0.0)
     nudge = _NUDGE * float(np.abs(c).max()) * G[:, ::3] @ lift
 
@@ -109,7 +110,7 @@ def sure(
 
 
 def _rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[Array, Outcome]:
-    """Friction without a normal, along a line, while all other forces are as they are."""
+    """Force and outcome of friction without a normal, along a line, while all other forces stay."""
     if sliding is not None:
         return np.array([0.0, *(-bound * sliding)]), "slip"
     held = -np.linalg.pinv(G, 1e-12, hermitian=True) @ c
@@ -118,7 +119,7 @@ def _rubbing(G: Array, c: Array, bound: float, sliding: Array | None) -> tuple[A
 
 
 def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tuple[Array, Outcome]:
-    """Force of one contact while the others are as they are."""
+    """Force and outcome of one contact while the other forces stay."""
     if c[0] >= 0:
         return np.zeros(3), "open"
     if sliding is not None or not mu:
@@ -130,7 +131,7 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tup
         return held, "stick"
 
     def across(angle: float) -> float:
-        """Component of the slip across the direction that friction is against."""
+        """Component of the slip perpendicular to the direction that friction opposes; zero at the solution."""
         t = np.array([np.cos(angle), np.sin(angle)])
         w = c + G @ _pressing(G, c, mu, t, name)
         return float(w[2] * t[0] - w[1] * t[1])
@@ -149,7 +150,7 @@ def _one(G: Array, c: Array, mu: float, sliding: Array | None, name: str) -> tup
 
 
 def _pressing(G: Array, c: Array, mu: float, t: Array, name: str) -> Array:
-    """Force of a contact that slides along t, which keeps the gap closed."""
+    """Force of a contact that slides along t with its gap kept closed. Raises NotUnique in Painlevé's paradox."""
     along = np.array([1.0, *(-mu * t)])
     response = float(G[0] @ along)
     if response <= 0:

@@ -1,7 +1,7 @@
 """Equations of motion of a mechanism whose bodies touch, in the coordinates of its tree.
 
-Between two changes each contact is ``open``, it ``slip``s (one row, friction against the slip), or it ``stick``s
-(three rows). What comes next follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
+Between two events each contact is ``open``, ``slip``s (one row, friction against the slip), or ``stick``s (three
+rows). The next mode follows from the forces, by :mod:`proofroll.elements.mechanism.contacts.coulomb`.
 """
 
 from collections.abc import Sequence
@@ -24,18 +24,18 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.named_forces import named_forces
 from proofroll.elements.mechanism.rotations import Array, cross, frame_of_axis, skew
 
-# Part of an impact's largest impulse that moves nothing: pressure that is nudged by 1e-6 makes some of it.
+# Impulse, relative to the largest of an impact, that counts as none; a pressure nudged by 1e-6 makes such impulses.
 _NO_IMPULSE = 1e-4
 
 
 @dataclass(frozen=True)
 class ContactsNow:
-    """Facts of the contacts at one state, in any mode.
+    """Kinematics and free accelerations of the contacts at one state, independent of the mode.
 
     Attributes:
         solution: of the mechanism without forces of contact.
-        W: accelerations by unit forces along the velocities, (nv, nv).
-        touching: of each contact.
+        W: accelerations caused by unit forces along the velocities, (nv, nv).
+        touching: geometry and rates of each contact.
         J: derivative of each slide by the velocities, (contacts, 3, nv).
         bias: rate of each slide where v̇ = 0, (contacts, 3).
     """
@@ -52,12 +52,13 @@ class ContactSolution:
     """Accelerations and forces in a mode.
 
     Attributes:
-        state: bodies and contacts that the forces belong to.
+        state: state of the contacts that they belong to.
         acceleration: v̇, (nv).
         force: on body a of each contact [N], (contacts, 3); the smallest where they are not determinate.
-        determinate: whether each component of these is, (contacts, 3).
+        determinate: True for each determinate component of ``force``, (contacts, 3).
         slide_rate: rate of each slide [m/s²], (contacts, 3).
-        response: Painlevé's measure: what normal forces do with friction, over what they would do without; above 0.
+        response: Painlevé's measure, above 0 in a possible motion: response to normal forces with friction over the
+            response without.
     """
 
     state: ContactsNow
@@ -69,7 +70,7 @@ class ContactSolution:
 
 
 class ContactDynamics:
-    """A mechanism in the coordinates of its tree, with its contacts; those of joints come after those of bodies."""
+    """A mechanism in the coordinates of its tree with its contacts: those between bodies, then laws of joints."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism, self.equations = mechanism, JointCoordinates(mechanism)
@@ -96,26 +97,27 @@ class ContactDynamics:
         return ContactsNow(found, W, touching, J, bias)
 
     def _row(self, motion: BodyMotion, k: int, found: Touching) -> tuple[Array, Array]:
-        """Derivative of a contact's slide by the velocities, and its rate without accelerations."""
+        """Derivative of a contact's slide by the velocities, (3, nv), and rate of the slide at v̇ = 0, (3,)."""
         J, bias = np.zeros((3, motion.J.shape[2])), np.zeros(3)
         for body, sign in zip(self._bodies[k], (1.0, -1.0), strict=True):
             arm, w = found.place - motion.p_WB[body], motion.w_WB[body]
             J += sign * (motion.J[body, :3] - skew(arm) @ motion.J[body, 3:])
             turning = motion.bias[body, :3] + cross(motion.bias[body, 3:], arm)
-            # the place moves over the body, where the velocity is another one
+            # the point of contact moves over the body, to places with other velocities
             bias += sign * (turning + cross(w, found.place_rate - motion.v_WB[body]))
         return J, bias
 
     def solve(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> ContactSolution:
-        """Accelerations and forces while each contact does what the mode says.
+        """Accelerations and forces while each contact keeps the given mode, at a time [s].
 
         Raises:
-            Refused: forces of contact are not determinate while something moves.
+            Refused: the line of a slip is not known.
+            Diverged: a velocity moves nothing with inertia in this pose.
         """
         return self.solved(self.at(q, v, time), mode)
 
     def solved(self, state: ContactsNow, mode: ContactMode) -> ContactSolution:
-        """See :meth:`solve`."""
+        """Accelerations and forces at a state while each contact keeps the given mode; see :meth:`solve`."""
         rows, bias, along, owner = [np.zeros((0, state.W.shape[0]))], [np.zeros(0)], list[Array](), list[int]()
         force, known = np.zeros((len(mode), 3)), np.ones((len(mode), 3), dtype=bool)
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
@@ -143,14 +145,14 @@ class ContactDynamics:
             force[k] += size * direction
             known[k] &= np.abs(direction) * np.linalg.norm(loose) <= RANK
         for k, (own, found) in enumerate(zip(mode, state.touching, strict=True)):
-            if own.kind == "stick" and own.along is not None:  # across its line joints hold it as well
+            if own.kind == "stick" and own.along is not None:  # across its line the joints hold it, too
                 known[k] &= np.abs(cross(found.normal, np.array(own.along))) <= RANK
         response = 1.0 if weak.any() else float(np.linalg.det(S) / np.linalg.det(smooth))
         return self._solution(state, free + state.W @ D.T @ z, force, known, response)
 
     @staticmethod
     def heading(own: Acting, found: Touching) -> Array:
-        """Direction in which a contact slips; its friction is against it."""
+        """Unit direction in which a contact slips; its friction acts against it."""
         return heading_of(own, found)
 
     @staticmethod
@@ -171,7 +173,7 @@ class ContactDynamics:
         return y[:nq], y[nq:-1], float(y[-1])
 
     def excess(self, y: Array) -> Array:
-        """Efforts that are wanted beyond their limits, as parts of these."""
+        """Relative excess of wanted efforts over their limits, (limited actuators,); below 0 within the limit."""
         q, v, time = self.parts(y)
         return np.array(
             [abs(m.wanted(time, q[at_q], v[at_v])) / m.bound - 1 for m, at_q, at_v in self.equations.limited]
@@ -192,7 +194,7 @@ class ContactDynamics:
         return np.concatenate([q, v - self._brought(state, v, mode), [time]])
 
     def _brought(self, state: ContactsNow, v: Array, mode: ContactMode) -> Array:
-        """Velocities that closed contacts do not allow."""
+        """Velocities that closed contacts forbid, (nv): the part of v that violates their rows."""
         rows = [np.zeros((0, len(v)))]
         for k, own in enumerate(mode):
             if own.kind == "stick":
@@ -203,7 +205,7 @@ class ContactDynamics:
         return _held(state.W, K, K @ v)
 
     def begin(self) -> tuple[ContactMode, float]:
-        """Mode at the start, and how far it is from another one, relative."""
+        """Mode at the start, and its margin to another one: inf, or 0 if it is not unique."""
         q, v = self.mechanism.start()
         scale = natural_scale(self.mechanism)
         turns = [isinstance(c, JointContact) and self.mechanism.joints[c.joint.number].kind != "prismatic"
@@ -214,13 +216,13 @@ class ContactDynamics:
     def decided(
         self, q: Array, v: Array, closed: Sequence[bool], still: Sequence[bool], time: float = 0.0
     ) -> tuple[ContactMode, float]:
-        """Mode that follows from the forces, and how far it is from another one, relative.
+        """Mode that follows from the forces, and its margin to another one: inf, or 0 if it is not unique.
 
         Args:
             q: coordinates.
             v: velocities.
-            closed: whether a contact's gap is closed and does not open by its speed.
-            still: whether it does not slide either.
+            closed: True for contacts whose gap is closed and does not open by its speed.
+            still: True for those of them that do not slide either.
             time: at which drives and targets are taken [s].
         """
         state = self.at(q, v, time)
@@ -246,7 +248,7 @@ class ContactDynamics:
         return tuple(mode), np.inf if same else 0.0
 
     def struck(self, q: Array, v: Array, closed: Sequence[int], restitution: Array) -> tuple[Array, Array, float]:
-        """Velocities after an impact, by Newton's law and Coulomb's, with the slip after it.
+        """Velocities after an impact, by Newton's law of restitution and Coulomb's law with the slip after the impact.
 
         Args:
             q: coordinates.
@@ -255,10 +257,10 @@ class ContactDynamics:
             restitution: of each of them.
 
         Returns:
-            The velocities, the impulses (closed, 3), and how far from another outcome it is, relative.
+            The velocities, the impulses (closed, 3), and the margin to another outcome: inf, or 0 if it is not unique.
 
         Raises:
-            NotUnique: several contacts press each other, so that the outcome hangs on an order.
+            NotUnique: several contacts press each other, so that the outcome depends on an order.
         """
         state = self.at(q, v)
         frames = [frame_of_axis(state.touching[k].normal)[:, [2, 0, 1]] for k in closed]
@@ -278,7 +280,7 @@ class ContactDynamics:
         return v + state.W @ J.T @ impulse.ravel(), impulse, np.inf if same else 0.0
 
     def sample(self, q: Array, v: Array, mode: ContactMode, time: float = 0.0) -> tuple[dict[str, Any], Array]:
-        """Fields of a record at one time [s], and the forces of bodies' contacts, (contacts, 3).
+        """Fields of a record at one time [s], and contact forces between bodies [N], (contacts, 3).
 
         Forces are NaN where they are not determinate.
         """
@@ -300,5 +302,5 @@ class ContactDynamics:
 
 
 def _held(W: Array, K: Array, violation: Array) -> Array:
-    """Smallest motion, measured by inertia, that makes these violations of rows K."""
+    """Motion of least kinetic energy that makes these violations of rows K, (nv)."""
     return np.asarray(W @ K.T @ (np.linalg.pinv(K @ W @ K.T, RANK, hermitian=True) @ violation))

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism.sampling import MechanismSample
 
 _States = NDArray[np.bool_]
-# Part of a mechanism's speed that a contact which sticks may creep with.
+# Slip speed of a contact that counts as sticking, relative to the mechanism's speed: softened contacts creep.
 _CREEPS = 1e-3
-# Part of a mechanism's size up to which a gap at the start is none.
+# Gap at the start that counts as closed, relative to the mechanism's size.
 _CLOSED = 1e-6
 # Kinds of events that samples do not tell apart: what stands may still begin to move, rebounds may be no end of them.
 _ALIKE = {"rest": "stick", "settle": "impact"}
@@ -30,8 +30,8 @@ _ALIKE = {"rest": "stick", "settle": "impact"}
 class ContactWatch:
     """Events of all contacts of a run. See :class:`proofroll.core.element_abilities.RunWatch`.
 
-    A state that lasts for one sample alone does not count as an event of its own. A contact that presses at one sample
-    between two open ones has rebounded; one whose slip is zero at one sample has changed direction. Two impacts between
+    A state that lasts for one sample only does not count: a contact that presses at a single sample between two open
+    ones rebounds, and one that does not slip at a single sample changes its direction of slip. Two impacts between
     samples count as one.
     """
 
@@ -48,7 +48,7 @@ class ContactWatch:
         samples: Sequence[MechanismSample],
         located: Sequence[Event] | None,
     ) -> SeenInRun:
-        """The events, or None where forces of contact are not known all the time."""
+        """Events of the contacts; None for the events if forces of contact are not known at all times."""
         count, mechanism = len(samples), self._element.mechanism
         if not mechanism.contacts or any(sample.q_WB is None for sample in samples):
             return SeenInRun(count, None, None)
@@ -103,7 +103,7 @@ def _alike(one: Event, seen: Event) -> bool:
 
 
 def _without_lone(states: _States) -> _States:
-    """States along time, without those of one sample between two of the other."""
+    """States along time without runs of one sample, which take the value of their neighbours."""
     lone = (states[:-2] == states[2:]) & (states[1:-1] != states[2:])
     return np.concatenate([states[:1], np.where(lone, states[2:], states[1:-1]), states[-1:]])
 
@@ -111,7 +111,7 @@ def _without_lone(states: _States) -> _States:
 def _change(
     times: FloatArray, found: Followed, u_n: FloatArray, presses: _States, slips: _States, k: int, c: int
 ) -> tuple[str, float]:
-    """Kind and time [s] of what happens to contact c after sample k; no kind: nothing."""
+    """Kind and time [s] of the event of contact c between samples k and k + 1; the kind is empty without an event."""
     start, middle = float(times[k]), float(times[k] + times[k + 1]) / 2
     if not presses[k]:
         closing = float(u_n[k])

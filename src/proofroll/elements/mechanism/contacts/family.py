@@ -1,4 +1,4 @@
-"""Families of contact: the laws that engines solve where bodies touch, and the words for one with its numbers."""
+"""Families of contact: the contact laws of engines, and the text for one with its numbers."""
 
 from enum import StrEnum
 
@@ -7,7 +7,7 @@ from proofroll.elements.mechanism.capabilities import MechanismCapability
 
 
 class Family(StrEnum):
-    """Law of contact that a model has, which steps that get shorter do not change."""
+    """Contact law of a model; shorter steps do not change it."""
 
     HARD = "hard contact by Coulomb's law"
     CONVEX = "contact by a convex cone, where sliding contacts open"
@@ -19,15 +19,15 @@ class Family(StrEnum):
 def of_contact(
     family: Family, *, stiffness: float | None = None, zone: float | None = None, time: float | None = None
 ) -> dict[str, str]:
-    """A family with what softens it, by the capabilities that it is of.
+    """Text of a contact law with its softening, keyed by the capabilities that it describes.
 
     Args:
-        family: whose.
+        family: the law.
         stiffness: [N/m].
-        zone: speed of slip below which friction is less [m/s].
+        zone: slip speed below which friction is reduced [m/s].
         time: time constant [s].
     """
     parts = (("k", stiffness, "N/m"), ("v_reg", zone, "m/s"), ("time constant", time, "s"))
-    said = [f"{name} = {value:g} {unit}" for name, value, unit in parts if value is not None]
-    text = f"{family.value}, {', '.join(said)}" if said else family.value
+    numbers = [f"{name} = {value:g} {unit}" for name, value, unit in parts if value is not None]
+    text = f"{family.value}, {', '.join(numbers)}" if numbers else family.value
     return dict.fromkeys((MechanismCapability.CONTACT, BallCapability.BOUNDED_FRICTION), text)

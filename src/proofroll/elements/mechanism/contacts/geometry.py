@@ -1,4 +1,4 @@
-"""Shapes of bodies that may touch, and the pairs of them that do."""
+"""Shapes of bodies that may touch, pairs of shapes with a contact law, and the contacts that they give."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from proofroll.elements.mechanism.contacts.shapes import (
 from proofroll.elements.mechanism.rotations import Array
 
 GeometryKind = Literal["sphere", "ellipsoid", "circle", "plane", "box"]
-# What each kind of geometry is described by, besides its place.
+# Fields that describe each kind of geometry, besides its position.
 _KEYS: Mapping[str, tuple[str, ...]] = {
     "sphere": ("radius",),
     "ellipsoid": ("axes", "orientation"),
@@ -42,12 +42,12 @@ class Geometry:
     Attributes:
         name: unique among geometries.
         body: that it is fixed to, or ``world``.
-        kind: a box touches with its eight vertices; a plane goes with any other kind, a sphere with a sphere.
+        kind: a box touches with its eight vertices; a plane pairs with any other kind, a sphere also with a sphere.
         position: of its centre, or of any point of a plane, in the body's frame [m].
         orientation: roll, pitch, yaw of an ellipsoid's or a box's axes in the body's frame [rad].
         radius: of a sphere or circle; a sphere of radius 0 is a vertex [m].
         axes: semi-axes of an ellipsoid [m].
-        normal: of a plane, out of the material, or of a circle's disc, in the body's frame; none given: z.
+        normal: of a plane, out of the material, or of a circle's disc, in the body's frame; default: z.
         size: edges of a box [m].
     """
 
@@ -88,14 +88,14 @@ class Geometry:
 
     @cached_property
     def frame(self) -> Array:
-        """Axes in the body's frame, as columns; of a plane and of a circle z is the normal."""
+        """Axes in the body's frame, as columns; for a plane or a circle z is the normal."""
         if self.kind in {"plane", "circle"}:
             return read_only(rotations.frame_of_axis(self.normal))
         return read_only(rotations.from_rpy(self.orientation))
 
     @cached_property
     def shapes(self) -> tuple[ConvexShape | HalfSpace, ...]:
-        """Touching shapes in the body's frame: one, or the vertices of a box."""
+        """Convex shapes that touch, in the body's frame: one, or the eight vertices of a box."""
         centre = np.array(self.position)
         if self.kind == "plane":
             return (HalfSpace(centre, np.array(self.normal)),)
@@ -111,12 +111,12 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two geometries that may touch, and the law of their contact; no others touch.
+    """Two geometries that may touch, and their contact law; geometries without a pair pass through each other.
 
     Attributes:
         name: unique among pairs.
-        geometries: names of the two; forces are those on the body of the first.
-        friction: of Coulomb, sticking and slipping alike.
+        geometries: names of the two; reported forces act on the body of the first.
+        friction: Coulomb's coefficient, the same for sticking and slipping.
         restitution: normal speed after an impact over that before it, from 0 to 1.
     """
 
@@ -139,14 +139,14 @@ class Pair:
 
 @dataclass(frozen=True)
 class BodyContact:
-    """One place where two bodies may touch: of a pair, or of one vertex of a box in it.
+    """A possible contact of two bodies: of a pair, or of one vertex of a box in a pair.
 
     Attributes:
         name: of the pair; a box adds ``.1`` to ``.8``.
         body_a, body_b: of the first and the second geometry.
         shape_a, shape_b: in the frames of these; one of them may be a plane.
         friction, restitution: of the pair.
-        bound: of a friction that no normal force has; bodies have none [N].
+        bound: largest friction without a normal force; always 0 between bodies [N].
     """
 
     bound: ClassVar[float] = 0.0
@@ -160,7 +160,7 @@ class BodyContact:
 
 
 def contacts_of(geometries: Sequence[Geometry], pairs: Sequence[Pair]) -> tuple[BodyContact, ...]:
-    """The contacts of all pairs, in their order. Raises InputError if one cannot touch, or is listed twice."""
+    """Contacts of all pairs, in their order. Raises InputError if a pair cannot touch or is listed twice."""
     known = {geometry.name: geometry for geometry in geometries}
     found: list[BodyContact] = []
     listed: dict[frozenset[str], str] = {}

@@ -1,7 +1,7 @@
-"""Stops and dry friction of joints in a mechanism whose bodies touch: contacts along a coordinate.
+"""Stops and dry friction of joints, expressed as contacts along a coordinate, for mechanisms whose bodies touch.
 
-A stop presses along its coordinate as a smooth surface does along its normal. Dry friction has no normal: it holds
-along a line, or rubs there with a force that nothing else changes.
+A stop presses along its coordinate as a smooth surface does along its normal. Dry friction has no normal force: it
+holds along a line, or acts there with a constant force.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,12 @@ _X, _Y, _NONE = np.eye(3)[0], np.eye(3)[1], np.zeros(3)
 
 @dataclass(frozen=True)
 class JointContact:
-    """One law of a joint; its normal is x, dry friction acts along y, in units of the coordinate.
+    """One law of a joint as a contact: a stop has the normal x, dry friction acts along y, in units of the coordinate.
 
     Attributes:
-        joint: that has it.
+        joint: joint that has the law.
         side: 1: the stop below, -1: the stop above, 0: dry friction.
+        friction: coefficient of the contact; 0, for dry friction has its ``bound`` instead.
     """
 
     joint: SwitchedJoint
@@ -49,18 +50,18 @@ class JointContact:
 
     @property
     def direction(self) -> Array:
-        """Slide that a unit rate of the coordinate is."""
+        """Direction of the slide for a positive rate of the coordinate, unit vector."""
         return np.asarray(self.side * _X if self.side else _Y)
 
     def touching(self, q: float, v: float) -> Touching:
-        """The contact at a coordinate and its rate."""
+        """Gap, normal and slide of the contact at a coordinate and its rate."""
         stop = self.joint.low if self.side > 0 else self.joint.high
         gap = self.side * (q - stop) if self.side else 0.0
         return Touching(gap, _X, _NONE, _NONE, _NONE, v * self.direction)
 
 
 def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
-    """The laws of switched joints as contacts.
+    """Laws of switched joints as contacts: a stop each, or dry friction.
 
     Raises:
         Refused: a joint has stops and dry friction, whose shares at a stop are not determinate.
@@ -79,7 +80,7 @@ def joint_contacts(joints: Sequence[SwitchedJoint]) -> tuple[JointContact, ...]:
 def mode_of_joints(
     joints: Sequence[SwitchedJoint], contacts: Sequence[BodyContact | JointContact], mode: ContactMode
 ) -> Mode:
-    """Modes of switched joints in a mode of contacts."""
+    """Modes of the switched joints that a mode of contacts implies."""
     own = {joint.name: "free" for joint in joints}
     for contact, acting in zip(contacts, mode, strict=True):
         if not isinstance(contact, JointContact) or acting.kind == "open":

@@ -1,4 +1,4 @@
-"""Results of contacts: gaps, slip, forces; as variables of a run, and as observables."""
+"""Gaps, slips, forces and residuals of contacts, as variables of a run and as observables."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from proofroll.elements.mechanism.sampling import MechanismSample
 
 
-# Coulomb's law held against the forces that a run reports, zero where they keep it.
+# Residuals of Coulomb's law for the forces that a run reports: zero where they obey it.
 RESIDUALS = (
     ("penetration", "m", "depth to which shapes overlap"),
     ("contact_pull", "N", "normal forces that pull"),
@@ -29,25 +29,26 @@ RESIDUALS = (
     ("hop_speed", "m/s", "speed along the normal of what presses"),
     ("natural_map", "N", "distance of forces from where Coulomb's law projects them with the slip"),
 )
-# Laws that no impact breaks, of bodies that nothing drives, and of those on which nothing acts but each other.
+# Conservation laws that hold through impacts: energy, if nothing drives the bodies; momentum, if nothing else acts on
+# them.
 LAWS = (
     ("energy_gain", "J", "energy beyond that at the start"),
     ("momentum_error", "N s", "momentum now minus that at the start"),
     ("angular_momentum_error", "N m s", "moment of momentum about the origin now minus that at the start"),
 )
-# Parts of a mechanism's weight and speed below which nothing presses and nothing slides; softened contacts creep.
+# Least force of a pressing contact and least speed of a sliding one, relative to the mechanism's weight and speed.
 PRESSES, SLIDES = 1e-6, 1e-2
-_AXIS = 1e-12  # component of a unit normal that is none
+_AXIS = 1e-12  # largest component of a unit normal that counts as zero
 
 
 class Followed(NamedTuple):
-    """All contacts along a motion.
+    """Geometry and motion of all contacts along a run.
 
     Attributes:
         gap: [m], shape (time, contacts).
         slip: speed along the surfaces [m/s], shape (time, contacts).
         normal: unit vectors from b to a, shape (time, contacts, 3).
-        slide: velocity of a against b where they touch [m/s], shape (time, contacts, 3).
+        slide: velocity of a relative to b at the contact [m/s], shape (time, contacts, 3).
     """
 
     gap: FloatArray
@@ -78,7 +79,7 @@ def followed(placed: Placed) -> Followed:
 
 
 def kept_laws(mechanism: Mechanism) -> frozenset[str]:
-    """Names of the ``LAWS`` that hold for a mechanism with contacts, whatever an impact does."""
+    """Names of the ``LAWS`` that hold for a mechanism with contacts, through any impact."""
     if not mechanism.contacts or mechanism.actuators or any(joint.torque for joint in mechanism.joints):
         return frozenset()
     if any(varies(signal) for signal in mechanism.signals):
@@ -95,9 +96,9 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
     """Observables of a mechanism with contacts.
 
     Args:
-        mechanism: whose.
-        sizes: natural size of what has a unit.
-        least: part of it below which nothing shows.
+        mechanism: the mechanism.
+        sizes: natural size of a quantity, by its unit.
+        least: floor of an observable, relative to its natural size.
     """
     if not mechanism.contacts:
         return
@@ -125,14 +126,14 @@ def contact_observables(mechanism: Mechanism, sizes: Mapping[str, float], least:
 def residuals(
     found: Followed, pressed: FloatArray, friction: FloatArray, weight: float, speed: float
 ) -> dict[str, FloatArray]:
-    """Each of ``RESIDUALS``, and ``unpressed``, shape (time, contacts); NaN of contacts without a force.
+    """Values of ``RESIDUALS`` and of ``unpressed``, shape (time, contacts); NaN for contacts without known forces.
 
     Args:
         found: the contacts along the motion.
         pressed: forces on their first bodies [N], shape (time, contacts, 3); NaN where not determinate.
         friction: their coefficients, shape (contacts,).
         weight: of the mechanism [N].
-        speed: by which the natural map weighs a slip against the weight [m/s].
+        speed: natural speed, which scales slip against weight in the natural map [m/s].
     """
     n, u_n = found.normal, np.sum(found.normal * found.slide, axis=-1)
     said, given = np.all(np.isfinite(pressed), axis=-1), np.any(np.isfinite(pressed), axis=-1)
@@ -166,13 +167,13 @@ def residuals(
 
 
 def normal_forces(found: Followed, pressed: FloatArray) -> FloatArray:
-    """Normal force of each contact [N], shape (time, contacts); a component across the normal may be unknown."""
+    """Normal force of each contact [N], shape (time, contacts); components that are tangential may be unknown (NaN)."""
     along = np.abs(found.normal) > _AXIS
     return np.asarray(np.sum(np.where(along, pressed, 0.0) * found.normal, axis=-1))
 
 
 def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Nearest normal force and friction of the cone T ≤ μN to given ones [N]."""
+    """Nearest point of the cone T ≤ μN to given normal forces and sizes of friction [N]: (normal force, friction)."""
     within, beyond = friction * N >= T, -friction * T >= N
     pressed = (N + friction * T) / (1 + friction**2)
     kept = np.where(within, N, np.where(beyond, 0.0, pressed))
@@ -180,7 +181,7 @@ def _onto_cone(N: FloatArray, T: FloatArray, friction: FloatArray) -> tuple[Floa
 
 
 def given_forces(mechanism: Mechanism, samples: Sequence[MechanismSample]) -> FloatArray:
-    """Forces on body a of each contact [N], shape (time, contacts, 3); NaN where the engine cannot say.
+    """Forces on body a of each contact [N], shape (time, contacts, 3); NaN where the engine does not know them.
 
     Raises:
         Diverged: they have another shape.

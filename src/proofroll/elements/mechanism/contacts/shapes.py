@@ -1,6 +1,6 @@
-"""Convex shapes by their support function: the farthest point in a direction, and how it moves with the direction.
+"""Convex shapes by their support function: the farthest point in a direction, and its derivative by the direction.
 
-All is in the frame of the body that a shape is fixed to.
+All coordinates are in the frame of the body that a shape is fixed to.
 """
 
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from proofroll.elements.mechanism.rotations import Array
 
 
 class ConvexShape(Protocol):
-    """A convex shape."""
+    """A convex shape that may touch a plane, given by its support function."""
 
     @property
     def centre(self) -> Array:
-        """Its middle [m], shape (3,)."""
+        """Centre of the shape [m], shape (3,)."""
 
     def support(self, d: Array) -> tuple[Array, Array]:
         """Farthest point in a unit direction [m], shape (3,), and its derivative by the direction, shape (3, 3)."""
@@ -24,7 +24,7 @@ class ConvexShape(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class SphereShape:
-    """A sphere; of radius 0 a vertex."""
+    """A sphere; a vertex if its radius is 0."""
 
     centre: Array
     radius: float
@@ -36,7 +36,7 @@ class SphereShape:
 
 @dataclass(frozen=True, eq=False)
 class EllipsoidShape:
-    """Semi-axes along the columns of a frame."""
+    """An ellipsoid with semi-axes along the columns of a frame."""
 
     centre: Array
     axes: Array
@@ -52,7 +52,7 @@ class EllipsoidShape:
 
 @dataclass(frozen=True, eq=False)
 class CircleShape:
-    """A flat disc with a sharp edge; lying flat it has no single farthest point."""
+    """A flat disc with a sharp edge; its farthest point along its own normal is not unique."""
 
     centre: Array
     radius: float
@@ -69,7 +69,7 @@ class CircleShape:
 
 @dataclass(frozen=True, eq=False)
 class HalfSpace:
-    """The half space behind a point [m] and a unit normal."""
+    """Half space bounded by a plane through a point [m], on the side opposite to the unit normal."""
 
     point: Array
     normal: Array

@@ -1,4 +1,4 @@
-"""The start of contacts: which touch, which slide, and what no start may have."""
+"""Start of contacts: which are closed, which slide, natural scales, and the check of a scene's start."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -13,14 +13,14 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.kinematics import BodyMotion, Tree
 from proofroll.elements.mechanism.model import Mechanism
 
-# Part of a natural length, or rad: digits of a file, by which shapes may be apart or overlap and still touch.
+# Gap or overlap of shapes that counts as touching, relative to a natural length, or in rad: digits of a file.
 TOUCHING = 1e-9
-# Part of a natural speed: digits of a file, by which what touches may part, approach or slide.
+# Speed that counts as none between touching shapes, relative to a natural speed: digits of a file.
 STILL = 1e-9
 
 
 def touches(mechanism: Mechanism, motion: BodyMotion) -> tuple[Touching, ...]:
-    """All contacts at one instant."""
+    """Gap, normal and slide of all contacts at one instant."""
     index = mechanism.body_index
 
     def moving(body: str) -> Moving:
@@ -51,19 +51,19 @@ class Scale(NamedTuple):
 
     @property
     def gap(self) -> float:
-        """Largest gap of bodies that touch [m]."""
+        """Largest gap that counts as touching [m]."""
         return TOUCHING * self.length
 
     @property
     def speed(self) -> float:
-        """Largest speed of what stands [m/s]."""
+        """Largest speed that counts as rest [m/s]."""
         return STILL * self.length * self.rate
 
 
 def natural_scale(mechanism: Mechanism) -> Scale:
-    """Length of a mechanism with its ways, and its rate: that of gravity or of its first motion, the faster one.
+    """Natural length, prismatic travel included, and the faster of the rates of gravity and of the first motion.
 
-    They are powers of two, so that a change of units rounds nothing.
+    Both are powers of two, so that a change of units causes no round-off.
     """
     found = JointCoordinates(mechanism).solve(*mechanism.start())
     motion, rates = found.motion, found.motion.J @ found.acceleration + found.motion.bias
@@ -80,11 +80,11 @@ def _largest(values: ArrayLike) -> float:
 
 
 def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float) -> tuple[list[bool], list[bool]]:
-    """True for each contact that is closed at the start and stays so for a moment, and for those of them that stand.
+    """Two lists over the contacts: True if closed at the start and not opening, True if also at rest.
 
     Args:
         found: the contacts.
-        lengths: natural length along each, 1 of an angle.
+        lengths: natural length along each, 1 for an angle.
         rate: natural rate [1/s].
     """
     rate = max([rate, *(float(np.linalg.norm(each.slide)) / size for each, size in zip(found, lengths, strict=True))])
@@ -100,7 +100,7 @@ def closed_and_still(found: Sequence[Touching], lengths: FloatArray, rate: float
 
 
 def check_contacts(mechanism: Mechanism) -> None:
-    """Raises InputError if something overlaps or strikes at the start."""
+    """Raises InputError if two bodies overlap or strike at the start."""
     if not mechanism.contacts:
         return
     motion = Tree(mechanism).at(*mechanism.start())

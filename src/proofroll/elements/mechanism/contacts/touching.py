@@ -1,4 +1,4 @@
-"""Contact of two bodies: gap, normal, the place of contact, and the rates of these."""
+"""Contact of two bodies: gap, normal, point of contact, and their rates."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,10 @@ from proofroll.elements.mechanism.rotations import Array, cross
 
 
 class Moving(NamedTuple):
-    """A body at one instant: origin of its frame, rotation, velocity of the origin, angular velocity, world axes."""
+    """Motion of a body at one instant: position and rotation of its frame, velocity of the origin, angular velocity.
+
+    All in world axes [m, m/s, rad/s].
+    """
 
     p: Array
     R: Array
@@ -18,7 +21,7 @@ class Moving(NamedTuple):
     w: Array
 
     def velocity(self, place: Array) -> Array:
-        """Velocity of its material at a place in the world [m/s]."""
+        """Velocity of the body's material at a place in the world [m/s]."""
         return self.v + cross(self.w, place - self.p)
 
 
@@ -29,9 +32,10 @@ class Touching(NamedTuple):
         gap: distance of the shapes, negative where they overlap [m].
         normal: unit vector from b to a; a force along it pushes a away.
         normal_rate: its time derivative [1/s].
-        place: where they touch or would, on the shape that is no plane, on a of two spheres [m].
-        place_rate: velocity of that place, over both bodies [m/s].
-        slide: velocity of the material of a there against that of b [m/s]; along the normal it is the gap's rate.
+        place: point of contact, or of an open contact the point that would touch: on the shape that is not a plane, for
+            two spheres on a [m].
+        place_rate: velocity of that point in the world, as it moves over both bodies [m/s].
+        slide: velocity of a's material relative to b's at that point [m/s]; along the normal it is the gap's rate.
     """
 
     gap: float
@@ -43,7 +47,7 @@ class Touching(NamedTuple):
 
 
 def touch(contact: BodyContact, a: Moving, b: Moving) -> Touching:
-    """Gap, normal and place of a contact, with their rates, wherever the bodies are."""
+    """Gap, normal, point of contact and rates of a contact at given motions of its bodies."""
     if isinstance(contact.shape_b, HalfSpace):
         assert not isinstance(contact.shape_a, HalfSpace)  # two planes are no contact
         gap, n, n_rate, place, rate = _on_plane(contact.shape_a, a, contact.shape_b, b)
@@ -61,12 +65,12 @@ _Lying = tuple[float, Array, Array, Array, Array]
 
 
 def _on_plane(shape: ConvexShape, own: Moving, plane: HalfSpace, other: Moving) -> _Lying:
-    """A convex shape over a plane; the normal is the plane's."""
+    """Gap, normal, its rate, point of contact and its rate of a convex shape on a plane, with the plane's normal."""
     n = other.R @ plane.normal
     n_rate = cross(other.w, n)
     point, by_direction = shape.support(-(own.R.T @ n))
     arm = own.R @ point
-    turning = cross(own.w, n) - n_rate  # of the direction, as the body sees it
+    turning = cross(own.w, n) - n_rate  # rate of the direction in the body's frame
     place = own.p + arm
     rate = own.v + cross(own.w, arm) + own.R @ (by_direction @ (own.R.T @ turning))
     gap = float(n @ (place - other.p - other.R @ plane.point))

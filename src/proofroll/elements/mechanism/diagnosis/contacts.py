@@ -1,4 +1,4 @@
-"""Hypotheses of contacts: another coefficient, a contact left out, another law of friction."""
+"""Hypotheses of contacts: a wrong coefficient, a missing contact, another law of friction."""
 
 import functools
 import itertools
@@ -19,14 +19,14 @@ from proofroll.elements.mechanism.contacts.observables import PRESSES, SLIDES, F
 from proofroll.elements.mechanism.diagnosis.equations import is_motion, of_start, placed_of
 from proofroll.elements.mechanism.model import Mechanism
 
-# Parts of a mechanism's weight and size by which forces and gaps have to differ to be another law's.
+# Least difference of forces and least overlap that point to another law, relative to the mechanism's force and size.
 _FORCE, _SUNK = 1e-4, 1e-3
-_OFF = 1e-3  # factor of friction that is none
-_TURNS = 0.3  # rad: slip and friction that turn less tell no shape of a cone
-_FEW = 3  # frictions that one angle does not bring to a square by chance
+_OFF = 1e-3  # largest factor of friction that counts as zero
+_TURNS = 0.3  # rad: least turn of slip and friction that shows the shape of a cone
+_FEW = 3  # samples of friction from which a square does not fit by chance
 _ANGLES = np.linspace(0.0, np.pi / 2, 181)[:-1]
-_HELD = 1e-6  # part of a mechanism's speed below which the truth sticks
-# Contacts move all that there is: another cause of it is not looked for.
+_HELD = 1e-6  # slip speed of the truth that counts as sticking, relative to the mechanism's speed
+# A wrong contact changes all of the motion, so that no further cause of the motion is looked for.
 contact_cause = functools.partial(
     Cause, covers=("motion", "contacts", "contact_forces", "normal_forces", "acceleration")
 )
@@ -34,7 +34,17 @@ contact_cause = functools.partial(
 
 @dataclass(frozen=True)
 class SeenContact:
-    """Contacts of a run with its forces; arrays over (time, contacts)."""
+    """Contacts of a run and of the truth, with forces; arrays over (time, contacts).
+
+    Attributes:
+        evidence: what the run is judged by.
+        time: [s], (time,).
+        found, true: gaps, normals and slides of the run and of the truth.
+        force, true_force: on body a of each contact [N], (time, contacts, 3).
+        N: normal forces of the run [N].
+        u_n: speed along the normal [m/s].
+        presses, slides: True where a contact presses, and where it also slides.
+    """
 
     evidence: Evidence
     time: FloatArray
@@ -60,7 +70,7 @@ class SeenContact:
 
     @property
     def across(self) -> FloatArray:
-        """Slip along the surfaces [m/s], (time, contacts, 3)."""
+        """Slip velocity along the surfaces [m/s], (time, contacts, 3)."""
         return np.asarray(self.found.slide - self.u_n[..., None] * self.found.normal)
 
     @property
@@ -70,14 +80,14 @@ class SeenContact:
 
     @property
     def against(self) -> FloatArray:
-        """Coulomb's friction of the normal forces that the run tells, against its slip [N]."""
+        """Coulomb friction of the run's own normal forces against its own slip [N], (time, contacts, 3)."""
         slip = np.where(self.found.slip > 0, self.found.slip, 1.0)
         return np.asarray(-(self.friction * self.N / slip)[..., None] * self.across)
 
 
 @once
 def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
-    """The contacts of the run, if it has any and tells their forces."""
+    """Contacts of the run; nothing if it has none or does not report their forces."""
     pair, element = both(evidence), evidence.element
     if pair is None or not element.mechanism.contacts or "contact_forces" not in pair[0] or not is_motion(pair[0]):
         return
@@ -108,15 +118,15 @@ def touch_of(evidence: Evidence) -> Iterator[SeenContact]:
 
 @hypothesis("contact forces", "the true forces with another sign, frame or time are what is said")
 def contact_forces(evidence: Evidence) -> Iterator[Cause]:
-    """Forces of contact on the other body, in other axes, at another time."""
+    """Hypothesis: contact forces are reported on the other body, in other axes, or at another time."""
     for touch in touch_of(evidence):
         known = np.isfinite(touch.true_force[1:]).all(axis=(0, 2))
         if np.abs(touch.found.slide - touch.true.slide).max() > _SUNK * evidence.element.speed:
-            continue  # another motion has other forces
-        said, true = touch.force[1:, known], touch.true_force[1:, known]
+            continue  # forces of another motion cannot be compared
+        reported, true = touch.force[1:, known], touch.true_force[1:, known]
         if known.any() and "contact_forces" not in evidence.settled:
             what, least = "the force of a contact on its first body", evidence.element.force
-            yield from Reported("contact_forces", what, "N", said, true, touch.time[1:], {}, least).causes(
+            yield from Reported("contact_forces", what, "N", reported, true, touch.time[1:], {}, least).causes(
                 evidence.step
             )
 
@@ -125,7 +135,7 @@ def contact_forces(evidence: Evidence) -> Iterator[Cause]:
     "friction of contacts", "friction of what slides is one factor times its bound, against its slip, in every sample"
 )
 def friction_factor(evidence: Evidence) -> Iterator[Cause]:
-    """A coefficient of friction that is not the scene's, of each contact or of all."""
+    """Hypothesis: one contact, or all, have a coefficient of friction with a factor."""
     for touch in touch_of(evidence):
         names = [contact.name for contact in touch.mechanism.contacts]
         groups = [(list(range(len(names))), "all contacts"), *(([k], name) for k, name in enumerate(names))]
@@ -145,7 +155,7 @@ def friction_factor(evidence: Evidence) -> Iterator[Cause]:
 
 @hypothesis("contact left out", "a contact never presses, and its shapes overlap where the truth presses them apart")
 def left_out(evidence: Evidence) -> Iterator[Cause]:
-    """A pair that the engine has not."""
+    """Hypothesis: the engine lacks a pair."""
     for touch in touch_of(evidence):
         true = normal_forces(touch.true, touch.true_force)
         for k, contact in enumerate(touch.mechanism.contacts):
@@ -161,11 +171,11 @@ def left_out(evidence: Evidence) -> Iterator[Cause]:
     "convex cone", "from the start of a slip each contact rises at μ|u|, as the convex dual of Coulomb's law lets it"
 )
 def convex_cone(evidence: Evidence) -> Iterator[Cause]:
-    """A sliding contact that hops: its first flight begins at the speed that makes impulse and slip orthogonal."""
+    """Hypothesis: sliding contacts hop; the first flight begins at the speed that makes impulse and slip orthogonal."""
     for touch in touch_of(evidence):
         t, size = touch.time, evidence.element.length
         part = (t[1] - t[0]) / (t[2] - t[1])
-        slip = np.linalg.norm(touch.across[1] + part * (touch.across[1] - touch.across[2]), axis=-1)  # as it flies off
+        slip = np.linalg.norm(touch.across[1] + part * (touch.across[1] - touch.across[2]), axis=-1)  # at take-off
         rises = touch.friction * slip
         which = (rises > SLIDES * evidence.element.speed) & (np.abs(touch.found.gap[0]) < _SUNK * size)
         if not which.any() or touch.presses[1:3, which].any():
@@ -180,7 +190,7 @@ def convex_cone(evidence: Evidence) -> Iterator[Cause]:
 
 @hypothesis("friction pyramid", "friction that turns lies on the sides of a square, |T1| + |T2| = μN, in every sample")
 def pyramid(evidence: Evidence) -> Iterator[Cause]:
-    """A pyramid in place of the cone, about axes that one angle tells."""
+    """Hypothesis: friction is bounded by a pyramid, whose axes are fitted by one angle, instead of a cone."""
     for touch in touch_of(evidence):
         at = touch.slides & (touch.friction > 0)
         if at.sum() > _FEW:
@@ -191,10 +201,10 @@ def pyramid(evidence: Evidence) -> Iterator[Cause]:
 def _of_a_square(
     n: FloatArray, u: FloatArray, T: FloatArray, full: FloatArray, bound: FloatArray, least: float
 ) -> Iterator[Cause]:
-    """The cause that friction is bounded by a square.
+    """Cause that friction is bounded by a square.
 
     Arrays over samples: normals, slips [m/s], friction T and Coulomb's friction ``full`` [N], (samples, 3); its size
-    [N], (samples,). A small part of ``least``, a natural force [N], counts as none.
+    [N], (samples,). Differences below a small part of ``least``, a natural force [N], count as none.
     """
     if np.abs(n - n[0]).max() > _FORCE:
         return
@@ -216,25 +226,25 @@ def _of_a_square(
     "contact forces at time 0", "as along the run, for the forces of the certificate: sign and axes, or a pyramid"
 )
 def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """Forces of contact at time 0."""
+    """Hypotheses of contact forces at time 0: sign, axes, or a pyramid."""
     element, name = evidence.element, "forces of contact"
     lines = {str(line["quantity"]): line for line in evidence.lines}
     line, shape = lines.get(name), (len(element.mechanism.contacts), 3)
     if line is None or line["holds"] or np.size(line["found"]) != np.prod(shape):
         return
-    said, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
-    known = np.isfinite(said).all(axis=-1) & np.isfinite(true).all(axis=-1)
+    reported, true = np.reshape(line["found"], shape), np.reshape(line["expected"], shape)
+    known = np.isfinite(reported).all(axis=-1) & np.isfinite(true).all(axis=-1)
     if all(other["holds"] for key, other in lines.items() if key != name) and known.any():
         what = "the force of a contact on its first body"
-        values = said[None, known], true[None, known], np.zeros(1)
+        values = reported[None, known], true[None, known], np.zeros(1)
         yield from Reported("contact_forces", what, "N", *values, {}, element.force).causes(evidence.step)
     found = followed(element.start)
     n, friction = found.normal[0], np.array([contact.friction for contact in element.mechanism.contacts])
-    N = np.sum(said * n, axis=-1)
+    N = np.sum(reported * n, axis=-1)
     slides = known & (PRESSES * element.force < N) & (found.slip[0] > SLIDES * element.speed) & (friction > 0)
     if slides.sum() >= _FEW:
         u = (found.slide[0] - n * np.sum(n * found.slide[0], axis=-1)[:, None])[slides]
-        bound, T = (friction * N)[slides], (said - N[:, None] * n)[slides]
+        bound, T = (friction * N)[slides], (reported - N[:, None] * n)[slides]
         full = -u * (bound / found.slip[0][slides])[:, None]
         yield from _of_a_square(n[slides], u, T, full, bound, element.force)
 
@@ -243,7 +253,7 @@ def forces_at_start(evidence: Evidence) -> Iterator[Cause]:
     "creep", "contacts that stick in the truth slide at one speed times T/(μN), as a regularised friction lets them"
 )
 def creep(evidence: Evidence) -> Iterator[Cause]:
-    """Slip of contacts that stick, by a regularised law of friction."""
+    """Hypothesis: sticking contacts creep, as by a regularised law of friction."""
     for touch in touch_of(evidence):
         held = touch.presses & (touch.true.slip <= _HELD * evidence.element.speed) & (touch.friction > 0)
         slip = touch.found.slip[held]
@@ -252,7 +262,7 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
         assert truth is not None
         moved = float(np.abs(run["positions"].to_numpy() - truth["positions"].to_numpy()).max())
         if len(slip) < 4 or slip.max() * (touch.time[-1] - touch.time[0]) < moved:
-            continue  # something else moves it further
+            continue  # the creep alone cannot explain the error of the motion
         used = np.linalg.norm(touch.T[held], axis=-1) / (touch.friction * touch.N)[held]
         speed = float(np.sum(slip * used) / np.sum(used * used))
         says = f"contacts that stick creep at {speed:.3g} m/s times T/(μN): friction is regularised"
@@ -265,7 +275,7 @@ def creep(evidence: Evidence) -> Iterator[Cause]:
     "contacts at time 0", "the accelerations at time 0 are those of a mechanism whose contacts differ in one thing"
 )
 def at_start(evidence: Evidence) -> Iterator[Cause]:
-    """Friction of another size, off or swapped, and contacts left out, by the first steps of the certificate."""
+    """Hypotheses tried on the first accelerations: a pair missing, friction scaled, off or swapped between pairs."""
     element, start = evidence.element, None
     if element.mechanism.contacts:
         start = of_start(evidence, derived=True)

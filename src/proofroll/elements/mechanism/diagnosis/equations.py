@@ -1,8 +1,8 @@
-"""A mechanism's run held against the equations of motion at its own states, without solving them.
+"""Residuals of the equations of motion at the states of a run, without solving the equations.
 
-The accelerations are derived from the run, or are those of the certificate. Put into d'Alembert's principle, what the
-bodies need and what acts on them must balance along every motion that joints and loops allow. That is linear in masses,
-inertias, stiffnesses, damping and gravity, and needs no reaction.
+The accelerations are derived from the run, or taken from the certificate. By d'Alembert's principle inertial and
+applied forces must balance along every motion that joints and loops allow. This balance is linear in masses, inertias,
+stiffnesses, damping and gravity, and needs no reactions.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _DEPENDENT = 1e-7
 _GONE = 1e-9
 _TURNS = 0.1
 _CONSISTENT = 1e-3
-_AT_REST = 1e-9  # of the largest rate of a coordinate
+_AT_REST = 1e-9  # rate that counts as rest, relative to the coordinate's largest
 
 
 @dataclass(frozen=True)
@@ -56,12 +56,12 @@ class MechanismState:
 
 
 class MechanismStates:
-    """A run, or the moment of its certificate, as states of a tree.
+    """States of a mechanism's tree: at samples of a run, or at the instant of its certificate.
 
     Attributes:
         each: the states.
-        consistent: whether the tree allows the bodies' velocities in their poses; where it does not, the
-        reported motion is wrong, and equations would be blamed for it.
+        consistent: True if the tree allows the bodies' velocities in their poses. If not, the reported motion is wrong,
+            and no conclusion about the equations is possible.
     """
 
     def __init__(self, mechanism: Mechanism, placed: Placed, acceleration: FloatArray, which: FloatArray) -> None:
@@ -84,7 +84,7 @@ class MechanismStates:
         return [self.free(state, ()) for state in self.each]
 
     def free(self, state: MechanismState, without: tuple[int, ...]) -> FloatArray:
-        """The same at one state, without some rows of the loops."""
+        """Directions of velocity allowed at one state, (nv, directions), if some rows of loops are left out."""
         rows = self.tree.loop_rows(state.motion)
         C = np.concatenate([np.delete(rows.C, without, axis=0), self._geared])
         if not len(C):
@@ -94,7 +94,7 @@ class MechanismStates:
 
     @cached_property
     def _geared(self) -> FloatArray:
-        """Rows of the couplings on the velocities."""
+        """Rows of the couplings on the velocities, (couplings, nv)."""
         found = np.zeros((len(self.mechanism.couplings), self.mechanism.nv))
         for row, coupling in zip(found, self.mechanism.couplings, strict=True):
             row[self.mechanism.place_of(coupling.joint_b)[1]] = 1.0
@@ -103,7 +103,7 @@ class MechanismStates:
 
     @cached_property
     def v_rates(self) -> list[FloatArray]:
-        """Accelerations of the tree's velocities, at each state."""
+        """Accelerations along the tree's velocities, (nv), at each state."""
         found: list[FloatArray] = []
         for state in self.each:
             J = state.motion.J[:-1].reshape(-1, self.mechanism.nv)
@@ -113,7 +113,11 @@ class MechanismStates:
 
     @cached_property
     def scale(self) -> FloatArray:
-        """Scale of each balance: the largest term of inertia or loads, about all axes of a joint that turns freely."""
+        """Scale of the balance along each velocity, (nv): its largest inertia or load.
+
+        Velocities of a ball joint or free body share one scale, for about an axis of symmetry only round-off may be
+        left.
+        """
         sizes = self._own[:, :2].reshape(-1, self.mechanism.nv)
         largest = np.max(np.abs(sizes), axis=0, initial=0.0)
         for joint, at in zip(self.mechanism.joints, self.mechanism.v_slices, strict=True):
@@ -123,14 +127,14 @@ class MechanismStates:
         return np.where(largest > 1e-9 * np.max(largest), largest, np.max(largest) or 1.0)
 
     def parts(self, change: Change) -> FloatArray:
-        """Inertia, loads and the size of their terms at each state along each velocity of the tree, (states, 3, nv)."""
+        """Inertia, loads and the sum of sizes of their terms, along each velocity at each state, (states, 3, nv)."""
         return np.array([change.balance(self, i) for i in range(len(self.each))])
 
     def left(self, change: Change, without: tuple[int, ...] = ()) -> FloatArray:
-        """Residuals of the balance, relative, along the motions that are allowed.
+        """Relative residuals of the balance along the allowed motions, all states in one vector.
 
-        A change that takes away all of a velocity's inertia and loads balances nothing there: what the mechanism itself
-        leaves is left.
+        Where a change removes all inertia and loads of a velocity, the unchanged mechanism's residual stands there: an
+        empty balance proves nothing.
         """
         found, parts, own = [], self.parts(change), self._own
         gone = np.max(parts[:, 2], axis=0) <= _GONE * np.max(own[:, 2], axis=0)
@@ -142,26 +146,26 @@ class MechanismStates:
 
     @cached_property
     def _own(self) -> FloatArray:
-        """Terms of the mechanism itself."""
+        """Terms of the unchanged mechanism, see :meth:`parts`."""
         return self.parts(Change(self.mechanism))
 
 
 @dataclass(frozen=True)
 class Change:
-    """Numbers with which an engine may move a mechanism, where they are not its own.
+    """Changed numbers of a mechanism with which an engine may move it.
 
     Attributes:
         mechanism: bodies and joints.
         mass, com, inertia: of the bodies; None: the mechanism's.
         gravity: [m/s²].
-        damping, stiffness, torque, armature: factors on those of the joints, or, ``added``, further ones by velocity.
+        damping, stiffness, torque, armature: factors on those of the joints.
         springs, spring_damping: factors on stiffness and damping of the springs.
-        weight_at_origin: whether weights act at the origins of the bodies' frames.
-        added: further damping by velocity of the tree, and further armature.
-        friction: factor on the dry friction of the joints, which move.
-        effort: of an actuator at a time, a coordinate and a rate.
+        weight_at_origin: True if weights act at the origins of the bodies' frames.
+        added_damping, added_armature: additional damping and armature along each velocity of the tree, (nv).
+        friction: factor on the dry friction of moving joints.
+        effort: effort of an actuator as a function of itself, time, coordinate and rate.
         gyroscopic: factor on ω × I ω.
-        coupling: pairs of velocities that lose their term of the mass matrix.
+        coupling: mask of entries of the mass matrix that are lost, (nv, nv).
     """
 
     mechanism: Mechanism
@@ -184,7 +188,7 @@ class Change:
     coupling: FloatArray | None = None
 
     def balance(self, states: MechanismStates, i: int) -> FloatArray:
-        """Inertia forces, applied forces, and the size of all their terms, along each velocity of the tree."""
+        """Inertial forces, applied forces, and the sum of sizes of their terms, along each velocity, (3, nv)."""
         m, state, mechanism = states.mechanism, states.each[i], self.mechanism
         motion, n = state.motion, len(m.bodies)
         mass = np.array([b.mass for b in mechanism.bodies]) if self.mass is None else self.mass
@@ -239,7 +243,7 @@ class Change:
 
 
 def placed_of(mechanism: Mechanism, dataset: Any) -> Placed:
-    """The bodies of a run."""
+    """Motion of the bodies of a run."""
     parts = (dataset[name].to_numpy() for name in ("p_WB", "v_WB", "w_WB", "q_WB"))
     return Placed(mechanism, dataset["time"].to_numpy(), *parts)
 
@@ -253,7 +257,7 @@ def is_motion(dataset: Any) -> bool:
 
 
 def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
-    """Mode of the laws that switch at each sample: friction, stops, efforts with a limit, stretches of tables."""
+    """Mode of the switching laws at each sample: friction and stops, limited efforts, sections of tables."""
     corners = np.array(breaks(mechanism.signals))
     found: list[tuple[object, ...]] = []
     joints = switched_joints(mechanism)
@@ -274,15 +278,15 @@ def _modes(mechanism: Mechanism, placed: Placed) -> list[tuple[object, ...]]:
 
 
 def _moves(mode: tuple[object, ...]) -> bool:
-    """True if each joint that may be held moves, and lies at no stop."""
+    """True if every switched joint moves and is away from its stops."""
     rest: Any = mode[0]
     return all(direction and inside for direction, inside in rest)
 
 
 def stretch(mechanism: Mechanism, *datasets: Any) -> slice | None:
-    """The longest stretch of samples in which no run has a switch, and no joint is held.
+    """Longest stretch of samples in which no run switches and no joint is held.
 
-    None: too few samples, or not all of them are numbers.
+    None: there are too few samples, or a run has values that are not finite.
     """
     if not all(is_motion(dataset) for dataset in datasets):
         return None
@@ -295,17 +299,17 @@ def stretch(mechanism: Mechanism, *datasets: Any) -> slice | None:
 
 
 def _fit(part: slice) -> tuple[int, int] | None:
-    """Degree of the splines through a stretch, and samples left out at each end; None: it is too short."""
+    """Degree of the splines through a stretch, and samples to leave out at each end; None: it is too short."""
     return next(((degree, ends) for degree, ends in _FITS if part.stop - part.start > degree + 2 * ends), None)
 
 
 def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
-    """The states of a run in a stretch, away from its ends."""
+    """States of a run at some samples of a stretch, away from its ends."""
     placed = placed_of(mechanism, dataset)
     twists = np.concatenate([placed.v_WB, placed.w_WB], axis=-1)
     acceleration = np.zeros_like(twists)
     time, fit = placed.time[part], _fit(part)
-    assert fit is not None  # a stretch has one
+    assert fit is not None  # :func:`stretch` returns only stretches that are long enough
     degree, ends = fit
     acceleration[part] = make_interp_spline(time, twists[part], k=degree).derivative()(time)
     which = np.unique(np.linspace(part.start + ends, part.stop - 1 - ends, _SAMPLES).astype(int))
@@ -313,9 +317,9 @@ def of_run(mechanism: Mechanism, dataset: Any, part: slice) -> MechanismStates:
 
 
 def of_start(evidence: Evidence, derived: bool = False) -> MechanismStates | None:
-    """The start with the accelerations of the certificate; None: it does not say them.
+    """State at the start with the accelerations of the certificate; None if it has none, or a joint is held.
 
-    Those of the first steps alone if ``derived``, else where the engine does not say its own.
+    Accelerations are those that the engine reports, or else those of its first steps; if ``derived``, only the latter.
     """
     element = evidence.element
     if not _moves(_modes(element.mechanism, element.start)[0]):

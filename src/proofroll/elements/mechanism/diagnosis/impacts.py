@@ -1,4 +1,4 @@
-"""Hypotheses of impacts: they come late, or with the restitution of another pair."""
+"""Hypotheses of impacts: they come late, or have the restitution of another pair."""
 
 import itertools
 from collections.abc import Iterator
@@ -10,9 +10,10 @@ from proofroll.core.diagnosis.clocks import said_delay
 from proofroll.core.diagnosis.fitting import change_by, said_factor
 from proofroll.elements.mechanism.diagnosis.contacts import SeenContact, contact_cause, touch_of
 
-_DELAY, _RATIO = 0.05, 1e-3  # steps, and restitution, that are as they should be
+_DELAY, _RATIO = 0.05, 1e-3  # largest delay, in steps, and error of restitution that count as none
 _REAL = 1e-9  # imaginary part of a real root, in intervals of samples
-# A gap with a cubic part misses its parabola by m one interval T back, by 5 m one interval ahead, its rate by 12 m / T.
+# If a gap has a cubic term, and its parabola misses by m one interval T back, it misses by 5 m one interval ahead, and
+# its rate there by 12 m / T.
 _OFF, _OFF_RATE = 5.0, 12.0
 
 
@@ -20,7 +21,7 @@ _OFF, _OFF_RATE = 5.0, 12.0
     "impacts", "flights before and after an impact, extended to where they meet, tell its time and its restitution"
 )
 def impacts(evidence: Evidence) -> Iterator[Cause]:
-    """Impacts that come late, or with the restitution of another pair."""
+    """Hypotheses: impacts come late, or with the restitution of another pair."""
     for touch in touch_of(evidence):
         law = [contact.restitution for contact in touch.mechanism.contacts]
         names = [contact.name for contact in touch.mechanism.contacts]
@@ -57,9 +58,9 @@ def impacts(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _met(touch: SeenContact, c: int) -> Iterator[tuple[float, float, float, float]]:
-    """Delay [s] and restitution of each impact of a contact between two flights, each with its error bar.
+    """Delay [s] and its error bar, restitution and its error bar, of each impact of a contact between two flights.
 
-    A flight is a parabola through two samples; its misfit at the further one is that of a gap that is none.
+    A flight is a parabola through two samples; its misfit at a third sample gives the error bars.
     """
     t, gap, rate, free = touch.time, touch.found.gap[:, c], touch.u_n[:, c], ~touch.presses[:, c]
     for k in range(1, len(t) - 2):

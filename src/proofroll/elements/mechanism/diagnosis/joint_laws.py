@@ -1,4 +1,4 @@
-"""Hypotheses that an engine has other gains, gears and limits of actuators, other couplings, or other stops."""
+"""Hypotheses of wrong gains, gears and limits of actuators, wrong couplings, and misplaced stops."""
 
 from collections.abc import Callable, Iterator
 
@@ -16,13 +16,13 @@ from proofroll.elements.mechanism.signal import value_at
 Effort = Callable[[Actuator, float, float, float], float]
 _COVERS = ("motion", *COVERED, "effort")
 _STILL = 1e-9
-_AT_STOP = 1e-3  # of the way of a joint: where parabolas through samples turn back at its stop
-# A velocity that changes by so many times what it does before and after jumps.
+_AT_STOP = 1e-3  # largest distance from a stop of rebounds found by parabolas, relative to the joint's range
+# Least change of velocity between two samples, relative to the changes before and after, that counts as a jump.
 _JUMPS = 5.0
 
 
 def _effort(kp: float = 1.0, kd: float = 1.0, gear: float = 1.0, limit: float = 1.0, clamps: str = "sum") -> Effort:
-    """Effort of actuators with factors on their numbers; ``clamps`` the sum, the part of kp, the motor, or nothing."""
+    """Effort of actuators with factors on their numbers, clamped in sum, in kp's part, at the motor, or not at all."""
 
     def effort(a: Actuator, t: float, q: float, v: float) -> float:
         n, target, bound = gear * a.gear, float(value_at(a.target, t)), limit * a.bound
@@ -38,7 +38,7 @@ def _effort(kp: float = 1.0, kd: float = 1.0, gear: float = 1.0, limit: float = 
 
 
 def _swapped(a: Actuator, t: float, q: float, v: float) -> float:
-    """Effort with kp and kd exchanged."""
+    """Effort of an actuator with kp and kd exchanged."""
     if a.kind != "position" or not a.kd:
         return a.effort(t, q, v)
     return _effort(kp=a.kd / a.kp, kd=a.kp / a.kd)(a, t, q, v)
@@ -48,7 +48,7 @@ def _swapped(a: Actuator, t: float, q: float, v: float) -> float:
     "actuators", "the equations of motion balance at every state of the run with that law, and not with the scene's"
 )
 def of_actuators(evidence: Evidence) -> Iterator[Cause]:
-    """Gains, gears and limits of all actuators."""
+    """Hypotheses: gains, gears and limits of all actuators."""
     mechanism = evidence.element.mechanism
     actuators = mechanism.actuators
     limited = any(item.limit is not None for item in actuators)
@@ -100,7 +100,10 @@ def _geared(actuators: tuple[Actuator, ...]) -> bool:
 
 @hypothesis("couplings", "the rates of both joints have one ratio at every sample, which is not the scene's")
 def of_couplings(evidence: Evidence) -> Iterator[Cause]:
-    """Wrong ratio of a coupling: fitted to a run; at the start the nearest of those that known mistakes give."""
+    """Hypothesis: a coupling has a wrong ratio.
+
+    The ratio is fitted to a run; from the start alone it is chosen among the ratios that known mistakes give.
+    """
     mechanism, found = evidence.element.mechanism, both(evidence)
     if not mechanism.couplings:
         return
@@ -131,9 +134,10 @@ def of_couplings(evidence: Evidence) -> Iterator[Cause]:
     "stops", "the engine's joint rests at one other place than at the true stop, or turns back at one each time"
 )
 def of_stops(evidence: Evidence) -> Iterator[Cause]:
-    """Another place of a stop, by where the joint rests, or by where it rebounds if the true joint does at its stop.
+    """Hypothesis: a stop is misplaced.
 
-    Other things turn joints back, too: contacts of bodies, other stops.
+    Its place is where the joint rests, or where it rebounds. The latter counts only if the true joint rebounds at its
+    stop, for contacts of bodies and other stops turn joints back, too.
     """
     mechanism, found = evidence.element.mechanism, both(evidence)
     if found is None or not is_motion(found[0]) or not any(joint.limits for joint in mechanism.joints):
@@ -165,9 +169,9 @@ def of_stops(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _rebounds(t: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
-    """Places where a coordinate turns back at once between two samples, and the sign of its velocity after, (n, 2).
+    """Places where a coordinate rebounds between two samples, and the sign of its velocity after that, (n, 2).
 
-    Parabolas through the samples before and after, with the accelerations there, meet at the place.
+    The parabolas through the samples before and after the rebound meet at the place.
     """
     from scipy.optimize import brentq
 

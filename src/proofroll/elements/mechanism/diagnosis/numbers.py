@@ -1,4 +1,4 @@
-"""Hypotheses that numbers of bodies, joints or springs are others in the engine: of all of a kind, or of one."""
+"""Hypotheses of wrong numbers: one factor on a number of all bodies, joints or springs, or of one of them."""
 
 import itertools
 from collections.abc import Callable, Iterator
@@ -23,9 +23,15 @@ def factor_of_all(
     remedy: str,
     signed: bool = True,
 ) -> Hypothesis:
-    """Hypothesis: a number of all bodies or joints has one factor on it in the engine, if the mechanism has it.
+    """Hypothesis that the engine moves all bodies or joints with one factor on a number.
 
-    ``signed``: whether its sign can be mistaken; nothing has a negative mass.
+    Args:
+        name: of the hypothesis.
+        what: the number, in the words of the cause.
+        change: of a mechanism, for a factor.
+        has: True if a mechanism has the number at all.
+        remedy: what to do.
+        signed: True if the number may have the wrong sign, as a mass cannot.
     """
 
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
@@ -49,7 +55,7 @@ def _masses(mechanism: Mechanism, x: float) -> Change:
 
 
 def _of_joints(name: str, law: str, what: str, give: str) -> Hypothesis:
-    """Hypothesis: a law of all joints has one factor; only its armature, an inertia, cannot have the wrong sign."""
+    """Hypothesis of one factor on a law of all joints; an armature, being an inertia, cannot have the wrong sign."""
     return factor_of_all(
         name,
         f"the {what} of the joints",
@@ -115,7 +121,7 @@ FACTORS_OF_ALL: tuple[Any, ...] = (
 
 @hypothesis("body", "as for all bodies, for one")
 def of_each_body(evidence: Evidence) -> Iterator[Cause]:
-    """A number of one body times a factor."""
+    """Hypotheses on one body: a factor on its mass or inertia, inertia in other axes or about another point."""
     mechanism = evidence.element.mechanism
     mass = np.array([body.mass for body in mechanism.bodies])
     inertia, com = (np.array([getattr(body, key) for body in mechanism.bodies]) for key in ("inertia", "com"))
@@ -141,7 +147,7 @@ def of_each_body(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _reordered(held: Residuals[Change], mechanism: Mechanism, inertia: FloatArray) -> Iterator[Cause]:
-    """Moments of inertia along other axes, and products of inertia with the other sign."""
+    """Hypotheses: moments of inertia along other axes, products of inertia with the wrong sign."""
     remedy = "look at the order of moments and products of inertia, and at the sign of the products"
     for order in list(itertools.permutations(range(3)))[1:]:
         changed = inertia[:, order][:, :, order]
@@ -157,7 +163,7 @@ def _reordered(held: Residuals[Change], mechanism: Mechanism, inertia: FloatArra
 def _about_origin(
     held: Residuals[Change], mechanism: Mechanism, mass: FloatArray, com: FloatArray, inertia: FloatArray
 ) -> Iterator[Cause]:
-    """Steiner's part once too often or once too few, and centres of mass forgotten."""
+    """Hypotheses: Steiner's part added once too often or too few, centres of mass ignored."""
     steiner = mass[:, None, None] * (
         np.einsum("ni,ni->n", com, com)[:, None, None] * np.eye(3) - com[:, :, None] * com[:, None, :]
     )
@@ -178,10 +184,10 @@ def _about_origin(
 
 @hypothesis("joint", "the equations are linear in it: one coefficient balances them at every state of the run")
 def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
-    """Damping or armature in one joint or in all, that the scene does not have.
+    """Hypothesis: one joint, or every joint, has additional damping or armature.
 
-    Coarse steps have them, too: an armature, or a damping times the natural time, counts against the inertia that the
-    joint moves at the start.
+    Coarse steps cause the same: the size of the change is the armature, or damping times natural time, relative to the
+    inertia that the joint moves at the start.
     """
     mechanism = evidence.element.mechanism
     equations = JointCoordinates(mechanism)

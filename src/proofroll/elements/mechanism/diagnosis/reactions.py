@@ -1,6 +1,6 @@
 """Hypotheses of wrongly reported reactions: other body, joint, point or axes.
 
-In a loop not every component is determined; the others are left out, by components in the world.
+Components in the world that a loop leaves undetermined are not compared.
 """
 
 from collections.abc import Iterator, Mapping
@@ -20,9 +20,9 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.placed import Placed
 from proofroll.elements.mechanism.rotations import skews
 
-# Joints of which nothing can be compared are so many sizes of the forces apart.
+# Distance of joints without any comparable components, in sizes of the forces: they are matched last.
 _FAR = 1e3
-# Reactions that differ by this part of the difference to be explained are the same.
+# Largest difference of equal reactions, relative to the difference to be explained.
 _SAME = 1e-2
 PARENT = "the axes of the parent body"
 _KINDS = (
@@ -33,13 +33,13 @@ _KINDS = (
 
 @dataclass(frozen=True)
 class Reactions:
-    """Forces or moments of all joints and loops, reported and true.
+    """Forces or moments of joints and loops, reported and true.
 
     Attributes:
-        reported: those of the connections that are known on both sides, shape (time, connections, 3).
+        reported: of the connections with values on both sides, shape (time, connections, 3).
         which: their indices among the mechanism's connections.
         placed: the bodies at these times.
-        force: the true forces of the same connections.
+        force: the true forces of the same connections [N].
     """
 
     reported: Reported
@@ -53,7 +53,7 @@ class Reactions:
         return self.placed.mechanism
 
     def causes(self, step: float | None) -> Iterator[Cause]:
-        """Possible causes of wrong reactions."""
+        """Possible causes of wrong reactions; none if they do not differ."""
         if self.reported.differs:
             yield from self.reported.causes(step)
             yield from self._of_other_joints()
@@ -62,15 +62,15 @@ class Reactions:
 
     def _of_other_joints(self) -> Iterator[Cause]:
         """Hypothesis: reactions are reported at other joints than their own."""
-        said, true = self.reported.said, self.reported.true
-        off = np.abs(said[:, :, None] - true[:, None])
+        given, true = self.reported.said, self.reported.true
+        off = np.abs(given[:, :, None] - true[:, None])
         shared = np.any(np.isfinite(off), axis=(0, 3))
         distance = np.where(shared, np.max(np.nan_to_num(off), axis=(0, 3)), np.inf)
         order = linear_sum_assignment(np.minimum(distance, _FAR * self.reported.size))[1].tolist()
         if order == list(range(len(order))):
             return
         names = [self.mechanism.connections[k].name for k in self.which]
-        sure = np.sum(distance <= _SAME * self.reported.before, axis=1) == 1  # two joints may carry the same
+        sure = np.sum(distance <= _SAME * self.reported.before, axis=1) == 1  # two joints may carry equal reactions
         moves = [(i, j) for i, j in enumerate(order) if i != j and sure[i]]
         moved = "; ".join(f"at {names[i]} stands that of {names[j]}" for i, j in moves)
         says = f"the {self.reported.name} is of another joint{': ' if moved else ''}{moved}"
@@ -95,7 +95,10 @@ def _reactions(
     true: Mapping[str, FloatArray],
     bars: Mapping[str, float],
 ) -> Iterator[Reactions]:
-    """Forces and moments, of shape (time, connections, 3), of the connections with known values."""
+    """Reported and true forces, then moments, of the connections with known values.
+
+    ``said`` and ``true``: by kind, shape (time, connections, 3); ``bars``: error bar of the truth, by kind.
+    """
     element = evidence.element
     ends = element.mechanism.connections
     bodies = element.mechanism.body_index
@@ -121,7 +124,7 @@ def _reactions(
     "the true wrench on the child at the joint with another sign, frame, point, joint or time is what is said",
 )
 def reactions(evidence: Evidence) -> Iterator[Cause]:
-    """Forces and moments of joints and loops along the run, as far as they are determined."""
+    """Hypotheses on forces and moments of joints and loops along the run, where they are determinate."""
     found = both(evidence)
     if found is None:
         return
@@ -138,7 +141,7 @@ def reactions(evidence: Evidence) -> Iterator[Cause]:
     "reactions at time 0", "as along the run, for the forces and moments of the certificate, if nothing else differs"
 )
 def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """Forces and moments at time 0."""
+    """Hypotheses on forces and moments at time 0."""
     lines = {str(line["quantity"]): line for line in evidence.lines}
     if {name for name, line in lines.items() if not line["holds"]} - {"forces", "torques"}:
         return
@@ -156,7 +159,7 @@ def reactions_at_start(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _stacked(data: Any, kind: str, names: list[str]) -> FloatArray:
-    """Shape (time, connections, 3); NaN where it is not said or not determined."""
+    """Components of a kind of reaction, (time, connections, 3); NaN where not reported or not determinate."""
     empty = np.full(data.sizes["time"], np.nan)
     rows = [
         [data[f"{kind}.{name}.{a}"].to_numpy() if f"{kind}.{name}.{a}" in data else empty for a in "xyz"]

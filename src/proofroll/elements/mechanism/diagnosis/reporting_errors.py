@@ -1,4 +1,4 @@
-"""Hypotheses about what an engine says of its bodies: frames, points, signs and times of its samples."""
+"""Hypotheses of wrongly reported motion: frames, points, signs and times of an engine's samples."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _UNITS = {
 
 
 def _state(element: Any, data: xr.Dataset) -> FloatArray:
-    """Poses and twists of all bodies, by the mechanism's own length and time [m]."""
+    """Poses and twists of all bodies, each scaled to a length by the mechanism's own length and time [m]."""
     length, T = element.length, element.natural_time
     parts = [data["p_WB"], data["v_WB"] * T, data["w_WB"] * (length * T), data["q_WB"] * length]
     return np.concatenate(parts, axis=-1)
@@ -57,7 +57,7 @@ def _of_centres(told: Reported, evidence: Evidence) -> Iterator[Cause]:
     "the scene's own vectors at time 0, of the centres of mass, are those of the certificate",
 )
 def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """Positions, velocities or accelerations at time 0 are those of the centres of mass; nothing else differs."""
+    """Hypothesis: vectors at time 0 are those of the centres of mass, and nothing else differs."""
     element, wrong = evidence.element, {line["quantity"]: line for line in differing(evidence.lines)}
     com, start = np.array([body.com for body in element.mechanism.bodies]), element.start
     w, turning = start.w_WB[0], element.first_motion.angular_acceleration
@@ -78,7 +78,7 @@ def centres_at_start(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _size(element: Any, name: str) -> float:
-    """Scale of a quantity of a mechanism, from its length and natural time."""
+    """Natural size of a quantity of a mechanism, from its length and natural time."""
     length, time = element.length, element.natural_time
     return float({"p_WB": length, "v_WB": length / time, "w_WB": 1 / time}[name])
 

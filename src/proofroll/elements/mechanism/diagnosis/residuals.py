@@ -1,4 +1,4 @@
-"""Residuals of other models of a mechanism: against its certificate, if that differs, and the states of its run."""
+"""Residuals of the equations of motion for changed models of a mechanism, at its certificate and along its run."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -13,29 +13,29 @@ from proofroll.core.diagnosis.lines import differing
 from proofroll.core.first_steps import OF_FIRST_STEPS
 from proofroll.elements.mechanism.diagnosis.equations import Change, MechanismStates, of_run, of_start, stretch
 
-# Equations that the true run leaves more of, relative, tell nothing.
+# Equations with a larger relative residual for the true run prove nothing.
 _TELLS = 1e-4
 COVERED = ("p_WB", "v_WB", "w_WB", "q_WB", "force", "torque")
-# Quantities of the certificate that follow from how the mechanism moves.
+# Quantities of the certificate that follow from the motion.
 _FOLLOWS = {f"{turning}acceleration{when}" for turning in ("", "angular ") for when in ("", OF_FIRST_STEPS)}
 
 
-# Where the start itself is another, its accelerations are.
+# If these differ, the start itself differs, and so do its accelerations.
 _STATE = {"position", "orientation", "velocity", "spin"}
-# What an engine is given, and may say to hold though it does not.
+# Numbers that an engine is given; it may report them correctly and yet move with others.
 GIVEN = (
     "mass", "centre of mass", "inertia", "gravity", "joint positions", "joint axes",
     "gaps", "normals of contact", "places of contact", "friction of contacts", "restitution of contacts",
 )  # fmt: skip
-# The start is known so many times as badly as its first steps show.
+# Error of the accelerations at the start, in imbalances of the first steps.
 _KNOWN = 10.0
 
 
 @once
 def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
-    """The start by the certificate, if its accelerations differ; the run, if it does not balance as the truth.
+    """Residuals at the start if its accelerations differ, and along the run if it balances worse than the truth.
 
-    Nothing where the certificate names a number that was built otherwise: that is the cause.
+    Nothing if the certificate shows a number that was built wrongly: that is the cause.
     """
     mechanism = evidence.element.mechanism
     plain = Change(mechanism)
@@ -54,7 +54,7 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
     if not seen.consistent:
         return
     own = np.abs(true.left(plain))
-    tells = own < _TELLS  # of a body that spins freely about its axis nothing is left to balance but round-off
+    tells = own < _TELLS  # e.g. the free spin of a body about its axis leaves only round-off to balance
     at = np.abs(seen.left(plain))
     if at.shape != own.shape or not tells.any():
         return
@@ -70,13 +70,13 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Change]]:
 
 
 def balanced_at_start(start: MechanismStates) -> Residuals[Change]:
-    """The balance at time 0, of the accelerations that the certificate tells."""
+    """Residuals at time 0, for the accelerations of the certificate."""
     before = float(np.max(np.abs(start.left(Change(start.mechanism))), initial=0.0))
     return _held(start, "at time 0", before, 1e3 * CLOSES_EXACTLY)
 
 
 def _doubt(evidence: Evidence, start: MechanismStates | None) -> float:
-    """Imbalance of the first steps by themselves, or the tolerance of their lines if that is larger."""
+    """Imbalance of the first steps for the unchanged mechanism, or the tolerance of their lines if that is larger."""
     if start is None:
         return 0.0
     allowed = [float(line["tolerance"]) for line in evidence.lines if str(line["quantity"]).endswith(OF_FIRST_STEPS)]
@@ -102,7 +102,7 @@ def _held(
 
 
 def _others(plain: Change) -> list[Change]:
-    """One number each: gravity, masses and inertias of the bodies, armature and damping of the joints."""
+    """Changes of one number each: gravity, masses and inertias of bodies, armature and damping of joints."""
     mechanism = plain.mechanism
     mass = np.array([body.mass for body in mechanism.bodies])
     inertia = np.array([body.inertia for body in mechanism.bodies])
@@ -115,9 +115,9 @@ def _others(plain: Change) -> list[Change]:
 
 
 def best(held: Residuals[Change], change: Callable[[float], Change]) -> tuple[float, int]:
-    """The factor that balances a linear equation, and how many numbers were fitted: none if it is a known one.
+    """Factor that balances an equation linear in it, and number of fitted values: 0 if the factor is a known one.
 
-    Where there is one equation, any factor would do, and only those that mistakes make are looked at.
+    With a single equation any factor would fit, so that only factors of known mistakes are tried.
     """
     at = held.left(change(1.0))
     slope = held.left(change(2.0)) - at

@@ -1,4 +1,4 @@
-"""Hypotheses that an engine gives a joint another axis, or loses terms between bodies, or rows of loops."""
+"""Hypotheses of structure: another axis of a joint, lost terms between bodies, missing rows of loops."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
@@ -28,7 +28,7 @@ _OF_AXES = {
 
 @hypothesis("joint axis", "seen from the parent, the child turns about one direction throughout, which is not the axis")
 def other_axis(evidence: Evidence) -> Iterator[Cause]:
-    """A joint turns about another axis than the scene's."""
+    """Hypothesis: a joint turns about another axis than the scene's."""
     mechanism = evidence.element.mechanism
     yield from _axes_at_start(evidence)
     found = both(evidence)
@@ -54,7 +54,7 @@ def other_axis(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis: FloatArray) -> bool:
-    """True if the poses turn about the one axis and not about the other: a spin alone may be reported wrongly."""
+    """True if the poses turn about ``own`` and not about ``axis``, so that not only the spin is reported wrongly."""
     relative = np.swapaxes(placed.R_WB[:, parent], 1, 2) @ placed.R_WB[:, child]
     turns = relative @ relative[0].T
     moved, unmoved = (float(np.max(np.linalg.norm(turns @ n - n, axis=-1))) for n in (own, axis))
@@ -62,7 +62,7 @@ def _turns_about(placed: Placed, parent: int, child: int, own: FloatArray, axis:
 
 
 def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """The axes that the certificate tells, one joint at a time."""
+    """Causes from axes in the certificate that differ from the scene's, one for each joint."""
     line = next((line for line in differing(evidence.lines) if line["quantity"] == "joint axes"), None)
     joints = evidence.element.mechanism.joints
     if line is None or len(line["found"]) != 3 * len(joints):
@@ -81,7 +81,7 @@ def _axes_at_start(evidence: Evidence) -> Iterator[Cause]:
     "the child's first turning tells the axis; a mechanism with that axis has the other accelerations and reactions",
 )
 def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
-    """A joint sets off about another axis than the scene's, in the pose that the scene has."""
+    """Hypothesis: in the scene's pose, a joint starts to turn about another axis than the scene's."""
     lines, element = {str(line["quantity"]): line for line in evidence.lines}, evidence.element
     wrong = {str(line["quantity"]) for line in differing(evidence.lines)}
     turning = lines.get(f"angular acceleration{OF_FIRST_STEPS}")
@@ -125,16 +125,16 @@ def axis_of_first_steps(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _first(element: Any) -> dict[str, FloatArray]:
-    """Lines that follow from a mechanism's axes."""
+    """Expected values of the lines of the certificate that depend on joint axes."""
     found, wrench = element.first_motion, element.first_wrench
-    said = {"acceleration": found.acceleration, "angular acceleration": found.angular_acceleration}
-    return {"forces": wrench[:, :3], "torques": wrench[:, 3:], **said} | {
-        f"{name}{OF_FIRST_STEPS}": values for name, values in said.items()
+    accelerations = {"acceleration": found.acceleration, "angular acceleration": found.angular_acceleration}
+    return {"forces": wrench[:, :3], "torques": wrench[:, 3:], **accelerations} | {
+        f"{name}{OF_FIRST_STEPS}": values for name, values in accelerations.items()
     }
 
 
 def _apart(lines: Mapping[str, Mapping[str, Any]], expected: Mapping[str, FloatArray]) -> FloatArray:
-    """Differences of all that hangs on axes from what is expected, or from the scene, each by its line's tolerance."""
+    """Differences of lines that depend on joint axes, in tolerances: from ``expected``, or else from the scene."""
     parts = [np.zeros(1)]
     for name in sorted(_OF_AXES & lines.keys()):
         line = lines[name]
@@ -148,7 +148,7 @@ def _shown(vector: FloatArray) -> str:
     return ", ".join(f"{x:.4g}" for x in np.round(vector, 9) + 0.0)  # not -0
 
 
-# Part of the mechanism's size from which on a loop is open, and part of inertia and loads that balances.
+# Opening of a broken loop, relative to the mechanism's size, and largest relative residual that counts as balanced.
 _OPEN = 1e-4
 _BALANCED = 1e-3
 
@@ -158,7 +158,7 @@ _BALANCED = 1e-3
     "without the terms that an algorithm loses that expects depth-first order, the equations balance",
 )
 def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
-    """Terms of the mass matrix between a body and one that hangs on it are lost."""
+    """Hypothesis: the mass matrix lacks terms between a body and its descendants."""
     mechanism = evidence.element.mechanism
     pairs = _ancestry(mechanism)
     if not np.any(pairs):
@@ -176,7 +176,7 @@ def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
-    """Mask of pairs of velocities whose joints carry one another, without pairs of one joint, (nv, nv)."""
+    """Mask of pairs of velocities of different joints of which one carries the other, (nv, nv)."""
     above = {joint.child: joint for joint in mechanism.joints}
     slices = dict(zip((joint.name for joint in mechanism.joints), mechanism.v_slices, strict=True))
     found = np.zeros((mechanism.nv, mechanism.nv))
@@ -194,7 +194,7 @@ def _ancestry(mechanism: Mechanism) -> FloatArray:
     "the others allow: nothing pulls it together there, as a stiff spring would",
 )
 def loop_lacks_row(evidence: Evidence) -> Iterator[Cause]:
-    """A loop lacks one or more of its rows."""
+    """Hypothesis: a loop lacks one or more of its rows."""
     mechanism = evidence.element.mechanism
     part = stretch(mechanism, evidence.run) if mechanism.loops and evidence.run is not None else None
     if part is None:

@@ -1,4 +1,4 @@
-"""A mechanism at its start, drawn from its own data: bodies, joints with their laws, loops, springs, tracked points."""
+"""Drawing of a mechanism at its start: bodies, joints with their laws, loops, springs, tracked points."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -11,19 +11,19 @@ from proofroll.elements.mechanism.kinematics import Tree
 from proofroll.elements.mechanism.rotations import frame_of_axis
 from proofroll.report.pen import Drawing, View
 
-_SIZE = 240.0  # of the mechanism in the picture [px]
-_JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of what marks them [px]
+_SIZE = 240.0  # size of the mechanism in the picture [px]
+_JOINT, _MASS, _POINT = 4.0, 2.5, 3.0  # radii of the marks [px]
 _GRAVITY = 44.0  # length of the arrow [px]
 _MOST_NAMES = 12  # of joints and loops: more would cover the drawing
-_OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer of what is not plane, world axes with z up
+_OBLIQUE = (0.45, -0.85, 0.35)  # direction towards the viewer for spatial mechanisms, world axes with z up
 _STROKE = 10.0  # half of the stroke that marks a stop [px]
-_FARTHEST = 10.0  # place of a stop that is drawn, over the mechanism's length, or its angle [rad]
+_FARTHEST = 10.0  # farthest stop that is drawn, relative to the mechanism's length, or its angle [rad]
 _TEETH = 8  # of the zigzag of a spring
 _OUTLINE, _PATCH = 97, 0.6  # points of a shape's outline; half of a plane's patch, over the mechanism's length
 
 
 def drawn(element: MechanismElement) -> Drawing:
-    """The skeleton of a mechanism: from each body's centre of mass a line to all that is fastened to the body."""
+    """Drawing of a mechanism: lines from centres of mass to the fastenings of bodies, and marks of joints and parts."""
     mechanism, start, picture = element.mechanism, element.start, Drawing()
     at = View(*direction(element), _SIZE / _reach(element))
 
@@ -62,7 +62,7 @@ def drawn(element: MechanismElement) -> Drawing:
 
 
 def _reach(element: MechanismElement) -> float:
-    """Length of the mechanism, or of its longest shape [m]."""
+    """Length of the mechanism, or of its longest shape if that is longer [m]."""
     shapes = [shape for contact in element.mechanism.contacts for shape in (contact.shape_a, contact.shape_b)]
     sizes = [
         float(np.linalg.norm(shape.support(axis)[0] - shape.support(-axis)[0]))
@@ -74,7 +74,7 @@ def _reach(element: MechanismElement) -> float:
 
 
 def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
-    """The outline of each shape that may touch, a patch of each plane, and the names of what touches at the start."""
+    """Draws the outline of each shape that may touch, a patch of each plane, and names of closed contacts."""
     mechanism = element.mechanism
     motion = Tree(mechanism).at(*mechanism.start())
     touching, index = touches(mechanism, motion), mechanism.body_index
@@ -103,7 +103,7 @@ def _shapes(picture: Drawing, at: View, element: MechanismElement) -> None:
 
 
 def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
-    """A ring with its name for an actuator, a dashed line for a coupling, a stroke where the child is at a stop."""
+    """Draws a ring and name for an actuator, a dashed line for a coupling, and a stroke where a stop is."""
     mechanism, start = element.mechanism, element.start
 
     def place(name: str) -> FloatArray:
@@ -137,9 +137,9 @@ def _laws(picture: Drawing, at: View, element: MechanismElement) -> None:
 
 
 def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
-    """Towards the viewer, and up in the picture, both in the world.
+    """Unit vectors in the world: towards the viewer, and up in the picture.
 
-    Along the axes of the joints where all are parallel, else obliquely; gravity points down in the picture.
+    The viewer looks along the axes of the joints where all are parallel, else obliquely; gravity points down.
     """
     mechanism = element.mechanism
     axes = [_axis(element, n) for n, joint in enumerate(mechanism.joints) if joint.kind == "revolute"]
@@ -156,7 +156,7 @@ def direction(element: MechanismElement) -> tuple[FloatArray, FloatArray]:
 
 
 def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
-    """A direction for z up, turned to another upward direction."""
+    """A direction given for z up, turned along with z to another upward direction."""
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
     across = np.cross(up, first)
     across /= np.linalg.norm(across)
@@ -164,14 +164,14 @@ def _turned(direction: FloatArray, up: FloatArray) -> FloatArray:
 
 
 def _axis(element: MechanismElement, number: int) -> FloatArray:
-    """The axis of a joint that has one, or of a loop after them, in the world at the start."""
+    """Axis of a joint, or of a loop (numbered after the joints), in the world at the start; z of its frame."""
     connection = element.mechanism.connections[number]
     body = element.mechanism.body_index[connection.a]
     return np.asarray(element.start.R_WB[0, body] @ connection.frame_a[:, 2])
 
 
 def _zigzag(ends: FloatArray) -> FloatArray:
-    """A spring between two places of the picture, shape (2, 2)."""
+    """Zigzag line of a spring between two places of the picture; ``ends`` has shape (2, 2)."""
     along = ends[1] - ends[0]
     across = 5.0 * np.array([-along[1], along[0]]) / (np.linalg.norm(along) or 1.0)
     inner = [ends[0] + (0.15 + 0.7 * (k + 0.5) / _TEETH) * along + (1 if k % 2 else -1) * across for k in range(_TEETH)]
@@ -179,12 +179,12 @@ def _zigzag(ends: FloatArray) -> FloatArray:
 
 
 def _name(picture: Drawing, place: FloatArray, name: str, look: str, beside: tuple[float, float]) -> None:
-    """A name as it stands in files; the pen would take its underscores for indices."""
+    """Writes a name with spaces for underscores, which the pen would turn into indices."""
     picture.text(place, name.replace("_", " "), look, beside)
 
 
 def _gravity(picture: Drawing, at: View, element: MechanismElement) -> None:
-    """The direction of gravity beside the mechanism; nothing where there is none."""
+    """Draws the direction of gravity beside the mechanism; nothing without gravity."""
     gravity = np.array(element.mechanism.gravity)
     if not np.any(gravity):
         return

@@ -25,9 +25,9 @@ _LAWS = {
     MechanismCapability.SATURATION, MechanismCapability.COUPLINGS,
 }  # fmt: skip
 _DRIVES = {MechanismCapability.ACTUATORS, MechanismCapability.SIGNALS}
-# Curves of forces, and of torques, of one case.
+# Largest number of curves of forces, and of torques, of one case.
 _MOST = 8
-# What changes by less than this part of the widest range is a straight line in its figure.
+# Range of a curve, relative to the widest one, below which it is left out as constant.
 _STILL = 1e-6
 
 
@@ -43,12 +43,12 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """True for one mechanism alone."""
+        """True if a mechanism is the scene's only element."""
         return len(scene.elements) == 1 and isinstance(scene.elements[0], MechanismElement)
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """Group of its hardest part: contact, joint laws that switch, loops, springs and drives, or none of them."""
+        """Group of its hardest part: contact, switching joint laws, loops, springs and drives, or none (trees)."""
         needs = the_mechanism(scene).requires
         if needs & _CONTACTS:
             return "contact"
@@ -60,19 +60,19 @@ class MechanismReport(ReportKind):
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
-        """The first case at its start."""
+        """Picture of the first case at its start."""
         from proofroll.elements.mechanism.report.drawing import drawn
 
         return [drawn(the_mechanism(scenes[0])).picture("at the start")], ""
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:
-        """Forces and torques of joints and loops; their arrays are judged as a whole."""
+        """Forces and torques of joints and loops that change most; tables judge their arrays as a whole."""
         return _reactions(the_mechanism(scene), truth)
 
     @staticmethod
     def replay() -> ReplayKind:
-        """Bodies and joints in motion."""
+        """Replay of bodies and joints in motion."""
         from proofroll.elements.mechanism.report.replay import drawn, seen
         from proofroll.report.replay.records import ReplayKind
 

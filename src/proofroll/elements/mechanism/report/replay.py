@@ -1,4 +1,4 @@
-"""Mechanisms in the replay: bodies as rods, their joints, springs and tracked points, and what the joints transmit."""
+"""Replay of a mechanism: bodies as rods, joints, springs, tracked points, and forces of joints and contacts."""
 
 import dataclasses
 import itertools
@@ -25,16 +25,16 @@ from proofroll.report.labels import symbol, unit
 from proofroll.report.replay.records import SPEEDS, PackedNumbers, Replayed, some
 from proofroll.report.replay.replay import frame_times, in_sight
 
-# Thickness of what is drawn, and what looks right, as parts of the mechanism's length.
+# Thickness of lines, and largest invisible error, relative to the mechanism's length.
 _SCALE, _SEEN = 0.035, 1e-3
-# A mechanism that is further from the true one than this many lengths has left the picture.
+# Distance from the true mechanism, in lengths, beyond which a run has left the picture.
 _FAR = 20.0
 _PATCH, _FLAT = 0.6, 0.02  # half of a plane's patch over its reach; half thickness of a disc over its radius
-_TURN = 2.0**-14  # to which a quaternion is rounded
-_ROUNDED = 2.0**-17  # to which a length is, as a part of the mechanism's, and a force as a part of the largest
-_LASTS = 4.0  # how long a replay should last at least [s]
-_TAIL = 0.15  # part of the motion that a path shows
-_ASIDE = (0.3, 0.25)  # how far the camera stands aside of the drawing's view, that depth is seen [rad]
+_TURN = 2.0**-14  # rounding of quaternions
+_ROUNDED = 2.0**-17  # rounding of lengths, relative to the mechanism's, and of forces, relative to the largest
+_LASTS = 4.0  # least duration of a replay [s]
+_TAIL = 0.15  # part of the motion over which a path is drawn
+_ASIDE = (0.3, 0.25)  # angles of the camera beside the drawing's view, to show depth [rad]
 _STEEPEST = 1.3  # of the camera above the horizon [rad]
 _MOST_READINGS = 6
 _MOTION = ("time", "p_WB", "v_WB", "w_WB", "q_WB")
@@ -55,7 +55,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
     mechanism, length = element.mechanism, element.length
     bodies, rods = [*element.bodies, WORLD], _rods(element)
     joints = [(each.name, each.b, each.position_b) for each in mechanism.connections if each.kind != "free"]
-    # Of contacts the force on the shape that is no plane, at its middle; what is not determinate is not drawn
+    # The force of a contact is drawn at the middle of the shape that is not a plane; undetermined forces are not drawn.
     touching = [_touching(contact) for contact in mechanism.contacts]
     joints += [
         (contact.name, body, middle) for contact, (body, middle, _) in zip(mechanism.contacts, touching, strict=True)
@@ -122,7 +122,7 @@ def drawn(replayed: Replayed) -> tuple[dict[str, Any], list[int], PackedNumbers]
 
 
 def _rods(element: MechanismElement) -> dict[str, list[list[Vector]]]:
-    """Ends of the rods of each body [m]: from its centre of mass to what is fastened there, and around its vertices."""
+    """Ends of the rods of each body [m]: from its centre of mass to its fastenings, and between its vertices."""
     mechanism = element.mechanism
     rods = {body.name: [[body.com, at] for at in mechanism.fastened[body.name]] for body in mechanism.bodies}
     for body in mechanism.bodies:
@@ -134,7 +134,7 @@ def _rods(element: MechanismElement) -> dict[str, list[list[Vector]]]:
 
 
 def _outline(contact: BodyContact, placed: Placed) -> FloatArray:
-    """Outermost places of a contact's shape that is no plane, along the world's axes, at all frames, shape (n, 3)."""
+    """Outermost points along the world's axes of a contact's shape that is not a plane, at all frames, shape (n, 3)."""
     body, _, sign = _touching(contact)
     shape = contact.shape_a if sign > 0 else contact.shape_b
     assert not isinstance(shape, HalfSpace)
@@ -144,7 +144,7 @@ def _outline(contact: BodyContact, placed: Placed) -> FloatArray:
 
 
 def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
-    """Body of the shape that is no plane, the shape's middle there [m], and the sign of the force on it."""
+    """Body of the shape that is not a plane, its centre in that body's frame [m], and the sign of the force on it."""
     if isinstance(contact.shape_a, HalfSpace):
         assert not isinstance(contact.shape_b, HalfSpace)  # two planes are no contact
         body, shape, sign = contact.body_b, contact.shape_b, -1.0
@@ -155,7 +155,7 @@ def _touching(contact: BodyContact) -> tuple[str, Vector, float]:
 
 
 def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatArray) -> dict[str, Any]:
-    """A shape that may touch: its frame in its body's, and its half sizes [m]; of a plane those of a patch."""
+    """Numbers of a geometry: its frame in its body's frame, and half sizes [m]; a plane is drawn as a patch."""
     at, frame, half = (
         np.array(geometry.position),
         geometry.frame,
@@ -166,10 +166,10 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
     if geometry.kind == "circle":
         half[2] = _FLAT * half[0]
     if geometry.kind == "plane":
-        if geometry.body == WORLD:  # below what moves
+        if geometry.body == WORLD:  # centred below the moving bodies
             middle, n = com.mean(axis=(0, 1)), frame[:, 2]
             at, reach = middle - n * (n @ (middle - at)), element.length + float(np.ptp(com, axis=0).max())
-        else:  # as far as what it meets is at first
+        else:  # as large as the initial distance to the bodies that it may touch
             pairs = [pair.geometries for pair in element.mechanism.pairs if geometry.name in pair.geometries]
             owner = {each.name: element.mechanism.body_index[each.body] for each in element.mechanism.geometries}
             meets = [owner[name] for pair in pairs for name in pair if owner[name] not in {-1, body}]
@@ -180,7 +180,7 @@ def _shape(geometry: Geometry, body: int, element: MechanismElement, com: FloatA
 
 
 def _readings(element: MechanismElement) -> list[tuple[str, str]]:
-    """Name and unit of the values that stand beside the picture: of tracked points, then of joints."""
+    """Name and unit of the values listed beside the picture: of tracked points, then of joints."""
     points = [(f"{point.name}.{axis}", "m") for point in element.mechanism.points for axis in "xyz"]
     units = {"revolute": "rad", "prismatic": "m"}
     joints = [(f"q.{joint.name}", units[joint.kind]) for joint in element.mechanism.joints if joint.kind in units]
@@ -191,19 +191,19 @@ def _camera(element: MechanismElement) -> tuple[float, float]:
     """Angles of the camera about the vertical and above the horizon [rad]."""
     x, y, z = direction(element)[0]
     lift = math.asin(max(-1.0, min(1.0, z))) + (_ASIDE[1] if z < 0.5 else -_ASIDE[1])
-    upright = math.hypot(x, y) < 1e-6  # seen from above
+    upright = math.hypot(x, y) < 1e-6  # the view is from above
     turn = -math.pi / 2 if upright else math.atan2(y, x)
     return turn + _ASIDE[0], max(-_STEEPEST, min(_STEEPEST, lift))
 
 
 def _columns(sampled: dict[str, npt.NDArray[Any]], names: list[str], times: FloatArray) -> FloatArray:
-    """Variables at the frames, 0 where they have no value, shape (n, names)."""
+    """Variables at the frames, 0 where they have no value, shape (frames, names)."""
     columns = [np.interp(times, sampled["time"], np.nan_to_num(sampled[name])) for name in names]
     return np.stack(columns, axis=1) if columns else np.zeros((times.size, 0))
 
 
 def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], times: FloatArray) -> Placed:
-    """A stored motion at the frames that it reaches."""
+    """Motion at the frames, interpolated from stored samples, up to the last sample."""
     grid = sampled["time"]
     if grid.size < 2:  # it ended before its first step
         return Placed(element.mechanism, times[:1], *(sampled[name][:1] for name in _MOTION[1:]))
@@ -217,15 +217,15 @@ def _placed(element: MechanismElement, sampled: dict[str, npt.NDArray[Any]], tim
 
 
 def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -> FloatArray:
-    """Orientations between samples, with as many turns between two of them as the spin says, shape (n, 4)."""
+    """Orientations between samples, with the whole turns that the spin implies, shape (frames, 4)."""
     stored = Rotation.from_quat(q, scalar_first=True)
     turn = (stored[1:] * stored[:-1].inv()).as_rotvec()
-    said = (w[1:] + w[:-1]) / 2 * np.diff(grid)[:, None]
+    spun = (w[1:] + w[:-1]) / 2 * np.diff(grid)[:, None]
     angle = np.linalg.norm(turn, axis=1, keepdims=True)
-    # Where nothing is left of the turn its axis is that of the spin.
-    axis = np.where(angle > 1e-9, turn, said)
+    # Where the turn is a whole number of turns, its axis is that of the spin.
+    axis = np.where(angle > 1e-9, turn, spun)
     axis = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
-    whole = np.round((np.sum(said * axis, axis=1, keepdims=True) - angle) / (2 * np.pi))
+    whole = np.round((np.sum(spun * axis, axis=1, keepdims=True) - angle) / (2 * np.pi))
     turn = turn + 2 * np.pi * whole * axis
     at = np.clip(np.searchsorted(grid, times, side="right") - 1, 0, grid.size - 2)
     part = (times - grid[at]) / np.diff(grid)[at]
@@ -234,7 +234,7 @@ def _turned(grid: FloatArray, q: FloatArray, w: FloatArray, times: FloatArray) -
 
 
 def _reachable(motion: Placed, true: Placed, length: float) -> Placed:
-    """The frames until a mechanism leaves the picture for good, as a motion without bound does."""
+    """Motion cut off where the mechanism leaves the picture for good, as a motion without bound does."""
     count = motion.time.size
     last = in_sight(np.linalg.norm(motion.p_WB - true.p_WB[:count], axis=-1).max(axis=-1) > _FAR * length)
     kept = {name: getattr(motion, name)[:last] for name in ("time", *_MOTION[1:])}
