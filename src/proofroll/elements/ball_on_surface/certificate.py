@@ -1,4 +1,4 @@
-"""Certificate of a ball on a surface, line by line, with the caps on what a model may soften."""
+"""Certificate of a ball on a surface, line by line, with the largest softening accepted of a model."""
 
 import dataclasses
 from collections.abc import Iterable, Mapping
@@ -25,10 +25,11 @@ _LEVER = "a soft contact rolls about a point midway in its depth, and the depth 
 _UNLOADED = "a contact that is not loaded yet lacks the whole force, and no more than that"
 _NUMBER = "a number must stand for friction without bound; whether it is enough, the run tells (another_scene)"
 _DYNAMICS = ("acceleration", "angular acceleration", "N", "F2", "F3")
-# Of a ball that starts slipping.
+# For a ball that starts slipping.
 _LIFTED = Regularised(float("inf"), "a convex cone of friction lifts what slips along it, the more the faster it slips")
-# What a model may soften: quantity -> largest relative difference that any reason explains, and why. What is not here
-# can never be softened: mass, inertia, gravity, radius, position along the wall, a coefficient that the scene gives.
+# Quantities that a model may soften -> largest relative difference that is accepted for any reason, and why. Quantities
+# not listed are never soft: mass, inertia, gravity, radius, position along the wall, a coefficient that the scene
+# gives.
 CAPS: Mapping[str, Regularised] = {
     "gap": Regularised(1.0, _DEEP),
     "gap in the engine": Regularised(1.0, _DEEP),
@@ -39,7 +40,7 @@ CAPS: Mapping[str, Regularised] = {
     **dict.fromkeys(_DYNAMICS, Regularised(1.0, _UNLOADED)),
     **dict.fromkeys(("1 / static friction", "1 / kinetic friction"), Regularised(float("inf"), _NUMBER)),
 }
-# Of what an engine built; of numbers also lists of one.
+# Accepted shapes of what an engine built; a number may also be a list of one.
 _SHAPES = {
     **dict.fromkeys(("gravity", "acceleration", "angular_acceleration"), ((3,),)),
     "inertia": ((3,), (-1,)),  # fewer or more than three differ in a line of their own
@@ -48,17 +49,17 @@ _SHAPES = {
 
 
 def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Line]:
-    """Compares what was built, and the sample at time 0, with the ball on its surface.
+    """Lines that compare what was built, and the sample at time 0, with the ball on its surface.
 
-    Quantities about which the engine is silent have a line that says so, except those that the scene requires it to
-    have, rolling resistance and bounded friction: there silence is a difference.
+    A quantity that the engine does not give has a line without a value. Rolling resistance and bounded friction, if the
+    scene has them, count as different when the engine does not give them.
     """
     require_shapes(built, _SHAPES)
     acceleration, force, turning = _expected(body, built)
     natural = natural_acceleration(body)
     frame = body.surface.frame(body.u0)
     fall = float(np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
-    # A velocity is the sum of that of the contact and what the ball turns, each known to its own rounding.
+    # The scale of velocities takes both terms, the contact's and the ball's rotation, for each has its own round-off.
     wall = wall_velocity(body, body.p0, frame[:, 0])
     turns = body.ball.radius * float(np.linalg.norm(body.w0))
     speed = max(float(np.linalg.norm(body.v0)), float(np.linalg.norm(wall)), turns) or fall or 1.0
@@ -90,9 +91,9 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
         bounded = np.isfinite(expected)
         if bounded:
             compare(name, "1", expected, found, expected or 1.0, required=True)
-        elif found is not None:  # a number that stands for no bound is the closer to it, the larger it is
+        elif found is not None:  # compared by its inverse, which is 0 for unbounded friction
             compare(f"1 / {name}", "1", 0.0, 1 / found if found else np.inf, 1.0)
-    # How far the ball is from the wall is the gap's business; along the wall it stands where the scene puts it.
+    # Position is compared along the wall; distance from the wall is the gap.
     below = body.surface.position(body.surface.locate(sample.p_WB))
     compare("position", "m", body.surface.position(body.u0), below, body.ball.radius)
     compare("gap", "m", body.gap0, body.surface.gap(sample.p_WB), body.ball.radius)
@@ -112,25 +113,27 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
 
 
 def _expected(body: RollingBall, built: BallBuilt) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Acceleration, force and angular acceleration at time 0.
+    """Acceleration, force and angular acceleration expected at time 0, in the world, shape (3,) each.
 
-    At rest the resistance has no direction yet. An engine may apply that of the motion to come, or none until it
-    moves: the one that it means is expected of everything it says.
+    For a ball at rest, rolling resistance has no direction yet. An engine may apply that of the coming motion, or none
+    until the ball moves; the closer one to its acceleration is expected in all three.
     """
-    meant, said = body, built.acceleration
-    if stands(body, body.v0) and said is not None:
+    assumed, reported = body, built.acceleration
+    if stands(body, body.v0) and reported is not None:
         free = dataclasses.replace(body, contact=dataclasses.replace(body.contact, rolling_resistance=0.0))
-        meant = min((body, free), key=lambda one: float(np.linalg.norm(initial_response(one)[0] - said)))
-    return *initial_response(meant), initial_angular_acceleration(meant)
+        assumed = min((body, free), key=lambda one: float(np.linalg.norm(initial_response(one)[0] - reported)))
+    return *initial_response(assumed), initial_angular_acceleration(assumed)
 
 
 def another_scene(lines: Iterable[Mapping[str, Any]], needed: float) -> str | None:
-    """Reason that the engine's model is of another kind than the scene, as one clause; None: it is of the same.
+    """Reason that the engine's model counts as another scene, as one clause; None: it does not.
 
-    A scene without bound on friction is built with a number for it. As long as the motion needs less friction than
-    that, the number changes nothing; where it needs more, the ball slips in the engine and cannot in the scene.
+    A scene with unbounded friction may be built with a finite coefficient. It changes nothing while the motion needs
+    less friction than that; where the motion needs more, the ball slips in the engine though it cannot in the scene.
 
-    The lines are those of a stored certificate (:meth:`Line.as_dict`), ``needed`` the largest |F|/N of the true motion.
+    Args:
+        lines: of a stored certificate (:meth:`Line.as_dict`).
+        needed: largest |F|/N of the true motion.
     """
     for line in lines:
         if line["quantity"] == "1 / static friction" and line["found"] and line["found"][0] * needed > 1:

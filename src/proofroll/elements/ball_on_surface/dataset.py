@@ -14,7 +14,7 @@ from proofroll.elements.ball_on_surface.sampling import BallSample
 
 
 def from_samples(body: RollingBall, times: FloatArray, samples: Sequence[BallSample]) -> Columns:
-    """The variables of a run, from one sample per time [s]; a force missing at time 0 is NaN."""
+    """Variables of a run, from one sample per time [s]; a force missing at time 0 is NaN."""
 
     def stacked(values: list[FloatArray | None]) -> FloatArray | None:
         return None if any(value is None for value in values) else np.asarray(values, dtype=np.float64)
@@ -49,7 +49,7 @@ def columns(
     force: FloatArray | None = None,
     q_WB: FloatArray | None = None,
 ) -> Columns:
-    """Dataset of a ball: all variables that follow from the state and the contact force.
+    """Variables of a ball that follow from its state and the contact force.
 
     Variables: ``p_WB`` [m], ``v_WB`` [m/s], ``w_WB`` [rad/s] with dims (time, xyz), ``q_WB`` (time, wxyz);
     the surface's coordinates (``gamma``, unwrapped, and ``z`` on a cylinder) and their rates; ``omega1..3`` [rad/s],
@@ -83,8 +83,8 @@ def columns(
         put(name, u[:, index], unit, f"surface coordinate {name}")
         period = surface.periods[index]
         if period is not None:
-            said = doubt(times, u[:, index], rates[:, index], period, turn_interval(body))
-            variables[name] = variables[name]._replace(attrs={**variables[name].attrs, **said})
+            warning = doubt(times, u[:, index], rates[:, index], period, turn_interval(body))
+            variables[name] = variables[name]._replace(attrs={**variables[name].attrs, **warning})
         put(f"{name}_rate", rates[:, index], f"{unit}/s", f"rate of {name}")
     for index in range(3):
         put(f"omega{index + 1}", spin[:, index], "rad/s", f"angular velocity about e{index + 1}")
@@ -104,7 +104,7 @@ def columns(
 
 
 def _smallest(variables: Mapping[str, Variable]) -> dict[str, float]:
-    """``smallest_N``, the least normal force at the samples [N], without time 0 (where several engines know none)."""
+    """Attribute ``smallest_N``: least normal force at the samples [N] but time 0, where several engines know none."""
     normal_force = variables["N"][1] if "N" in variables else np.zeros(0)
     return (
         {f"{SMALLEST}N": float(np.min(normal_force[1:] if len(normal_force) > 1 else normal_force))}

@@ -1,4 +1,4 @@
-"""A ball on a surface as an element of a scene: its data, and what the harness asks of it."""
+"""A ball on a surface as an element of a scene: its data, and what the harness calls."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from proofroll.core.certificate import Line
 
-# Part of the speed below which an initial slip is the round-off of rolling.
+# Initial slip, relative to the ball's speed, that counts as round-off of rolling.
 _ROUND_OFF = 1e-12
 
 
@@ -43,7 +43,7 @@ class BallOnSurface:
     """A ball that rolls or slips on a surface. See :class:`proofroll.core.element.Element`.
 
     Attributes:
-        ball, surface, contact, start, gravity: the mechanics.
+        ball, surface, contact, start, gravity: data of the scene.
     """
 
     ball: Ball
@@ -55,7 +55,11 @@ class BallOnSurface:
     sample_type: ClassVar[type[BallSample]] = BallSample
 
     def __post_init__(self) -> None:
-        """Refuses a start without a normal, a slip that nothing brakes, and all but rolling on a wall that moves."""
+        """Checks that the start has a normal, friction brakes an initial slip, and a ball on a moving wall rolls.
+
+        Raises:
+            InputError: one of these does not hold.
+        """
         for name, only in (("mu_static", math.inf), ("rolling_resistance", 0.0)):
             if any(self.surface.wall_rate) and getattr(self.contact, name) != only:
                 advice = f"on a wall that moves a ball only rolls; leave {name} out, or the wall's turning"
@@ -113,7 +117,7 @@ class BallOnSurface:
 
     @cached_property
     def rolling(self) -> RollingBall:
-        """The ball as every engine needs it."""
+        """Ball on its surface in the form that engines use."""
         surface = self.surface.offset(self.ball.radius)
         u0 = np.asarray(self.start.coordinates, dtype=np.float64)
         frame = surface.frame(u0)
@@ -226,7 +230,7 @@ class BallOnSurface:
 
 
 def rolling_ball(scene: Scene) -> RollingBall:
-    """The scene's one ball on its one surface. Raises Refused if there is another element."""
+    """Ball of a scene with one ball on one surface. Raises Refused if the scene has another element."""
     (element,) = scene.elements if len(scene.elements) == 1 else (None,)
     if not isinstance(element, BallOnSurface):
         what = ", ".join(item.name for item in scene.elements)
@@ -235,7 +239,7 @@ def rolling_ball(scene: Scene) -> RollingBall:
 
 
 def changed(scene: Scene, **parts: Any) -> Scene:
-    """The scene with other ``ball``, ``surface``, ``contact``, ``start`` or ``gravity``."""
+    """Copy of a scene with another ``ball``, ``surface``, ``contact``, ``start`` or ``gravity``."""
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)
     return dataclasses.replace(scene, elements=(dataclasses.replace(element, **parts),))

@@ -1,4 +1,4 @@
-"""Events of a ball on a wall: it begins to slip, sticks again, leaves the wall."""
+"""Events of a ball on a wall: begin and end of slip, lift-off, impacts."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ from proofroll.elements.ball_on_surface.sampling import BallSample
 if TYPE_CHECKING:
     import xarray as xr
 
-# Slip begins; it sticks again; the normal force reached zero; an impact; the last of infinitely many impacts.
+# Slip begins; the ball sticks again; the normal force reaches zero; an impact; the last of infinitely many impacts.
 EventKind = Literal["slip", "stick", "lift_off", "bounce", "settle"]
 
-# How long a wall must not press before that is a flight [s]: soft and corrected contacts let a ball hop for less.
+# Shortest time without pressure that counts as a flight [s]: soft and corrected contacts let a ball hop for less.
 _FLIGHT = 0.01
-# Normal force, relative to the natural one, that is round-off or what a solver's tolerance leaves.
+# Normal force, relative to the natural one, that counts as round-off or a solver's tolerance.
 _FAINT = 1e-6
-# A time known to this part of it is told as one number, of six digits.
+# Relative bracket of a time below which a message gives one number, of six digits.
 _TOLD = 1e-6
-# What a ball on the wall goes over to.
+# Events between two states on the wall.
 _SWITCHES = ("slip", "stick")
-# What there is on the wall only.
+# Variables that have a value only on the wall.
 _ON_WALL = ("N", "F2", "F3", "needed_friction", "slip2", "slip3", "slip", "gap")
 
 Key = TypeVar("Key", bound=Hashable)
 
 
 class Watch:
-    """Looks for slip and for lift-off, after which a model that holds the ball is another one than the scene.
+    """Finds slip, and lift-off, which ends a run of a model that holds the ball on the wall.
 
     See :class:`proofroll.core.element_abilities.RunWatch`.
     """
@@ -46,11 +46,11 @@ class Watch:
         self._faint = _FAINT * body.ball.mass * natural_acceleration(body)
 
     def over(self, sample: BallSample) -> bool:
-        """True if the wall pulls."""
+        """True if the wall pulls the ball, which the scene's wall cannot."""
         return self._leaves and self._press(sample) < -self._faint
 
     def conclude(self, times: FloatArray, samples: Sequence[BallSample], located: Sequence[Event] | None) -> SeenInRun:
-        """The events, and how many samples are of the scene."""
+        """Events of the run, number of samples that belong to the scene, and the reason if the run ends early."""
         at, kept, ended = times.tolist(), len(samples), None
         events = list(located or ())
         left = next((event for event in events if event.kind == "lift_off"), None)
@@ -75,16 +75,16 @@ class Watch:
         return SeenInRun(kept, sorted(events, key=lambda event: event.time), ended)
 
     def _press(self, sample: BallSample) -> float:
-        """N [N]; NaN where the engine gives no force."""
+        """Normal force N [N]; NaN where the engine gives no force."""
         if sample.force is None:
             return math.nan
         return float(normal_force(self._body, np.reshape(sample.p_WB, 3), np.reshape(sample.force, 3)))
 
 
 def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events: Sequence[Event]) -> bool:
-    """True if samples stick where the events say slip, or the other way round.
+    """True if samples stick where the events imply slip, or the reverse.
 
-    Only samples that lie in no event's bracket are held against them, and only those before it leaves the wall.
+    Samples inside an event's bracket, and samples after the ball leaves the wall, are not compared.
     """
     switches = [event for event in events if event.kind in _SWITCHES]
     until = min((event.time_low for event in events if event.kind not in _SWITCHES), default=math.inf)
@@ -99,7 +99,7 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
 
 
 def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
-    """Events between two samples [s], one of them sticking and the other slipping."""
+    """Slip and stick events between consecutive samples [s] of which one sticks and the other slips."""
     return [
         Event("stick" if after else "slip", 0.5 * (low + high), low, high)
         for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)
@@ -110,16 +110,16 @@ def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Ev
 def lift_off(times: Sequence[float], N: Sequence[float], faint: float) -> Event | None:
     """Lift-off of the ball between two samples; None: it stays on the wall.
 
-    It has left where the wall would have to pull, or where for a hundredth of a second it does not press.
+    The ball has left where the wall would have to pull, or where it does not press for a hundredth of a second.
 
     Args:
         times: of the samples [s].
-        N: normal force there [N]; that at time 0, which several engines do not know, does not count.
-        faint: normal force that is round-off [N].
+        N: normal force there [N]; that at time 0, which several engines do not know, is ignored.
+        faint: normal force that counts as round-off [N].
     """
     pressed = 0
     for index in range(1, len(times)):
-        if not N[index] <= faint:  # also where nobody knows
+        if not N[index] <= faint:  # also where it is NaN
             pressed = index
         elif N[index] < -faint or times[index] - times[pressed + 1] >= _FLIGHT * (1 - 1e-9):
             low, high = times[pressed], times[pressed + 1]
@@ -135,10 +135,10 @@ def left_at(dataset: xr.Dataset) -> float:
 
 
 def common_span(truth: xr.Dataset, runs: Mapping[Key, xr.Dataset]) -> tuple[xr.Dataset, dict[Key, xr.Dataset]]:
-    """The truth and the runs up to the end of the shortest, and what is on the wall up to the first lift-off of any.
+    """Truth and runs cut to the samples of the shortest run; variables of the wall set to 0 from the first lift-off on.
 
-    A model that holds the ball on the wall ends its run where the ball leaves it. That is no fault where the truth's
-    ball leaves the wall too, no more than one sample later; a run that ends before is left too short, and differs.
+    A model that holds the ball on the wall ends its run where the ball leaves it. This is right if the truth's ball
+    leaves the wall too, at most one sample later. A run that ends earlier is not cut to, and differs.
     """
     leaves, true = left_at(truth), truth["time"].to_numpy()
     if not np.isfinite(leaves):

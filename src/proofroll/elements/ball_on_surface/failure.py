@@ -1,4 +1,4 @@
-"""Signs that a run of a ball on a surface has failed: every threshold with its reason."""
+"""Signs of failure of a run of a ball on a surface; each threshold has its reason."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from proofroll.elements.ball_on_surface.observables import creep
 if TYPE_CHECKING:
     import xarray as xr
 
-# Part of the radius, or of the path's radius of curvature if that is less, by which a ball may be off its wall. The
-# lever of friction and the curvature of the path are then wrong by as much, so nothing accurate is left.
+# Distance from the wall, relative to the radius or to the path's radius of curvature if smaller, that is a failure. The
+# lever of friction and the curvature of the path are then wrong by as much, so that nothing is accurate.
 OFF_SURFACE = 0.1
-# Part of the largest kinetic energy by which the energy may grow. Nothing in a scene drives the ball, so all of it is
-# the engine's; runs that hold 1 % of the path stay far below.
+# Growth of energy that is a failure, relative to the largest kinetic energy. Nothing in a scene drives the ball, so
+# that all growth is the engine's error; runs within 1 % of the path stay far below.
 GAIN = 0.1
-# Part of the initial speed with which a ball may move against the way that it last had, where rolling resistance has
-# to bring it to rest: a fixed step that ends beyond rest leaves the ball some speed, which is no motion yet.
+# Speed against the last heading that is a failure, relative to the initial speed, where rolling resistance must bring
+# the ball to rest: a fixed step that ends beyond rest leaves a small reversed speed, which is no motion yet.
 BACKWARDS = 0.01
-# A path is wrong because of slip where the way slipped while rolling makes up this part of the error or more.
+# Slip explains a wrong path if the distance slipped while rolling is at least this part of the error.
 SLIPPED = 0.5
 
 LEFT, SANK, ENERGY_GAIN = "left the surface", "sank in", "energy gain"
@@ -38,13 +38,13 @@ MEANINGS = {
 
 
 def off_surface(body: RollingBall) -> float:
-    """Allowed distance from the wall, and depth in it [m]."""
+    """Largest allowed distance from the wall, to either side [m]."""
     bend = float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
     return OFF_SURFACE * (min(body.ball.radius, 1 / bend) if bend else body.ball.radius)
 
 
 def largest_kinetic_energy(body: RollingBall, truth: xr.Dataset | None) -> float:
-    """Largest kinetic energy of the start, or of the whole true run [J]."""
+    """Largest kinetic energy of the true run, or without it of the start [J]."""
     m, J = body.ball.mass, body.ball.inertia
     v, w = body.v0[None, :], body.w0[None, :]
     if truth is not None:
@@ -73,7 +73,7 @@ def signs(body: RollingBall, dataset: xr.Dataset, truth: xr.Dataset | None) -> l
 
 
 def heading(v: FloatArray) -> FloatArray:
-    """Directions of velocities, shape (n, 3); where one is below the threshold, that before it."""
+    """Directions of velocities, shape (n, 3); below the threshold of speed, the last direction before it."""
     speeds = np.linalg.norm(v, axis=-1)
     moves = speeds > BACKWARDS * speeds[0]
     last = np.maximum.accumulate(np.where(moves, np.arange(len(v)), 0))
@@ -81,5 +81,5 @@ def heading(v: FloatArray) -> FloatArray:
 
 
 def cause(body: RollingBall, dataset: xr.Dataset, error: float) -> str | None:
-    """Creep, where the way slipped while rolling is a large part of the ``error`` of the last coordinate."""
+    """Creep, if the distance slipped while rolling explains the ``error`` of the last coordinate; else None."""
     return CREEP if creep(dataset) >= SLIPPED * error * body.surface.length_scales[-1] else None

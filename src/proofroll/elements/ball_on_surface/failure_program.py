@@ -1,4 +1,4 @@
-"""The text of the programs: what each is about, the engine's part, the numbers to hold it against, and the check."""
+"""Text of programs that show a failure of a ball: the engine's part, the reference values, the check."""
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def signs(stopped, p, v, w):
 
 
 def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
-    """An engine's part that runs it through proofroll, for failures of code that is at least in part proofroll's."""
+    """Engine's part that runs the engine through proofroll, for failures that involve proofroll's own code."""
     head = "import numpy as np\nfrom proofroll import load_scene, simulate\n"
     head += "from proofroll.elements.ball_on_surface.element import rolling_ball\n\n"
     return (
@@ -61,7 +61,7 @@ def through_proofroll(body: RollingBall, failed: FailedRun) -> str:
 
 
 def program(body: RollingBall, failed: FailedRun, engine: str | None) -> str:
-    """The whole file; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
+    """Text of the program; see :class:`proofroll.core.element_abilities.WritesPrograms`."""
     truth, part = failed.truth, engine if engine is not None else through_proofroll(body, failed)
     generators = body.surface.generators
     along = None if generators is None else generators[-1]

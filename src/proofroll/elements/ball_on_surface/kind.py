@@ -28,7 +28,7 @@ else:
 
 @dataclass(frozen=True)
 class BallTables:
-    """The tables of a scene file that hold balls on surfaces."""
+    """Tables of a scene file that describe balls on surfaces."""
 
     balls: tuple[Ball, ...]
     contacts: tuple[Contact, ...]
@@ -48,7 +48,7 @@ class BallOnSurfaceKind:
 
     @staticmethod
     def read(tables: Mapping[str, Any], gravity: Gravity, numbers: Parameters, where: str) -> Sequence[BallOnSurface]:
-        """One element for each contact, with the ball, the surface and the start that it names."""
+        """Elements of a file: one for each contact, with the ball, the surface and the start that it names."""
         units = BallOnSurfaceKind.units
         filled = {key: numbers.filled(table, f"{where}: {key}", units) for key, table in tables.items()}
         contents = validated(BallTables, filled, where)
@@ -80,7 +80,7 @@ class BallOnSurfaceKind:
 
     @staticmethod
     def conformance_scenes() -> Mapping[str, Scene]:
-        """Scenes in which nothing is zero or symmetric: the smooth motions first, of these the most demanding first."""
+        """Scenes without zero or symmetric values: smooth motions first, the most demanding first among them."""
         from proofroll.files.scene_file import load_scene
 
         cylinder = {"speed": 3.3, "axial_speed": 0.7, "radial_spin": 12.0}
@@ -96,7 +96,7 @@ class BallOnSurfaceKind:
 
     @staticmethod
     def truth_scenes() -> Mapping[str, Scene]:
-        """Turned about the axis, tilted, spinning; slow, fast; through a bowl's bottom; on a wall that moves."""
+        """Scenes turned about the axis, tilted, spinning; slow, fast; through a bowl's bottom; on a moving wall."""
         from proofroll.files.scene_file import load_scene
 
         scenes = BallOnSurfaceKind.conformance_scenes()
@@ -117,7 +117,7 @@ class BallOnSurfaceKind:
 
 
 def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
-    """A scene that starts at the angle ``gamma``, with the axis of its cylinder tilted, both in rad."""
+    """Copy of a scene that starts at the angle ``gamma``, with its cylinder's axis tilted by ``tilt``, both in rad."""
     (element,) = scene.elements
     assert isinstance(element, BallOnSurface)
     start = dataclasses.replace(element.start, coordinates=(gamma, 0.1), **motion)
@@ -125,7 +125,7 @@ def _turned(scene: Scene, gamma: float, tilt: float, **motion: Any) -> Scene:
 
 
 def _check_names(found: BallTables, where: str) -> None:
-    """Raises InputError unless contacts and initial motions name what there is, and no two things share a name."""
+    """Raises InputError unless contacts and starts name balls and surfaces of the file, and all names are unique."""
     balls, surfaces = [ball.name for ball in found.balls], [surface.name for surface in found.surfaces]
     for kind, names in (("balls", balls), ("surfaces", surfaces)):
         for index, name in enumerate(names):

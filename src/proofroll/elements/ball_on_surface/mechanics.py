@@ -1,4 +1,4 @@
-"""Vector formulas of a ball rolling on a surface that hold in every regime and on every surface.
+"""Vector formulas of a ball rolling on a surface, valid on every surface and in every regime.
 
 Signs as in Blajer (2006), with the frame of :mod:`ball_on_surface.surfaces`: the contact point is at ``p_WB + a e1``.
 Array arguments may carry leading dimensions.
@@ -13,9 +13,9 @@ from proofroll.core.arrays import FloatArray, cross
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Declared
 
-# A ball sets off with this part of the speed of a fall by one radius: enough for a direction, too little to matter.
+# Speed of a ball about to move from rest, relative to that of a fall by one radius: it has a direction and no effect.
 _SETTING_OFF = 1e-12
-_PULLS = 1e-9  # of the whole force: a smaller pull is round-off
+_PULLS = 1e-9  # relative to the whole force: a smaller pull is round-off
 
 
 def slip_velocity(radius: float, e1: FloatArray, v_WB: FloatArray, w_WB: FloatArray) -> FloatArray:
@@ -49,11 +49,11 @@ def energy(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray, w_WB: FloatArr
 
 
 def always_pressed(body: RollingBall) -> bool:
-    """True if the wall presses the ball at every place and speed: then nothing can lift it off.
+    """True if the wall presses the ball at every place and speed, so that nothing can lift it off.
 
-    N / m = e1 · g + v · (∂e1/∂p) v: so it is where no normal points against gravity and the wall nowhere bends away.
-    Looked at around the surface's periodic coordinates; along the others it is taken to be the same everywhere. Of a
-    declared surface the whole domain is looked at.
+    N / m = e1 · g + v · (∂e1/∂p) v: this holds if no normal points against gravity and the wall is nowhere convex. It
+    is checked around the surface's periodic coordinates; along the others the surface is taken to be uniform. A
+    declared surface is checked on its whole domain.
     """
     if isinstance(body.surface, Declared):
         u = body.surface.places()
@@ -69,12 +69,12 @@ def always_pressed(body: RollingBall) -> bool:
 
 
 def normal_force(body: RollingBall, p_WB: FloatArray, force: FloatArray) -> FloatArray:
-    """N [N], shape (...), of the wall's force on the ball [N], shape (..., 3)."""
+    """Normal force N [N], shape (...), of the wall's force on the ball [N], shape (..., 3)."""
     return np.asarray(-np.sum(force * body.surface.normal(p_WB), axis=-1))
 
 
 def natural_acceleration(body: RollingBall) -> float:
-    """Scale of accelerations, and times the mass of forces, at time 0: max(g, |p̈|) [m/s²], never zero.
+    """Scale of accelerations at time 0, and times the mass of forces: max(g, |p̈|) [m/s²], never zero.
 
     The certificate's relative differences of acceleration, N, F2 and F3 refer to it.
     """
@@ -83,7 +83,7 @@ def natural_acceleration(body: RollingBall) -> float:
 
 
 def natural_speed(body: RollingBall) -> float:
-    """Natural speed [m/s], never zero: of the centre and of the spin at the start, and of a fall by one radius."""
+    """Natural speed [m/s], never zero: root of the sum of squares of |v0|, a |ω0| and √(a g)."""
     a = body.ball.radius
     parts = np.linalg.norm(body.v0), a * np.linalg.norm(body.w0), math.sqrt(a * float(np.linalg.norm(body.gravity)))
     return math.hypot(*(float(part) for part in parts)) or 1.0
@@ -92,12 +92,13 @@ def natural_speed(body: RollingBall) -> float:
 def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
     """Acceleration of the centre [m/s²] and force of the wall on the ball [N] at time 0, each shape (3,).
 
-    Newton-Euler with rolling without slip, solved for the nine unknowns p̈, ω̇, (N, F2, F3) together; the rows of
-    the last three equations are the constraints differentiated, using the signed distance and its derivatives.
-    Where that needs more friction than there is, the ball begins to slip against it: N is the same, for friction
-    along the wall does not change it. A ball at rest stays so where rolling resistance and friction can hold it. A
-    ball that starts slipping has kinetic friction against its slip, and one off the wall falls, as does one that only a
-    pull would hold there.
+    * Rolling: Newton-Euler for the nine unknowns p̈, ω̇, (N, F2, F3) together; the last three equations are the
+      constraints differentiated, using the signed distance and its derivatives.
+    * Rolling that needs more friction than the bound: the ball begins to slip against it. N is the same, for friction
+      along the wall does not change it.
+    * At rest: the ball stays if rolling resistance and friction can hold it.
+    * A slipping start: kinetic friction against the slip.
+    * Off the wall, or held by nothing but a pull: the ball falls.
     """
     if body.gap0:
         return body.gravity, np.zeros(3)
@@ -121,7 +122,7 @@ def initial_response(body: RollingBall) -> tuple[FloatArray, FloatArray]:
 
 
 def initial_angular_acceleration(body: RollingBall) -> FloatArray:
-    """ω̇ at time 0 in the world [rad/s²], shape (3,): moments of the wall's force and of the resistance, over J."""
+    """Angular acceleration at time 0 in the world [rad/s²], shape (3,): moments of contact and resistance over J."""
     if body.gap0 or (stands(body, body.v0) and stays(body, body.p0)):
         return np.zeros(3)
     _, force = initial_response(body)
@@ -140,7 +141,7 @@ def _slipping_force(body: RollingBall) -> FloatArray:
 
 
 def _way(body: RollingBall) -> FloatArray:
-    """Velocity at time 0 [m/s]; of a ball that rests but will not stay, a tiny one along its coming motion."""
+    """Velocity at time 0 [m/s]; for a ball at rest that will not stay, a tiny one along its coming motion."""
     return setting_off(body, body.p0) if stands(body, body.v0) else body.v0
 
 
@@ -157,8 +158,8 @@ def newton_euler(
     """p̈ [m/s²], ω̇ [rad/s²] and the wall's force on the ball [N] while rolling without slip, each shape (3,).
 
     Unreduced: six equations of motion and three acceleration constraints, in the world frame, with no
-    parametrisation of the surface. A ``force`` [N] and a ``moment`` [N m] may act besides; a ``resistance`` is the
-    moment of another law of rolling resistance for N = 1 [m].
+    parametrisation of the surface. ``force`` [N] and ``moment`` [N m] are additional loads; ``resistance`` replaces the
+    moment of rolling resistance for N = 1 [m].
     """
     a, m, J, f = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact.rolling_resistance
     e1 = body.surface.normal(p_WB)
@@ -186,12 +187,12 @@ def newton_euler(
     return solution[:3], solution[3:6], solution[6:]
 
 
-# Rolling resistance follows the direction of the centre's velocity (Blajer 2006, section 2.4), which does not exist at
-# rest. There it is a bound, as static friction is: a moment of at most f N. What must be held is gravity along it.
+# Rolling resistance has the direction of the centre's velocity (Blajer 2006, section 2.4), which does not exist at
+# rest. There it is a bound, like static friction: a moment of at most f N, which must hold gravity along the wall.
 
 
 def stands(body: RollingBall, v_WB: FloatArray) -> bool:
-    """True if the resistance has no direction: there is one, and the centre's velocity ``v_WB`` [m/s] is zero."""
+    """True if there is rolling resistance without a direction, for the centre's velocity ``v_WB`` [m/s] is zero."""
     return body.contact.rolling_resistance > 0 and not np.any(v_WB)
 
 
@@ -199,13 +200,13 @@ def stays(body: RollingBall, p_WB: FloatArray) -> bool:
     """True if friction and resistance can hold a ball whose centre stands still at ``p_WB`` [m]."""
     pull, press = _pull(body, p_WB)
     strength, contact = float(np.linalg.norm(pull)), body.contact
-    # Unbounded friction holds whatever presses the ball, also nothing: inf times 0 would be NaN.
+    # Unbounded friction holds even without pressure: inf times 0 would be NaN.
     rubs = strength <= contact.mu_static * press if np.isfinite(contact.mu_static) else True
     return bool(press >= 0 and strength * body.ball.radius <= contact.rolling_resistance * press and rubs)
 
 
 def setting_off(body: RollingBall, p_WB: FloatArray) -> FloatArray:
-    """A velocity down the slope at ``p_WB`` [m], too small to matter [m/s], shape (3,): it gives the resistance a way.
+    """Velocity down the slope at ``p_WB`` [m], shape (3,) [m/s]: a direction for the resistance, too small for effects.
 
     Only where the ball does not stay (:func:`stays`).
     """

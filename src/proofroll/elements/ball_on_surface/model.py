@@ -1,4 +1,4 @@
-"""A ball, the surface that it touches, the law of their contact, and how the ball starts."""
+"""A ball, the surface that it touches, the law of their contact, and the ball's start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from proofroll.elements.ball_on_surface.surfaces import Surface
 
 
 class BallCapability(StrEnum):
-    """Needs of a ball on a surface that a formulation may provide; the value is a text for a person."""
+    """Capability that a ball on a surface may need of a formulation; the value is a text for a person."""
 
     ROLLING = "rolling without slip"
     CURVED_SURFACE = "a curved surface"
@@ -32,7 +32,7 @@ class BallCapability(StrEnum):
 ROLLS: frozenset[str] = frozenset(
     {BallCapability.ROLLING, BallCapability.CURVED_SURFACE, BallCapability.ROLLING_RESISTANCE}
 )
-# Of a ball that stays on a wall that stands; impacts and walls that move few formulations have, and say so themselves.
+# Capabilities for a ball that stays on a wall at rest; few formulations have the others, and declare them themselves.
 ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {
     BallCapability.MOVING_WALL,
     BallCapability.IMPACTS,
@@ -42,14 +42,14 @@ ALL_OF_A_BALL: frozenset[str] = frozenset(BallCapability) - {
 
 @dataclass(frozen=True)
 class Ball:
-    """A rigid ball whose central inertia is the same about every axis.
+    """A rigid ball with the same central inertia about every axis.
 
     Attributes:
         name: used by contacts and starts.
         radius: a [m].
         mass: m [kg].
         inertia_ratio: J / (m a²); 2/5 for a homogeneous ball, 2/3 for a thin shell.
-        shape: of the body; there is no other yet.
+        shape: of the body; only ``ball``.
     """
 
     name: str
@@ -70,17 +70,17 @@ class Ball:
 
 @dataclass(frozen=True)
 class Contact:
-    """A ball that rolls on a surface.
+    """Contact law of a ball on a surface.
 
     Attributes:
         body, surface: names of a ball and of the surface that it touches.
         rolling_resistance: f, distance by which the normal force is shifted forward [m].
         mu_static: largest |F|/N while sticking [1]; inf: the ball never slips.
         mu_kinetic: |F|/N while slipping [1].
-        restitution: e: part of its normal velocity with which the ball leaves the wall after an impact [1]; left out:
-            impacts are unknown, and the motion is known only until the ball would land.
+        restitution: e: normal speed after an impact over that before it [1]; left out: impacts are not modelled, and
+            the motion is known only until the ball would land.
         tangential_restitution: e_t: the contact point leaves an impact with -e_t times its velocity along the wall, as
-            far as friction allows [1]; 0 stops it there, 1 turns it back whole.
+            far as friction allows [1]; 0: at rest, 1: fully reversed.
     """
 
     body: str
@@ -111,7 +111,7 @@ class InitialMotion:
 
     Attributes:
         body: name of a ball.
-        coordinates: where on the surface, in its coordinates.
+        coordinates: place on the surface, in the surface's coordinates.
         velocity: of the centre along e2 and e3 [m/s].
         spin: ω1, about the normal e1 [rad/s].
         tangential_spin: ω2 and ω3, about e2 and e3 [rad/s]; left out: those of rolling without slip. Rolling along e2
@@ -136,7 +136,7 @@ class InitialMotion:
 
 @dataclass(frozen=True)
 class RollingBall:
-    """A ball on a surface as every engine needs it: one body, one contact, and where it starts.
+    """A ball on a surface in the form that engines use: one body, one contact, and its start.
 
     Attributes:
         ball: the body.
@@ -175,7 +175,7 @@ class RollingBall:
 
     @cached_property
     def wall_rate(self) -> FloatArray | None:
-        """W: angular velocity of the wall about the world's origin [rad/s], shape (3,); None: it stands."""
+        """Angular velocity W of the wall about the world's origin [rad/s], shape (3,); None: the wall is at rest."""
         return read_only(np.array(self.wall.wall_rate)) if any(self.wall.wall_rate) else None
 
     @property
@@ -190,7 +190,7 @@ class RollingBall:
         mu_kinetic: float | None = None,
         rolling_resistance: float | None = None,
     ) -> RollingBall:
-        """The ball with other contact parameters; μk left out keeps its ratio to μs (1 where both are inf)."""
+        """Copy with other contact parameters; μk left out keeps its ratio to μs (1 if μs is 0 or inf)."""
         contact = self.contact
         if mu_static is not None:
             if mu_kinetic is None:
@@ -202,7 +202,7 @@ class RollingBall:
         return replace(self, contact=contact)
 
     def at_speed(self, speed: float) -> RollingBall:
-        """The ball with another initial speed of its centre [m/s] in the same direction; it rolls, ω1 is unchanged."""
+        """Copy with another initial speed of the centre [m/s], the same direction and ω1; the ball rolls."""
         e1 = self.surface.normal(self.p0)
         v0 = speed * self.v0 / np.linalg.norm(self.v0)
         w0 = (self.w0 @ e1) * e1 - np.cross(e1, v0) / self.ball.radius

@@ -1,4 +1,4 @@
-"""Motion of the ball in the world: what every route to the truth returns."""
+"""Motion of the ball in the world, as every route to the truth returns it."""
 
 from dataclasses import dataclass
 
@@ -36,7 +36,7 @@ def world_motion(
     press: FloatArray,
     route: str,
 ) -> BallMotion:
-    """Motion at n times.
+    """Motion in the world at n times, from values in the local frame.
 
     Args:
         body: the scene's ball.
@@ -45,8 +45,8 @@ def world_motion(
         spin: ω1 [rad/s], shape (n,).
         slip: velocity of the contact point along e2, e3 [m/s], shape (n, 2).
         friction: on the ball along e2, e3 [N], shape (n, 2).
-        press: N [N], shape (n,).
-        route: for a person.
+        press: normal force N [N], shape (n,).
+        route: name of the method, for a person.
     """
     frame = body.surface.frame(u)
     e1, e2, e3 = np.moveaxis(frame, -1, 0)

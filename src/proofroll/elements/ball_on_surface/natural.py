@@ -22,7 +22,8 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 if TYPE_CHECKING:
     import xarray as xr
 
-# An engine without a step is looked at after this part of the time in which its ball rolls by one radius, or stops.
+# Time of the first look at an engine without a step, relative to the time in which its ball rolls by one radius or
+# stops.
 _PART = 1e-2
 
 
@@ -35,8 +36,8 @@ def natural_time(body: RollingBall) -> float:
     """Period of the slowest motion that the scene starts with [s].
 
     Where the path turns at the rate Ω, a ball with r = J/(m a²) oscillates across it at √(r/(1+r)) Ω (√(2/7) Ω for a
-    homogeneous ball, Blajer 2006, section 3). Where it does not turn, there is no oscillation: one turn of the ball, or
-    the time 2π √(a/g) in which it would begin to roll, whichever is longer. On a turntable it is one circle.
+    homogeneous ball, Blajer 2006, section 3). On a straight path there is no oscillation: it is one turn of the ball,
+    or 2π √(a/g), the time scale of starting to roll, whichever is longer. On a turntable it is one circle of the ball.
     """
     turning, ratio = turning_rate(body), body.ball.inertia_ratio
     if body.wall_rate is not None:
@@ -50,12 +51,12 @@ def natural_time(body: RollingBall) -> float:
 
 
 def turn_interval(body: RollingBall) -> float | None:
-    """See :class:`proofroll.core.element_abilities.CountsTurns`: by how the ball goes round, and how it would swing."""
+    """See :class:`proofroll.core.element_abilities.CountsTurns`; by the periods of the ball's round and swing."""
     if not any(body.surface.periods):
         return None
     gravity, bend = float(np.linalg.norm(body.gravity)), float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
     swing = 2 * math.pi / math.sqrt(gravity * bend) if gravity * bend else math.inf
-    # Round a cylinder a ball goes as evenly as it began, however fast.
+        # Round a cylinder a ball runs evenly, however fast.
     return max(EVERY, PART_OF_TURNS * min(natural_time(body), swing))
 
 
@@ -97,6 +98,6 @@ def first_motion(body: RollingBall) -> FirstMotion | None:
 
 
 def _stops(velocity: FloatArray, rate: FloatArray) -> float:
-    """Time in which a velocity vanishes at its first rate [s]; infinite where it does not shrink."""
+    """Time in which a velocity would vanish at its initial rate [s]; infinite where it does not shrink."""
     shrinks = -float(velocity @ rate)
     return float(velocity @ velocity) / shrinks if shrinks > 0 else math.inf

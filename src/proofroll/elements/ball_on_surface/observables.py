@@ -1,6 +1,6 @@
-"""Numbers that a trajectory is judged by: observables, their scales, the energy balance and the force audit.
+"""Observables of a ball, their scales, the energy balance and the audits of forces and rates.
 
-Everything here sees a trajectory and the scene's ball, never an engine.
+All of it depends on a trajectory and the scene's ball, never on an engine.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerat
 if TYPE_CHECKING:
     import xarray as xr
 
-# Least size of an observable over its natural one: a ball that moves by less than a hundredth of its radius (0.25 mm
-# inside the cylinder) stands still to the eye, and a range made of round-off is no size.
+# Least scale of an observable, relative to its natural size: a ball that moves by less than a hundredth of its radius
+# (0.25 mm inside the cylinder) looks at rest, and a range of round-off is no scale.
 _LEAST = 1e-2
 _FORCES = ("N", "F2", "F3")
-# Steps in which the turning from one sample to the next is integrated.
+# Number of steps that integrate the turning from one sample to the next.
 _SUBSTEPS = 16
 
 
 def table(body: RollingBall) -> tuple[Observable, ...]:
-    """The observables of a ball on a surface; the last coordinate, the height in a cylinder, decides.
+    """Observables of a ball on a surface; the last coordinate decides (on a cylinder the height), or the gap in flight.
 
-    No size is below a hundredth (:data:`_LEAST`) of what is natural for the ball: its radius a, its largest force
-    m max(g, |p̈|), √(g a), m g a, and a friction of 1.
+    No scale is below a hundredth (:data:`_LEAST`) of the ball's natural size: radius a, largest force m max(g, |p̈|),
+    √(g a), m g a, and a friction of 1.
     """
     weight = natural_acceleration(body)
     a, force = _LEAST * body.ball.radius, _LEAST * body.ball.mass * weight
@@ -60,7 +60,7 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
 
     apart = "m", "distance of the ball from the wall"
 
-    # A flight begins and ends slip unseen
+    # A ball that flies may begin and end slip in flight, unseen
     says_slip = bool(bounded) and not body.flies
 
     def residual(name: str, unit: str, meaning: str, floor: float, **more: Any) -> Observable:
@@ -88,7 +88,8 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
         Observable("gap", *apart, Role.MOTION, floor=a, headline=True, decides=True, difference_of="p_WB")
         if flies
         else residual("gap", *apart, a, difference_of="p_WB"),
-        # Without a bound on friction nothing slips; with one the true ball does, and is followed.
+        # Without a bound on friction slip is an error; with one the true ball slips, and slip is an observable of the
+        # motion.
         Observable(
             "slip",
             "m/s",
@@ -113,25 +114,25 @@ def table(body: RollingBall) -> tuple[Observable, ...]:
 
 
 def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
-    """All observables that a run allows, by name; what the engine cannot say is absent.
+    """Observables that a run allows, by name; those that the engine's values do not determine are absent.
 
-    Coordinates of the surface as they are, and ``attitude`` [1]; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [1]
-    without time 0, where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s],
-    ``force_audit`` [N] and ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction ``slip`` is
-    not zero; ``creep`` [m] is, the way slipped while sticking, and ``first_slip`` [s] is one value, or none if the ball
+    Coordinates of the surface, and ``attitude`` [1]; ``N``, ``F2``, ``F3`` [N] and ``needed_friction`` [1] without time
+    0, where the certificate judges reactions; ``energy_balance`` [J], ``gap`` [m], ``slip`` [m/s], ``force_audit`` [N]
+    and ``rate_audit`` [m/s], which are zero for a perfect run. With bounded friction a perfect run may have ``slip``,
+    but no ``creep`` [m], the distance slipped while sticking; ``first_slip`` [s] is one value, or none if the ball
     never slips.
     """
     names = [*body.surface.coordinates, *({"attitude"} & set(dataset))]
     curves = {name: dataset[name].to_numpy() for name in names}
-    whole = set(_FORCES) <= set(dataset)  # a file of somebody's may have some of them
+    whole = set(_FORCES) <= set(dataset)  # a user's file may have only some of them
     curves |= {name: dataset[name].to_numpy()[1:] for name in (*_FORCES, "needed_friction") if name in dataset}
     curves["gap"] = dataset["gap"].to_numpy()
     curves["slip"] = dataset["slip"].to_numpy()
     if dataset.sizes["time"] > 2 * (DEGREE + 1) + 2 * ENDS:
-        # What impacts take of the energy nobody tells.
+        # The energy that impacts dissipate is unknown.
         dissipates = body.contact.rolling_resistance or body.wall_rate is not None or "sticking" in dataset
-        told = whole or not dissipates
-        if told and not body.flies:
+        known = whole or not dissipates
+        if known and not body.flies:
             curves["energy_balance"] = energy_balance(body, dataset)
         if whole:
             audited = force_audit(body, dataset)
@@ -149,7 +150,7 @@ def observe(body: RollingBall, dataset: xr.Dataset) -> dict[str, FloatArray]:
 
 
 def creep(dataset: xr.Dataset) -> float:
-    """Distance slipped while sticking [m]; an interval counts if the ball sticks at both ends, or that is unknown."""
+    """Distance slipped while sticking [m]: over intervals whose both ends stick, or all if sticking is not known."""
     slip, t = dataset["slip"].to_numpy(), dataset["time"].to_numpy()
     sticking = dataset["sticking"].to_numpy().astype(bool) if "sticking" in dataset else np.ones(len(t), dtype=bool)
     both = sticking[1:] & sticking[:-1]
@@ -157,10 +158,10 @@ def creep(dataset: xr.Dataset) -> float:
 
 
 def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
-    """Size of each observable in the truth: ranges of coordinates, the largest normal force and needed friction.
+    """Size of each observable in the truth; floors are those of :func:`table`.
 
-    The kinetic energy and the speed of the start, the ball's radius, and the way that it slips. Floors are those of the
-    table.
+    Ranges of coordinates, the largest normal force and needed friction, the kinetic energy and the speed of the start,
+    the ball's radius, and the distance slipped.
     """
     normal, friction = float(np.max(np.abs(truth["N"].to_numpy()))), truth["needed_friction"].to_numpy()
     speed = float(np.linalg.norm(body.v0))
@@ -175,12 +176,11 @@ def scales(body: RollingBall, truth: xr.Dataset) -> dict[str, float]:
 
 
 def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """Energy now plus what resistance and friction took, minus the energy at the start [J], shape (time,).
+    """Energy now plus the work that resistance and friction took, minus the energy at the start [J], shape (time,).
 
-    Rolling resistance takes -M · ω from the ball per second (N f V / a while it rolls), friction -F · u, and a wall
-    that moves at the velocity w gives F · w; N, F, ω, V and the slip u are the engine's own. Where there is no force at
-    time 0, work counts from the first sample that has one; shape (time - 1,) then. Samples off the grid
-    come last.
+    Rolling resistance takes the power -M · ω (N f V / a while rolling), friction -F · u, and a wall that moves at the
+    velocity w adds F · w; N, F, ω, V and the slip u are the engine's own. Without a force at time 0, work counts from
+    the first sample that has one, and the shape is (time - 1,). Samples off the grid come last.
     """
     dataset = _with_forces(dataset)
     balance = dataset["energy"].to_numpy() - float(dataset["energy"][0])
@@ -208,7 +208,7 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     if np.any(power):
         from scipy.interpolate import make_interp_spline
 
-        # The power has kinks where slip begins and ends and where the ball stops, at which a smooth spline would ring.
+        # Power has kinks where slip begins or ends and where the ball stops; a smooth spline would ring there.
         work = make_interp_spline(t, power, k=1 if bounded or rests else DEGREE).antiderivative()
         balance, few = balance + work(t) - work(t[0]), few + work(at) - work(t[0])
     return np.concatenate([balance, few])
@@ -217,10 +217,10 @@ def energy_balance(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Reported minus recomputed contact force, largest of the components N, F2, F3 [N], shape (samples,).
 
-    Newton's law along e1, e2, e3 with the acceleration from the engine's own motion: the rates of the surface
-    coordinates are differentiated (they turn slowly, unlike the world components), the rest is geometry. Forces jump
-    where slip begins or ends, so each stretch between events is taken by itself, without its first and last samples;
-    stretches of few samples are left out. That the rates are those of the positions, :func:`rate_audit` says.
+    Newton's law along e1, e2, e3 with the acceleration of the engine's own motion: rates of the surface coordinates,
+    which vary slowly unlike velocities in the world, are differentiated. Forces jump where slip begins or ends, so that
+    each stretch between events is audited separately, without its first and last samples; short stretches are left out.
+    :func:`rate_audit` checks that the rates belong to the positions.
     """
     return _joined(_audited(body, stretch) for stretch in stretches(_with_forces(dataset)))
 
@@ -228,10 +228,9 @@ def force_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 def rate_audit(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     """Differences of the velocities from the rates of the positions, in stretches as :func:`force_audit` [m/s].
 
-    At every sample v is held against the derivative of the positions. Where there is an orientation, the radius times ω
-    is held against the rate of it. Samples off the grid (:func:`proofroll.core.time_grid.off_grid`) are held against
-    curves through the others: their velocity and spin, and their position and orientation over the time from the
-    nearest sample.
+    At every sample v is compared with the derivative of the positions and, if an orientation is given, a ω with its
+    rate times the radius a. Samples off the grid (:func:`proofroll.core.time_grid.off_grid`) are compared with curves
+    through the others: velocity and spin directly, position and orientation over the time from the nearest sample.
     """
     return _joined(_rates_audited(body, stretch) for stretch in stretches(dataset))
 
@@ -247,7 +246,7 @@ def _joined(audited: Iterable[FloatArray]) -> FloatArray:
 
 
 def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """The audit of a stretch without events: on the grid but for its ends, then off it."""
+    """Audit of forces in a stretch without events [N]: on the grid but for its ends, then off it."""
 
     def apart(given: Mapping[str, FloatArray], at: FloatArray) -> FloatArray:
         u, acceleration = accelerations(body.surface, dataset, at)
@@ -262,7 +261,7 @@ def _audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
 
 
 def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """The audit of the rates of a stretch without events: on the grid, then off it."""
+    """Audit of rates in a stretch without events [m/s]: on the grid but for its ends, then off it."""
     from scipy.interpolate import make_interp_spline
 
     surface, t = body.surface, dataset["time"].to_numpy()
@@ -282,7 +281,7 @@ def _rates_audited(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
     few, times = _off_grid(dataset)
     if not len(times):
         return audit
-    # Along the wall: how far off it the ball is, is the gap's business.
+    # Along the wall only: the distance from it is the gap.
     away = surface.position(surface.locate(few["p_WB"])) - surface.position(curve(times))
     since = np.min(np.abs(times[:, None] - t), axis=1)
     spin = make_interp_spline(t, dataset["w_WB"].to_numpy(), k=DEGREE)

@@ -1,4 +1,4 @@
-"""Parts of the model of a ball that a scene can have or not, for the ladder of models."""
+"""Parts of a ball's model that the ladder of models can leave out or add."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
     from proofroll.elements.ball_on_surface.element import BallOnSurface
 
-# Rolling resistance that a scene without any is given to see what the term costs: f in radii (Blajer 2006, figure 5).
+# Rolling resistance f, in radii, added to a scene without any to see the cost of the term (Blajer 2006, figure 5).
 _RESISTANCE = 0.02
-# Friction that is bounded far away from what rolling needs: this many times as much.
+# Factor on the friction that rolling needs, for a bound that is never reached.
 _FAR = 10.0
 
 
@@ -35,7 +35,7 @@ def optional_terms(element: BallOnSurface, parameters: Mapping[str, float], trut
     if "mu_static" in parameters:
         unbounded = dict.fromkeys((n for n in ("mu_static", "mu_kinetic") if n in parameters), math.inf)
         if math.isfinite(element.contact.mu_static):
-            if BallCapability.SLIPPING_START not in element.requires:  # which has no motion without a bound
+            if BallCapability.SLIPPING_START not in element.requires:  # such a start has no motion without a bound
                 terms.append(OptionalTerm("bounded friction", "the scene bounds it", {}, unbounded))
         else:
             far = _FAR * (float(np.nanmax(truth["needed_friction"].to_numpy())) or 1.0)

@@ -1,4 +1,4 @@
-"""Programs of a ball on a wall without proofroll: an adapter's own steps, cut out, with the numbers that they ask for.
+"""Programs that run a ball on a wall without proofroll: an adapter's own steps, cut out, with the numbers they use.
 
 They are for :meth:`proofroll.core.engine_abilities.Reproduces.reproducer`.
 """
@@ -12,7 +12,7 @@ from proofroll.core.errors import Refused
 from proofroll.core.program_text import assigned
 from proofroll.elements.ball_on_surface.model import RollingBall
 
-# The wall of a ``BODY``, for what holds a run against the laws.
+# Functions of the wall of a ``BODY``, with which a program checks a run against the laws.
 WALL = '''
 
 def frame(p):
@@ -35,19 +35,19 @@ def cut_program(
     instead: Mapping[str, str] = {},
     **values: Any,
 ) -> str:
-    """A program: numbers, the definitions ``wanted`` with all that they need, ``BODY`` and ``SETTINGS``, and ``run``.
+    """Text of a program: numbers, the definitions ``wanted`` with all they need, ``BODY``, ``SETTINGS``, ``run``.
 
     Args:
-        body: the ball; the program holds the attributes of it, and of the settings, that its code reads.
+        body: the ball; the program holds those attributes of it, and of the settings, that its code reads.
         settings: of the engine.
         wanted: functions and classes.
-        uses: attributes that ``run`` asks for.
+        uses: names of attributes that ``run`` reads.
         run: text that defines ``run(times)``.
-        instead: texts that stand in for definitions, by their names.
+        instead: texts that replace definitions, by their names.
         values: further numbers, by their names.
 
     Raises:
-        Refused: the wall moves, or is not given by numbers alone.
+        Refused: the wall moves, or is not homogeneous.
     """
     if body.wall_rate is not None:
         raise Refused("programs are written only for walls that stand")
@@ -60,7 +60,7 @@ def cut_program(
 
 
 def ball_numbers(body: RollingBall) -> dict[str, float | FloatArray]:
-    """The numbers of the ball, by the names that programs use."""
+    """Numbers of the ball, by their names in programs."""
     return {
         "RADIUS": body.ball.radius,
         "MASS": body.ball.mass,

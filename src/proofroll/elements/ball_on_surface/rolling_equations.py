@@ -1,7 +1,7 @@
 """Rolling without slip: closed forms, and five states (u, u̇, ω1) with the reactions eliminated by hand.
 
-The truth's first route and the engine ``reduced`` both rest on this module. So their agreement says nothing
-about these equations: only the truth's second route, which does not know them, checks them.
+The truth's first route and the engine ``reduced`` both use this module, so that their agreement does not check these
+equations. The truth's second route, which does not use them, does.
 """
 
 import math
@@ -21,16 +21,16 @@ def start(body: RollingBall) -> FloatArray:
 
 
 def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rates of (u, u̇, ω1), shape (5,), and velocity and force in the world, shape (3,).
+    """Rates of (u, u̇, ω1), shape (5,), and velocity [m/s] and force [N] in the world, shape (3,).
 
     With κ = J/ma² the tangential part of Newton-Euler after eliminating the friction reads
-    (1 + κ) v̇ = g - κ a ω1 e1 × ė1 + e1 × M / (m a), and ω̇1 = ω · ė1. A wall that turns at the rate W adds κ ẇ, for the
-    velocity w = W × (p + a e1) of its point at the contact, and in ω the ball rolls with v - w.
+    (1 + κ) v̇ = g - κ a ω1 e1 × ė1 + e1 × M / (m a), and ω̇1 = ω · ė1. A wall that turns at the rate W adds κ ẇ, for
+    the velocity w = W × (p + a e1) of its point at the contact, and v - w replaces v in ω.
     """
     a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
     u, spin = state[:2], float(state[4])
     frame, bending = body.surface.frame(u), body.surface.second(u) @ state[2:4]
-    # Along e1, e2, e3 as plain floats: for vectors of two or three numbers arrays cost several times the arithmetic.
+    # Components along e1, e2, e3 as plain floats: for two or three numbers, arrays cost several times the arithmetic.
     udot1, udot2 = state[2:4].tolist()
     _, (t2u, t2v), (t3u, t3v) = (frame.T @ body.surface.tangents(u)).tolist()
     (bend_u, bend_v), *curving = (frame.T @ bending).tolist()
@@ -64,7 +64,7 @@ def reduced_rates(body: RollingBall, state: FloatArray) -> tuple[FloatArray, Flo
 
 
 def placed(body: RollingBall, states: FloatArray, v_WB: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """p_WB [m], v_WB [m/s] and w_WB [rad/s] of states (u, u̇, ω1), shape (n, 5), with ``v_WB``; each shape (n, 3)."""
+    """Centre p_WB [m], ``v_WB`` [m/s] and spin w_WB [rad/s] of states (u, u̇, ω1), shape (n, 5); each shape (n, 3)."""
     e1 = body.surface.frame(states[:, :2])[..., 0]
     p_WB = body.surface.position(states[:, :2])
     w_WB = states[:, 4:] * e1 - cross(e1, v_WB - wall_velocity(body, p_WB, e1)) / body.ball.radius
@@ -72,7 +72,7 @@ def placed(body: RollingBall, states: FloatArray, v_WB: FloatArray) -> tuple[Flo
 
 
 def closed_form(body: RollingBall, times: FloatArray) -> BallMotion | None:
-    """The closed form, or None where there is none (rolling resistance, a tilted cylinder)."""
+    """Closed form of the motion; None with rolling resistance, or off a plane or vertical cylinder."""
     if body.contact.rolling_resistance > 0:
         return None
     if isinstance(body.surface, Plane):

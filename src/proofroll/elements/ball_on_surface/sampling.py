@@ -1,4 +1,4 @@
-"""Sample of a ball on a surface: its state with the wall's reaction; and the model read back from the engine."""
+"""Sample of a ball with the reaction of the wall, and the model of a ball read back from the engine."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,12 +11,12 @@ from proofroll.elements.ball_on_surface.model import BallCapability
 
 @dataclass(frozen=True, slots=True)
 class BallSample(Sample):
-    """State of a ball, whose frame has its origin at the centre and is not turned at time 0, and reaction of the wall.
+    """State of a ball and reaction of the wall; the ball's frame is at its centre, unturned at time 0.
 
     Attributes:
-        force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None at time 0
-            alone: the engine defines reactions only after a first step.
-        sticking: whether the contact holds by static friction; only where friction is bounded.
+        force: of the wall on the ball at the contact point, -N e1 + F2 e2 + F3 e3 [N], shape (3,). None only at time 0,
+            from engines that define reactions only after a first step.
+        sticking: True if static friction holds the contact; given only where friction is bounded.
     """
 
     widths: ClassVar[Mapping[str, int]] = {**Sample.widths, "force": 3}
@@ -27,25 +27,25 @@ class BallSample(Sample):
 
 @dataclass(frozen=True)
 class BallBuilt:
-    """Model of a ball read back from the engine (never from the scene). None: the engine cannot say.
+    """Model of a ball read back from the engine (never from the scene). None: the engine does not know it.
 
     Attributes:
         mass: of the ball [kg].
         inertia: central inertia of the ball, principal values [kg m²], shape (3,).
         gravity: acceleration of gravity in the world [m/s²], shape (3,).
         ball_radius: [m].
-        rolling_resistance: f [m]; 0 where nothing of the kind was built. None counts as missing where f > 0.
+        rolling_resistance: f [m]; 0 if none was built. None counts as missing where the scene's f > 0.
         mu_static, mu_kinetic: coefficients of friction [1]; inf where friction has no bound. None counts as missing
             where friction is bounded.
         gap: distance of the ball from the engine's own wall at time 0 [m].
         acceleration: of the ball's centre at time 0 [m/s²], shape (3,).
         angular_acceleration: of the ball at time 0 in the world [rad/s²], shape (3,).
-        terms: the optional parts that are in the built model: rolling resistance, bounded friction, orientation.
+        terms: optional terms in the built model: rolling resistance, bounded friction, orientation.
         regularised: names of certificate quantities (``gap``, ``slip``, ``spin``, ``acceleration``, ``N``, ``F2``, …)
-            that the model softens, with tolerance and reason, as far as :data:`certificate.CAPS` lets it:
-            mass, inertia, gravity, radius and position along the wall are never soft. Tolerances of acceleration, N,
-            F2 and F3 are relative to :func:`mechanics.natural_acceleration`; one of ``1 / static friction``,
-            where the scene has no bound and the engine needs a number, to 1/mu.
+            that the model softens, with tolerance and reason, up to the caps of :data:`certificate.CAPS`: mass,
+            inertia, gravity, radius and position along the wall are never soft. Tolerances of acceleration, N, F2 and
+            F3 are relative to :func:`mechanics.natural_acceleration`. A tolerance of ``1 / static friction``, for an
+            engine that needs a number where the scene has no bound, is one of 1/mu.
     """
 
     mass: float | None = None
@@ -63,9 +63,9 @@ class BallBuilt:
 
 
 def terms_held(*, resists: object, slips: object = False, turns: object = False) -> frozenset[str]:
-    """Terms of a model besides rolling, for :attr:`BallBuilt.terms`.
+    """Optional terms of a model, for :attr:`BallBuilt.terms`: truth values of the arguments as capabilities.
 
-    Rolling resistance, friction that is bounded, and the ball's orientation.
+    ``resists``: rolling resistance; ``slips``: bounded friction; ``turns``: orientation of the ball.
     """
     held = {"ROLLING_RESISTANCE": resists, "BOUNDED_FRICTION": slips, "ORIENTATION": turns}
     return frozenset(BallCapability[name] for name, is_there in held.items() if is_there)

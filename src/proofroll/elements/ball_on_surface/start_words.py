@@ -1,4 +1,4 @@
-"""Start of a ball, in words for the author of the scene."""
+"""Start of a ball in sentences for the author of the scene."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 
 
 def start_facts(body: RollingBall) -> Sequence[str]:
-    """Centre and velocity, what presses it on the wall, and whether it rolls, slips, rests or leaves at once."""
+    """Sentences on centre, velocity, normal force, and whether the ball rolls, slips, rests or leaves at once."""
     named = zip(body.wall.coordinates, body.u0.tolist(), body.wall.units, strict=True)
     at = ", ".join(f"{name} = {value:.4g}{'' if unit == '1' else f' {unit}'}" for name, value, unit in named)
     said = [

@@ -1,4 +1,4 @@
-"""Stretches of samples between events, long enough for splines, with accelerations and turns."""
+"""Stretches of samples between events, long enough for splines, with accelerations and rotations."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ if TYPE_CHECKING:
     import xarray as xr
     from scipy.spatial.transform import Rotation
 
-# Degree of the splines through the samples. Sampled twenty times per oscillation of z, a derivative of degree 7 is
-# good to about 1e-6 of its size; what is left is measured on the truth and reported as the error bar.
+# Degree of the splines through the samples. With twenty samples per oscillation of z, a derivative of degree 7 has a
+# relative error of about 1e-6, which is measured on the truth and reported as the error bar.
 DEGREE = 7
 # The ends of an interpolating spline's derivative are worse than its middle; they are left out.
 ENDS = 5
 
 
 def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
-    """The samples between events, where they are enough for the splines."""
+    """Parts of a run between its events that have enough samples for the splines."""
     t = dataset["time"].to_numpy()
     cuts = [0, *np.searchsorted(t, [event.time for event in events_of(dataset)]).tolist(), len(t)]
-    if len(cuts) == 2:  # to cut each of the many variables would take longer than what follows
+    if len(cuts) == 2:  # a cut of all variables would take longer than the use of the parts
         parts = [dataset]
     else:
         parts = [dataset.isel(time=slice(start, end)) for start, end in itertools.pairwise(cuts)]
@@ -34,10 +34,10 @@ def stretches(dataset: xr.Dataset) -> list[xr.Dataset]:
 
 
 def accelerations(surface: Surface, dataset: xr.Dataset, at: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-    """Surface coordinates, shape (time, 2), and accelerations of the centre [m/s²], (time, 3), without events between.
+    """Surface coordinates, (time, 2), and accelerations of the centre [m/s²], (time, 3), in a stretch without events.
 
-    The rates of the coordinates are differentiated, for they turn slowly, unlike velocities in the world. They are
-    given at the samples, or ``at`` other times [s].
+    They come from the rates of the coordinates, which vary slowly, unlike velocities in the world. They are given at
+    the samples, or ``at`` other times [s].
     """
     from scipy.interpolate import make_interp_spline
 
@@ -57,13 +57,17 @@ def accelerations(surface: Surface, dataset: xr.Dataset, at: FloatArray | None =
 def carried(
     start: Rotation, t: FloatArray, w_WB: FloatArray, substeps: int, spans: tuple[FloatArray, FloatArray] | None = None
 ) -> Rotation:
-    """Orientations ``start`` turned by the spin [rad/s], shape (time, 3), to the next sample or over other ``spans``.
+    """Orientations ``start`` turned by the spin over the spans of time, or without ``spans`` to the next sample.
 
     The ball may turn more than once from sample to sample, so ω is integrated, by Magnus steps of fourth order
     (Blanes, Casas, Oteo & Ros, Phys. Rep. 470, 2009, section 5.4).
 
-    ``start`` are the orientations at all samples but the last, or at the beginnings of the spans; ``t`` the times of
-    the samples [s].
+    Args:
+        start: orientations at the begin of each span, or at all samples but the last.
+        t: times of the samples [s].
+        w_WB: spin at the samples [rad/s], shape (time, 3).
+        substeps: Magnus steps in each span.
+        spans: begins and ends of the spans [s].
     """
     from scipy.interpolate import make_interp_spline
     from scipy.spatial.transform import Rotation

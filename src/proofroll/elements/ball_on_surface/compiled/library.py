@@ -1,4 +1,4 @@
-"""heyoka, where it is installed."""
+"""Availability of heyoka, which is optional."""
 
 from importlib import metadata, util
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from proofroll.core.errors import Missing
 
-# A step's error relative to the state: no tolerance below can be told from it.
+# Tightest tolerance of a step, relative to the state; tighter ones make no difference.
 TIGHTEST = float(np.finfo(float).eps)
 
 
@@ -16,15 +16,11 @@ def available() -> bool:
 
 
 def require_heyoka(what: str) -> None:
-    """Check: heyoka is here, which ``what`` needs.
-
-    Raises:
-        Missing: it is not installed; no engine has refused anything by that.
-    """
+    """Raises Missing, which is no refusal by an engine, unless heyoka is installed; ``what`` names its user."""
     if not available():
         raise Missing(f"{what} needs heyoka, which is not installed here: pip install 'proofroll[fast]' (Linux)")
 
 
 def with_heyoka(version: str) -> str:
-    """A version of something that may run on heyoka: stored answers, refusals too, end where heyoka comes or goes."""
+    """Version text that also names heyoka's version if installed, so that stored results depend on it."""
     return f"{version}, heyoka {metadata.version('heyoka')}" if available() else version

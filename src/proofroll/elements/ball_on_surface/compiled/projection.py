@@ -1,14 +1,14 @@
 """Blajer's projection method for a ball on a cylinder or plane, in symbols and compiled.
 
-The matrices are those of the engine ``projection``, whose code they do not share: the velocities s move the ball by
-v = D s, with v = [v1 v2 v3 ω1 ω2 ω3] along the local axes, and a dot is a rate seen from the world. The system of the
+The matrices are those of the engine ``projection``, but share no code with it: the velocities s move the ball by
+v = D s, with v = [v1 v2 v3 ω1 ω2 ω3] along the local axes; a dot is a rate seen from the world. The system of the
 tangential projection and the non-holonomic constraints C v = 0,
 
     [M̄ C_nhᵀ; C_nh 0] [ṡ; λ] = [Dᵀ (f - M Ḋ s); ξ],
 
-is solved in symbols by the Schur complement S = C_nh M̄⁻¹ C_nhᵀ. Since D M̄⁻¹ Dᵀ is M⁻¹ without the direction e1, which
-the wall takes (the rotational block of D is square), S = (1/m + a²/J) 1. Source: W. Blajer, Math. Comput. Model. Dyn.
-Syst. 12(6), 2006, 543-553, sections 2.1-2.4.
+is solved in symbols by the Schur complement S = C_nh M̄⁻¹ C_nhᵀ. D M̄⁻¹ Dᵀ is M⁻¹ without the direction e1, which the
+wall holds (the rotational block of D is square), so that S = (1/m + a²/J) 1. Source: W. Blajer, Math. Comput. Model.
+Dyn. Syst. 12(6), 2006, 543-553, sections 2.1-2.4.
 """
 
 from dataclasses import dataclass
@@ -27,22 +27,22 @@ _Symbols = npt.NDArray[np.object_]
 
 # Order of the run-time parameters.
 PARAMETERS = ("J/m", "m/J", "1/(m S)", "radius", "f", "g_x", "g_y", "g_z", "c", "1/c^2")
-# How near an entry of a rotation matrix is to 0 or 1 where it should be that.
+# Distance of an entry of a rotation matrix from 0 or 1 below which it is set to that.
 _ZERO = 4 * np.finfo(float).eps
-# F0, Fc and Fs where the first coordinate is an angle about the vertical: see Structure.
+# F0, Fc and Fs, see :class:`Structure`, where the first coordinate is an angle about the vertical.
 _UPRIGHT = (*(0.0,) * 8, 1.0, 1.0, *(0.0,) * 3, 1.0, *(0.0,) * 4, *(0.0, -1.0, 0.0, 1.0), *(0.0,) * 5)
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Facts of a scene that decide the form of the equations; its other numbers are parameters.
+    """Properties of a scene that decide the form of the equations; all other numbers are parameters.
 
     Attributes:
         formulation: as in the engine ``projection``.
-        curved: on a cylinder, else on a plane.
-        resistance: with rolling resistance.
+        curved: True on a cylinder, False on a plane.
+        resistance: True with rolling resistance.
         frame: F = F0 + cos γ Fc + sin γ Fs, columns e1, e2, e3 in the world: entries of F0, Fc, Fs; on a plane F0.
-        gravity: components of gravity in the world that are not zero.
+        gravity: True for each nonzero component of gravity in the world.
     """
 
     formulation: Formulation
@@ -58,7 +58,7 @@ class Structure:
 
 
 def structure(body: RollingBall, formulation: Formulation) -> Structure:
-    """The structure of a scene on a cylinder or plane (:func:`rolling.supports`)."""
+    """Form of the equations of a scene on a cylinder or plane, for which :func:`rolling.supports` is true."""
     curved = isinstance(body.surface, Cylinder)
     first, quarter, half = (body.surface.frame(np.array([angle, 0.0])) for angle in (0.0, np.pi / 2, np.pi))
     constant = (first + half) / 2 if curved else first

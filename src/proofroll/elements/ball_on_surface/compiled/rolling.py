@@ -1,14 +1,14 @@
 """Rolling without slip of a ball on a cylinder or plane in five states, as symbolic expressions and compiled series.
 
-Surfaces are those along which gravity turns with the arc length q and which bend only that way: curvature k = 1/c on
-a cylinder, 0 on a plane. State: arc length q and height h [m], velocities v2, v3 of the centre [m/s], ω1 [rad/s]; all
-forces are divided by the mass. With κ = J/(m a²), A = (1 + κ)/κ and the drive
+The surface bends along the arc length q only, along which gravity's direction turns in the local frame: curvature
+k = 1/c on a cylinder, 0 on a plane. State: arc length q and height h [m], velocities v2, v3 of the centre [m/s], ω1
+[rad/s]; all forces are divided by the mass. With κ = J/(m a²), A = (1 + κ)/κ and the drive
 
     b = g_t + a ω1 e1 × ė1 + (f N / (κ a)) v/V
 
 the slip velocity u obeys u̇ = A F + b, whether the ball slips (F = -μk N u/|u|) or sticks (F = -b/A).
 
-The truth's Taylor route and the engine ``reduced`` both rest on these expressions: only routes that do not, check them.
+The truth's Taylor route and the engine ``reduced`` both use these expressions: only other routes can check them.
 """
 
 from collections.abc import Sequence
@@ -22,8 +22,8 @@ from proofroll.core.arrays import FloatArray
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.surfaces import Cylinder, Plane
 
-# Order of the run-time parameters that every expression shares. A product of parameters is one itself, for a series
-# would form it anew in every step.
+# Order of the run-time parameters that every expression shares. A product of parameters is a parameter itself, for a
+# series would compute it anew in every step.
 PARAMETERS = ("k", "g_x", "g_y", "g_z", "k/a", "k a", "A", "1/A", "f/(kappa a)")
 STATES = ("q", "h", "v2", "v3", "w1")
 
@@ -52,22 +52,22 @@ class Expressions:
     N: Any
 
     def rates(self, F2: Any, F3: Any, u3: Any = 0.0) -> list[tuple[Any, Any]]:
-        """Equations under the friction F [m/s²], where the contact point slips along e3 with ``u3`` [m/s]."""
+        """(variable, rate) pairs under the friction F [m/s²], with the slip ``u3`` of the contact along e3 [m/s]."""
         q, h, v2, v3, w1 = self.state
         turning = self.swing * (v3 - u3) * v2
         return [(q, v2), (h, v3), (v2, self.g2 + F2), (v3, self.g3 + F3), (w1, turning)]
 
     def rolling(self) -> list[tuple[Any, Any]]:
-        """Equations of rolling without slip."""
+        """(variable, rate) pairs of rolling without slip."""
         return self.rates(-self.per_A * self.b2, -self.per_A * self.b3)
 
     def excess(self, mu: Any) -> Any:
-        """Zero where the needed friction is ``mu`` times the normal force, positive where it is more."""
+        """Guard of slip: zero if rolling needs ``mu`` times the normal force as friction, positive if more."""
         return self.b2**2 + self.b3**2 - (self.A * mu * self.N) ** 2
 
     @staticmethod
     def along(expression: Any, flow: Sequence[tuple[Any, Any]]) -> Any:
-        """Rate of an expression along a flow."""
+        """Rate of an expression along a flow of (variable, rate) pairs."""
         import heyoka as hy
 
         return hy.sum([hy.diff(expression, x) * rate for x, rate in flow])
@@ -78,7 +78,7 @@ def expressions(resistance: bool, uniform: bool) -> Expressions:
 
     Args:
         resistance: with rolling resistance; without it the speed may pass through zero.
-        uniform: gravity's local components do not change along the surface.
+        uniform: True if gravity's local components are constant along the surface.
     """
     import heyoka as hy
 
@@ -102,7 +102,7 @@ def expressions(resistance: bool, uniform: bool) -> Expressions:
 
 
 class Function:
-    """A compiled function of states, shape (k,) or (k, n), and as many of the parameters as it uses."""
+    """A compiled function of states, shape (k,) or (k, n), and of the parameters that it uses."""
 
     def __init__(self, outputs: Sequence[Any], variables: Sequence[Any]) -> None:
         import heyoka as hy
@@ -121,10 +121,10 @@ class Function:
 
 @dataclass(frozen=True)
 class CompiledEquations:
-    """Equations, compiled.
+    """Compiled equations of motion.
 
     Attributes:
-        integrator: of the state; copy it, for it holds one.
+        integrator: heyoka's integrator; copy it before use, for it holds a state.
         evaluate: state -> its rates, and the forces over mass [m/s²].
     """
 
@@ -134,9 +134,9 @@ class CompiledEquations:
 
 @lru_cache(maxsize=16)
 def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquations:
-    """The equations compiled for a tolerance of each step, relative to the state [1]; it also decides the order.
+    """Equations compiled for a relative tolerance of each step [1], which also decides the order of the series.
 
-    Forces are b2/A, b3/A and N: what friction must hold, and the press.
+    Its forces over mass are b2/A, b3/A (the friction needed) and N.
     """
     import heyoka as hy
 
@@ -150,12 +150,12 @@ def reduced(resistance: bool, uniform: bool, tolerance: float) -> CompiledEquati
 
 
 def supports(body: RollingBall) -> bool:
-    """True if the expressions hold on the scene's surface and the wall stands still."""
+    """True if the expressions hold on the scene's surface and the wall does not move."""
     return isinstance(body.surface, (Cylinder, Plane)) and body.wall_rate is None
 
 
 def is_uniform(body: RollingBall) -> bool:
-    """True if gravity's local components do not change along the surface."""
+    """True if gravity's local components are constant along the surface."""
     return not isinstance(body.surface, Cylinder) or not np.any(local_gravity(body)[:2])
 
 

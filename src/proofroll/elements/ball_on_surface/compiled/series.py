@@ -1,4 +1,4 @@
-"""A compiled Taylor integrator that is read between the ends of its steps."""
+"""A compiled Taylor integrator with dense output, which samples between the ends of its steps."""
 
 import copy
 from collections.abc import Callable
@@ -9,25 +9,25 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.core.errors import Diverged
 
-# Called with the state where the step began, and with a time in that step and the state there; raises Diverged if the
-# state is not to be trusted.
+# Function of the state at the begin of the step, a time [s] in that step, and the state then; raises Diverged if the
+# state is not valid.
 Check = Callable[[FloatArray, float, FloatArray], None]
 
-# Called before every few steps with the time [s] and state; the state from which to go on instead, or None.
+# Function of time [s] and state, called every few steps; returns a state to continue from instead, or None.
 Renewed = Callable[[float, FloatArray], FloatArray | None]
 
-# Steps between two of these calls. Round-off is not worth one after each step, which would cost a third of the run;
-# what happens to the angles in so few steps is bounded by their own step size control.
+# Number of steps between two of these calls. A call after each step would cost a third of the run for round-off alone;
+# within a few steps the step size control bounds the change of the angles.
 _RENEWAL = 4
 
-# Longest step [s]: only a motion that is a polynomial of time has no other bound.
+# Longest step [s]: needed only for a motion that is a polynomial of time, whose steps nothing else bounds.
 _LONGEST = 1e3
 
 
 class Series:
-    """Moves a state in time by steps as long as the tolerance allows.
+    """Integrates a state by steps as long as the tolerance allows.
 
-    A step is a polynomial as accurate as its end, so that a sample costs no step.
+    The polynomial of a step is as accurate inside the step as at its end, so that samples cost no steps.
 
     Attributes:
         t, x: present time [s] and state.
@@ -36,7 +36,7 @@ class Series:
     def __init__(
         self, integrator: Any, pars: FloatArray, x: FloatArray, check: Check, renewed: Renewed | None = None
     ) -> None:
-        """Starts at time 0, with a copy of heyoka's integrator, for that holds a state."""
+        """Starts at time 0, with a copy of heyoka's integrator, for the original holds a shared state."""
         self.t, self.x = 0.0, np.array(x, dtype=np.float64)
         self._integrator, self._check, self._renewed = copy.copy(integrator), check, renewed
         self._steps = 0
@@ -46,7 +46,7 @@ class Series:
         self._before = self.x
 
     def advance(self, t: float) -> None:
-        """Moves to time t [s]. Raises Diverged if the state is not finite, or fails the check."""
+        """Integrates up to time t [s]. Raises Diverged if the state is not finite or fails the check."""
         if t <= self.t:
             return
         series = self._integrator
@@ -64,22 +64,26 @@ class Series:
         self.t, self.x = t, x
 
     def _trusted(self, t: float, x: FloatArray) -> None:
-        """Only what was reached is looked at: a step may end beyond."""
+        """Checks a state at the requested time only, not at the end of the step beyond it.
+
+        Raises Diverged if it is not finite or fails the check.
+        """
         if not np.all(np.isfinite(x)):
             raise Diverged(f"the state is not finite (NaN or overflow) at t = {t:.6g} s")
         self._check(self._before, t, x)
 
 
 def still_moving(before: FloatArray, t: float, now: FloatArray) -> None:
-    """Notices that the centre stood still in a step: rolling resistance has no direction there, and reverses beyond.
+    """Raises Diverged if the centre came to rest within a step, where the direction of rolling resistance reverses.
 
-    At the other side of rest on a straight path the equations are smooth, so a series may step across. A velocity that
-    merely turns does not turn by more than a right angle in a step, for its own turning is what bounds the step.
+    The equations are smooth beyond rest on a straight path, so that a series may step across it. A reversal is told
+    from a mere turn of the velocity by its angle: within a step a velocity turns by less than a right angle, for its
+    turning bounds the step.
 
-    Velocities [m/s], shape (k,), are those where the step began and at a time ``t`` [s] in it.
-
-    Raises:
-        Diverged: it stood still.
+    Args:
+        before: velocity at the begin of the step [m/s], shape (k,).
+        t: a time in the step [s].
+        now: velocity at ``t`` [m/s], shape (k,).
     """
     if float(before @ now) < 0 or not np.any(now):
         raise Diverged(

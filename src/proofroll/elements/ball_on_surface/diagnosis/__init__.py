@@ -1,4 +1,4 @@
-"""Diagnosis of a ball: wrong reports of a right motion, and wrong motions."""
+"""Diagnosis of a ball: hypotheses of wrongly reported motion, and of wrong motion."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Hypotheses that rolling resistance or friction follow another law than the scene's."""
+"""Hypotheses of another law of rolling resistance or friction than the scene's."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -20,9 +20,9 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 
 _ANGLES = 90
 _FEWEST = 5
-# Along one direction every cone has its edge or its face: the slip has to turn by this much to tell [rad], or the
-# friction, for at an edge of a pyramid the slip stays, and the friction is now that of one face, now of the other.
-# A face that is fitted comes near any short arc of slip: an elliptic cone that lags left a fiftieth.
+# Slip or friction must turn by this angle [rad] to show the shape of a friction cone. At an edge of a pyramid the slip
+# keeps its direction while the friction alternates between two faces. A fitted face comes near any short arc of slip:
+# an elliptic cone that lags left a fiftieth, so that a pyramid must leave less than a hundredth.
 _PYRAMID = 1 / 100
 _TURNS = 0.4
 
@@ -30,7 +30,10 @@ _TURNS = 0.4
 def other_law(
     name: str, says: str, law: Callable[[RollingBall], Law], remedy: str, applies: Callable[[RollingBall], bool]
 ) -> Hypothesis:
-    """Hypothesis: the contact has another law than the scene's, with no number fitted, where the law applies."""
+    """Hypothesis that the contact has another law than the scene's, without any fitted number.
+
+    ``law``: of a ball; ``applies``: True for balls whose scene can show the difference.
+"""
 
     @hypothesis(name, "the other law gives the accelerations and forces at every sample, with no number fitted")
     def test(evidence: Evidence) -> Iterator[Cause]:
@@ -46,7 +49,7 @@ def other_law(
     "static friction", "up to the first slip the path is the true one, so the friction that it needs then is the bound"
 )
 def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
-    """Hypothesis: the bound of sticking is not the scene's."""
+    """Hypothesis: the ball begins to slip at the kinetic friction, not at the static one."""
     run, truth, contact = evidence.run, evidence.truth, evidence.element.contact
     if run is None or truth is None or not np.isfinite(contact.mu_static) or "sticking" not in truth:
         return
@@ -76,20 +79,20 @@ def starts_to_slip(evidence: Evidence) -> Iterator[Cause]:
     "while it slips, the reported friction is that of a cone of four faces at one angle, sample by sample",
 )
 def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
-    """Friction depends on the direction of the slip."""
+    """Hypothesis: the friction cone is a pyramid, so that friction depends on the direction of the slip."""
     run, body = evidence.run, evidence.element.rolling
     if run is None or "sticking" not in run or "N" not in run or not is_bounded(body):
         return
     slips = run["sticking"].to_numpy() == 0
     slip = np.stack([run[name].to_numpy()[slips] for name in ("slip2", "slip3")], axis=-1)
-    said = np.stack([run[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1)
+    reported = np.stack([run[name].to_numpy()[slips] for name in ("F2", "F3")], axis=-1)
     most = body.contact.mu_kinetic * run["N"].to_numpy()[slips][:, None]
     sizes = np.linalg.norm(slip, axis=-1, keepdims=True)
-    if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(said)):
+    if len(slip) < _FEWEST or not np.all(sizes > 0) or not np.all(np.isfinite(reported)):
         return
-    if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, said)) < _TURNS:
+    if max(np.ptp(np.unwrap(np.arctan2(of[:, 1], of[:, 0]))) for of in (slip, reported)) < _TURNS:
         return
-    before = apart(said, -most * slip / sizes)
+    before = apart(reported, -most * slip / sizes)
     if not before > _PYRAMID * float(np.max(np.abs(most))):
         return
     after = np.inf
@@ -98,7 +101,7 @@ def pyramidal_cone(evidence: Evidence) -> Iterator[Cause]:
         along = slip @ turn
         corner = np.abs(along) == np.max(np.abs(along), axis=-1, keepdims=True)
         for kind in (corner, 1.0):
-            after = min(after, apart(said, -most * (np.sign(along) * kind) @ turn.T))
+            after = min(after, apart(reported, -most * (np.sign(along) * kind) @ turn.T))
     says = "the friction cone is a pyramid: the friction depends on the direction of the slip"
     remedy = "choose an elliptic (quadratic) cone"
     covered = ("motion", *COVERED)

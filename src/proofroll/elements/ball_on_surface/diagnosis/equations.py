@@ -1,7 +1,7 @@
-"""A ball's certificate and run held against the equations of motion: what is left of them under another law.
+"""Residuals of the equations of motion for a ball's certificate and run, under the scene's or another law.
 
-Accelerations are derived from the run, forces are those that it reports. So a law is tested at each sample by itself,
-however far the path has gone from the true one.
+Accelerations are derived from the run, forces are those that it reports. So each sample tests a law by itself, however
+far the path has departed from the true one.
 """
 
 from __future__ import annotations
@@ -31,24 +31,24 @@ from proofroll.elements.ball_on_surface.stretches import DEGREE, ENDS, accelerat
 if TYPE_CHECKING:
     import xarray as xr
 
-# What an engine is given, and may say to hold though it does not.
+# Numbers that an engine is given; it may report them correctly and yet move with others.
 GIVEN = ("mass", "inertia", "gravity", "ball radius", "rolling resistance", "static friction", "kinetic friction")
-# What follows from the law by which a ball moves.
+# Quantities that follow from the law of motion.
 COVERED = ("force", "p_WB", "v_WB", "w_WB", "velocity", "spin", "acceleration", "angular acceleration")
 _SAMPLES = 24
-# A line of the certificate is known this many times as badly as it allows.
+# Error of a line of first steps in the certificate, in its tolerances.
 _KNOWN = 3.0
 
 
 @dataclass(frozen=True)
 class BallStates:
-    """A run at some of its samples, away from events.
+    """States of a run at some of its samples, away from events.
 
     Attributes:
         p, v, w: centre, velocity and angular velocity in the world, shape (samples, 3).
-        a, alpha: their rates, from the run itself.
-        force: that the engine reports; None if it does not.
-        sticks: whether the ball sticks.
+        a, alpha: rates of v and w, from the run itself.
+        force: force of the wall that the engine reports [N], shape (samples, 3); None if it does not.
+        sticks: nonzero where the ball sticks, shape (samples,).
     """
 
     p: FloatArray
@@ -65,11 +65,11 @@ class Law:
     """Law of motion of a ball.
 
     Attributes:
-        body: with what the law takes its numbers to be.
-        force: applied besides [N], of the velocity.
-        moment: applied besides [N m], of e1, the velocity and the angular velocity.
-        resisting: moment of the rolling resistance [N m] for N and the angular velocity; None: that of the scene.
-        slipping: friction [N] for N and the centre's velocity; None: Coulomb's.
+        body: ball with the numbers that the law assumes.
+        force: additional force [N] as a function of the velocity.
+        moment: additional moment [N m] as a function of e1, the velocity and the angular velocity.
+        resisting: moment of rolling resistance [N m] for a ball, N and the angular velocity; None: the scene's law.
+        slipping: friction [N] of a slipping ball for a ball, N and the centre's velocity; None: Coulomb's.
     """
 
     body: RollingBall
@@ -80,7 +80,7 @@ class Law:
 
 
 def states(body: RollingBall, dataset: xr.Dataset) -> BallStates | None:
-    """The run at its samples; None: too few of them lie between events."""
+    """States of a run at up to 24 samples; None: too few samples lie between events."""
     parts = [_states(body, part) for part in stretches(dataset)]
     if not parts:
         return None
@@ -106,7 +106,7 @@ def _states(body: RollingBall, part: xr.Dataset) -> BallStates:
 
 
 def residuals(body: RollingBall, seen: BallStates, law: Law) -> FloatArray:
-    """Residuals of a law: accelerations, angular ones times the radius, and force over mass [m/s²]."""
+    """Residuals of a law: accelerations, angular ones times the radius, and forces over mass, in one vector [m/s²]."""
     left = []
     for i in range(len(seen.p)):
         a, alpha, force = response(law, seen.p[i], seen.v[i], seen.w[i], bool(seen.sticks[i]))
@@ -119,7 +119,7 @@ def residuals(body: RollingBall, seen: BallStates, law: Law) -> FloatArray:
 def response(
     law: Law, p: FloatArray, v: FloatArray, w: FloatArray, sticks: bool
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Accelerations and the wall's force at a state: Newton-Euler as in the mechanics, with the law's loads."""
+    """Acceleration, angular acceleration and wall's force at a state: Newton-Euler with the loads of the law."""
     body = law.body
     a, m, J = body.ball.radius, body.ball.mass, body.ball.inertia
     e1 = body.surface.normal(p)
@@ -144,9 +144,9 @@ def response(
 
 @once
 def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
-    """Residuals of the certificate if a line of it differs, and of the run unless its equations hold as for the truth.
+    """Residuals of the certificate if a line of it differs, and of the run if it balances worse than the truth.
 
-    Nothing where the certificate names a number that was built otherwise: that is the cause.
+    Nothing if the certificate shows a number that was built wrongly: that is the cause.
     """
     body = evidence.element.rolling
     plain, wrong = Law(body), differing(evidence.lines)
@@ -157,7 +157,7 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
     if evidence.run is None or evidence.truth is None or evidence.by_step:
         return
     if _leaves(evidence.run) and not _leaves(evidence.truth):
-        return  # off the wall another law holds, and an impact has no derivative
+        return  # in flight another law holds, and an impact has no derivative
     seen, true = states(body, evidence.run), states(body, evidence.truth)
     if seen is None or true is None:
         return
@@ -176,7 +176,7 @@ def residuals_of(evidence: Evidence) -> Iterator[Residuals[Law]]:
 
 
 def held_at_start(evidence: Evidence, body: RollingBall, wrong: Sequence[Mapping[str, Any]]) -> Residuals[Law]:
-    """Residuals of the certificate."""
+    """Residuals of the certificate's lines, relative to their scales; ``wrong`` are the lines that differ."""
 
     def left_of_lines(law: Law | None) -> FloatArray:
         plain = left(evidence.lines, {}, GIVEN)
@@ -191,7 +191,7 @@ def held_at_start(evidence: Evidence, body: RollingBall, wrong: Sequence[Mapping
 
 
 def _others(body: RollingBall) -> list[Law]:
-    """One number each: gravity, mass and inertia, damping and moments."""
+    """Laws that differ in one number each: gravity, mass, inertia, damping, constant moments."""
     ball = body.ball
     lighter = [replace(ball, mass=0.9 * ball.mass), replace(ball, inertia_ratio=0.9 * ball.inertia_ratio)]
     laws = [Law(replace(body, gravity=body.gravity + axis)) for axis in np.eye(3)]
@@ -201,9 +201,9 @@ def _others(body: RollingBall) -> list[Law]:
 
 
 def _contradicted(lines: Sequence[Mapping[str, Any]], body: RollingBall, law: Law, allowed: float) -> bool:
-    """True if the first steps of an engine show other accelerations than those of a law.
+    """True if an engine's first steps show other accelerations than a law, by more than ``allowed``.
 
-    Its reported accelerations may be those of a model without a damping that it adds later.
+    The accelerations that the engine reports may lack a damping that its steps add.
     """
     if not float(np.linalg.norm(body.v0)):
         return False
@@ -250,10 +250,10 @@ def falling(element: Any, gravity: FloatArray) -> Law:
 
 
 def is_bounded(body: RollingBall) -> bool:
-    """True if the scene's ball may slip."""
+    """True if friction is bounded, so that the scene's ball may slip."""
     return bool(np.isfinite(body.contact.mu_static))
 
 
 def has_resistance(body: RollingBall) -> bool:
-    """True if the scene resists the rolling."""
+    """True if the scene has rolling resistance."""
     return body.contact.rolling_resistance > 0

@@ -1,4 +1,4 @@
-"""Hypotheses that a number of the scene is another in the engine, or that a load acts which the scene has not."""
+"""Hypotheses of wrong numbers in the engine, and of loads that the scene does not have."""
 
 import copy
 import dataclasses
@@ -19,7 +19,7 @@ def _ball(body: RollingBall, **changes: float) -> RollingBall:
 
 
 def _resisting(body: RollingBall, f: float) -> RollingBall:
-    """Ball with any f, even a negative one: an engine may drive the ball by it."""
+    """Ball with any rolling resistance f [m], even a negative one, with which an engine may drive the ball."""
     contact = copy.copy(body.contact)
     object.__setattr__(contact, "rolling_resistance", f)
     return dataclasses.replace(body, contact=contact)
@@ -39,10 +39,16 @@ def number(
     only: Callable[[RollingBall], bool] = lambda _: True,
     signed: bool = False,
 ) -> Hypothesis:
-    """Hypothesis: a number of the scene is another one in the engine.
+    """Hypothesis that the engine moves the ball with one factor on a number.
 
-    ``value`` is that of the scene, 0 if it has none, and ``change`` gives a ball with another one; ``only`` says
-    whether the scene has it, ``signed`` whether its sign can be mistaken.
+    Args:
+        name: of the hypothesis.
+        what: the number, in the words of the cause.
+        value: number in the scene, 0 if it has none.
+        change: ball with another value of the number.
+        remedy: what to do.
+        only: True for balls whose scene has the number.
+        signed: True if the number may have the wrong sign.
     """
 
     @hypothesis(name, "one factor on this number of the scene closes accelerations and forces at every sample")
@@ -61,21 +67,21 @@ def number(
         for held in residuals_of(evidence):
             factor, fitted = _snapped(held.fit(law, 1.0))
             if possible(factor, signed):
-                said = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
-                says = f"the engine moves a ball with {what} {said}"
+                factor_words = f"{said_factor(factor)} ({factor * scene:.6g} instead of {scene:.6g})"
+                says = f"the engine moves a ball with {what} {factor_words}"
                 yield held.cause(name, says, law(factor), remedy, fitted, change_by(factor))
 
     return test
 
 
 def _snapped(factor: float) -> tuple[float, int]:
-    """The factor that a mistake makes, if it is one, and how many numbers are then fitted."""
+    """(factor, number of fitted values): the factor of a known mistake, and 0; or else the given one, and 1."""
     known = known_factor(factor)
     return (known[0], 0) if known else (factor, 1)
 
 
 def damping(what: str, velocity: float, spin: float) -> Hypothesis:
-    """Hypothesis: velocity, spin or both are damped at one rate; 1 for what is, 0 for what is not."""
+    """Hypothesis that velocity, spin or both are damped at one rate; the two are 1 if damped, else 0."""
 
     @hypothesis("damping", "the load with one coefficient closes accelerations and forces at every sample")
     def test(evidence: Evidence) -> Iterator[Cause]:

@@ -1,4 +1,4 @@
-"""Hypotheses about what an engine says of its ball: signs, units, axes, points and times of its samples."""
+"""Hypotheses of wrongly reported motion: signs, units, axes, points and times of an engine's samples."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SUBSTEPS = 32
 
 
 def frames(body: RollingBall, truth: xr.Dataset) -> dict[str, FloatArray]:
-    """The frames in which a vector may be given by mistake, at each time of the true run."""
+    """Frames in which a vector may be given by mistake, at each time of the true run, shape (time, 3, 3), by name."""
     local = body.surface.frame(body.surface.locate(truth["p_WB"].to_numpy()))
     return {SURFACE: local, BODY: attitudes(truth["time"].to_numpy(), truth["w_WB"].to_numpy())}
 
@@ -50,7 +50,7 @@ def attitudes(time: FloatArray, w_WB: FloatArray) -> FloatArray:
 
 
 def forces(body: RollingBall, dataset: xr.Dataset) -> FloatArray:
-    """The wall's force on the ball in the world, NaN where it is not said, shape (time, 3)."""
+    """Force of the wall on the ball in the world [N], NaN where not reported, shape (time, 3)."""
     frame = body.surface.frame(body.surface.locate(dataset["p_WB"].to_numpy()))
     local = np.stack([-dataset["N"].to_numpy(), dataset["F2"].to_numpy(), dataset["F3"].to_numpy()], axis=-1)
     return np.asarray(np.einsum("tij,tj->ti", frame, local))
@@ -65,7 +65,7 @@ _UNITS = {
 
 
 def _state(element: Any, data: xr.Dataset) -> FloatArray:
-    """Centre, velocities by the time in which the ball falls or turns by itself [m]."""
+    """Centre and velocities of the ball, each scaled to a length by the radius [m]."""
     a = element.rolling.ball.radius
     return np.concatenate([data["p_WB"], data["v_WB"] * a, data["w_WB"] * a**2], axis=-1)
 
@@ -80,11 +80,11 @@ CLOCK = another_clock(_state, ("p_WB", "v_WB", "w_WB", "force", "motion"))
 
 @hypothesis("said force", "the true force with another sign, unit, frame or time is what the engine says")
 def reported_force(evidence: Evidence) -> Iterator[Cause]:
-    """The wall's force, and its friction by itself."""
+    """Hypotheses on the wall's force along the run, and on its friction alone."""
     pair, body = both(evidence), evidence.element.rolling
     if pair is None or "N" not in pair[0] or "N" not in pair[1] or CLOCK.proven(evidence):
         return
-    if body.flies:  # a force that is there and gone: an impact a moment later is no force that is told late
+    if body.flies:  # its force comes and goes: a late impact must not be taken for a force that is reported late
         return
     run, truth = pair
     time, axes = truth["time"].to_numpy(), frames(body, truth)
@@ -99,7 +99,7 @@ def reported_force(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
-    """Hypothesis: N is right and the friction points the other way."""
+    """Cause that N is right and the friction points the other way."""
     normal = np.sum(told.true * e1, axis=-1, keepdims=True) * e1
     says = "the friction has the wrong sign, and N is right"
     return told.cause("friction sign", says, 2 * normal - told.true, "give the friction on the ball, not on the wall")
@@ -107,7 +107,7 @@ def _friction_reversed(told: Reported, e1: FloatArray) -> Cause:
 
 @hypothesis("late start", "the position at time 0 is that of the true path at another time, to second order")
 def starts_late(evidence: Evidence) -> Iterator[Cause]:
-    """A start that lies on the true path a moment before or after time 0, from the certificate's line alone."""
+    """Hypothesis: the start lies on the true path before or after time 0; tested with the certificate's line alone."""
     lines = {line["quantity"]: line for line in differing(evidence.lines)}
     if evidence.run is not None or "position" not in lines:
         return
@@ -150,7 +150,7 @@ def at_the_contact(evidence: Evidence) -> Iterator[Cause]:
 
 @hypothesis("stale normal", "N, F2 and F3 of the truth along e1, e2, e3 of one time before give the force that is said")
 def stale_normal(evidence: Evidence) -> Iterator[Cause]:
-    """The force has the right components along the axes of another moment."""
+    """Hypothesis: the force has the right components, but along the axes of another time."""
     run, truth, body = evidence.run, evidence.truth, evidence.element.rolling
     if run is None or truth is None or "N" not in run or "N" not in truth or run.sizes["time"] < 3:
         return
@@ -169,7 +169,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
 
     delay = fitted(lambda x: np.ravel(turned(x) - said), 0.0, evidence.step or 1e-3)
     if 2 * apart(run["p_WB"].to_numpy()[1:], p) > float(np.max(np.abs(delay * v))):
-        return  # the ball itself is as far off, and its force with it
+        return  # the ball itself is as far off, which explains its force
     moment = said_delay(delay, evidence.step).removesuffix(" late")
     says = f"the force is along the axes of the normal of {moment} before"
     after, remedy = apart(said, turned(delay)), "take the normal where the ball is when the force is read"
@@ -179,7 +179,7 @@ def stale_normal(evidence: Evidence) -> Iterator[Cause]:
 
 @hypothesis("force at time 0", "the scene's own force with another sign, unit or axes is the one of the certificate")
 def force_at_start(evidence: Evidence) -> Iterator[Cause]:
-    """The wall's force at time 0, from the certificate."""
+    """Hypotheses on the wall's force at time 0, from the certificate."""
     lines, body = {line["quantity"]: line for line in evidence.lines}, evidence.element.rolling
     wrong, parts = {line["quantity"] for line in differing(evidence.lines)}, ("N", "F2", "F3")
     if not wrong or not wrong <= set(parts) or not all(lines[name]["found"] for name in parts):

@@ -1,4 +1,4 @@
-"""Surfaces on which the centre of a ball moves: a file for each, and what they have in common."""
+"""Surfaces on which the centre of a ball moves, a file each, and their common protocol."""
 
 from dataclasses import is_dataclass
 from functools import cache
@@ -17,7 +17,7 @@ __all__ = ["Bowl", "Cone", "Cylinder", "Declared", "Generator", "Plane", "Revolv
 
 @cache
 def surface_kinds() -> tuple[type[Any], ...]:
-    """All kinds that a scene can name, here and in other packages: dataclasses that follow :class:`Surface`."""
+    """Kinds of surfaces that a scene can name, of other packages too: dataclasses that follow :class:`Surface`."""
     others = list[Any]()
     for point, kind in loaded("proofroll.surfaces"):
         if is_dataclass(kind):

@@ -18,10 +18,10 @@ from proofroll.elements.ball_on_surface.surfaces.formula import sqrt
 
 @dataclass(frozen=True)
 class Bowl(Declared):
-    """Inside of a sphere about the world's origin; coordinates are those of its stereographic projection from the top.
+    """Inside of a sphere about the world's origin; coordinates are its stereographic projection from the top [m].
 
-    They are regular everywhere else, also at the bottom, where an angle about the axis is not: xi along x and eta
-    against y, in metres at the bottom.
+    They are regular everywhere but at the top; an angle about the axis would be singular at the bottom. At the bottom
+    xi points along x and eta against y.
 
     Attributes:
         name: used by contacts.

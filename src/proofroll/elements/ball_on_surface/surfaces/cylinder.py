@@ -15,7 +15,7 @@ from proofroll.core.bounds import bounded
 from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator, components, tilted
 
-# Of places [m] as rows: their part across the axis, and that part turned about it by a quarter.
+# Matrices on places [m] as rows: projection across the axis, and that projection turned about the axis by 90°.
 _ACROSS = np.array([1.0, 1.0, 0.0])
 _AROUND = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
@@ -100,13 +100,13 @@ class Cylinder:
         return float(rotation[0, 0]), float(rotation[0, 2])
 
     def _frame(self, cos: float, sin: float) -> FloatArray:
-        """The local frame at one angle, without the overhead of arrays."""
+        """Local frame at the angle of this cosine and sine, computed without arrays for speed."""
         across, down = self._tilted
         return np.array([[across * cos, -across * sin, down], [sin, cos, 0.0], [-down * cos, down * sin, across]])
 
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
         """See :class:`Surface`."""
-        if not self.tilt:  # as in triad
+        if not self.tilt:  # upright: fewer products
             distance = math.sqrt(x * x + y * y)
             size = distance or math.nan
             return self.radius - distance, x / size, y / size, 0.0
@@ -118,7 +118,7 @@ class Cylinder:
 
     def triad(self, x: float, y: float, z: float) -> tuple[float, ...]:
         """See :class:`Surface`."""
-        if not self.tilt:  # upright: the same with a third fewer products
+        if not self.tilt:  # upright: a third fewer products
             distance = math.sqrt(x * x + y * y) or math.nan
             cos, sin = x / distance, y / distance
             return cos, sin, 0.0, -sin, cos, 0.0, 0.0, 0.0, 1.0

@@ -1,4 +1,4 @@
-"""Surfaces that are declared by a position and, if it is known, a distance; what engines ask besides follows."""
+"""Surfaces declared by a position and optionally a distance; all other geometry is derived from these."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.formula import differentiated
 from proofroll.elements.ball_on_surface.surfaces.surface import Generator
 
-# Places along each coordinate at which a declaration is checked, and from which the nearest point is looked for.
+# Places along each coordinate at which a declaration is checked, and from which Newton's method for the nearest point
+# starts.
 _PLACES = 17
-# What round-off may leave of a declaration that agrees with itself, relative to the surface's size.
+# Largest discrepancy of a consistent declaration by round-off, relative to the surface's size.
 _CLOSE = 1e-9
 _NEWTON = 12
 
@@ -44,7 +45,7 @@ class Declared:
 
     @property
     def domain(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Least and largest value of each coordinate, where the surface is looked at and drawn; of an angle a turn."""
+        """(least, greatest) of each coordinate, where the surface is checked and drawn; a whole turn for an angle."""
         raise NotImplementedError
 
     def offset(self, ball_radius: float) -> Declared:
@@ -64,15 +65,16 @@ class Declared:
         """Distance of a place in the world from the surface [m]: positive where balls are, negative behind the wall.
 
         Raises:
-            InputError: it is not said.
+            InputError: the surface has no formula of it.
         """
         raise InputError(f"{self.name}: kind", self.kind, "a formula of the distance is needed here, and it has none")
 
     def checked(self) -> None:
-        """Holds the two descriptions against each other all over the domain.
+        """Checks that position, distance and coordinates agree with each other all over the domain.
 
         Raises:
-            InputError: a point of the surface is not at distance zero, or the distance is none.
+            InputError: a point of the surface is not at distance zero, the distance has no unit gradient, the
+                coordinates lead away from the wall, or the coordinates of a point do not lead back to it.
         """
         u = self.places()
         p = self.position(u)
@@ -98,14 +100,14 @@ class Declared:
             raise InputError(f"{self.name}: locate", missed, "the coordinates of a point do not lead back to it")
 
     def places(self) -> FloatArray:
-        """Coordinates all over the domain but for its edges [rad or m], shape (n, 2)."""
+        """Coordinates on a grid over the domain without its edges [rad or m], shape (n, 2)."""
         inner = (np.arange(_PLACES) + 0.5) / _PLACES
         axes = [low + (high - low) * inner for low, high in self.domain]
         return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
 
     @cached_property
     def length_scales(self) -> tuple[float, float]:
-        """See :class:`Surface`: of an angle its largest radius; 1 of a length."""
+        """See :class:`Surface`; the largest radius for an angle, 1 for a length."""
         lengths = np.linalg.norm(self.tangents(self.places()), axis=-2).max(axis=0)
         first, second = (1.0 if unit == "m" else float(x) for unit, x in zip(self.units, lengths, strict=True))
         return first, second
@@ -115,7 +117,10 @@ class Declared:
         return self._bent(u, 0, 1)[..., 0]
 
     def _bent(self, u: npt.ArrayLike, first: int, count: int) -> FloatArray:
-        """Derivatives of x, y and z by the coordinates: from one of the six of each on, shape (..., 3, count)."""
+        """Derivatives number ``first`` to ``first + count`` of x, y and z by the coordinates, shape (..., 3, count).
+
+        Order: value, two first derivatives, three second derivatives.
+        """
         u = np.asarray(u, dtype=np.float64)
         parts = _chart(self)[0](*u.tolist()) if u.ndim == 1 else _chart(self)[1](u[..., 0], u[..., 1])
         wanted = [parts[6 * axis + index] for axis in range(3) for index in range(first, first + count)]
@@ -142,7 +147,7 @@ class Declared:
         return np.stack([e1, e2, cross(e1, e2)], axis=-1)
 
     def locate(self, p_WB: npt.ArrayLike) -> FloatArray:
-        """See :class:`Surface`: Newton's method for the nearest point, from the nearest of many."""
+        """See :class:`Surface`; Newton's method for the nearest point, from the nearest of a grid."""
         p = np.asarray(p_WB, dtype=np.float64)
         flat, known = p.reshape(-1, 3), self.places()
         u = known[np.argmin(np.linalg.norm(flat[:, None] - self.position(known)[None], axis=-1), axis=1)]
@@ -156,7 +161,10 @@ class Declared:
         return np.asarray(u.reshape(*p.shape[:-1], 2))
 
     def _away(self, p_WB: npt.ArrayLike, first: int, count: int) -> FloatArray:
-        """Distance and its derivatives by x, y, z: ``count`` of ten numbers from ``first`` on, shape (..., count)."""
+        """Derivatives number ``first`` to ``first + count`` of the distance, shape (..., count).
+
+        Order: value, gradient by x, y, z, upper half of the Hessian, row by row.
+        """
         p = np.asarray(p_WB, dtype=np.float64)
         parts = _field(self)[0](*p.tolist()) if p.ndim == 1 else _field(self)[1](p[..., 0], p[..., 1], p[..., 2])
         return _stacked(parts[first : first + count], p.shape[:-1])
@@ -194,7 +202,7 @@ class Declared:
         return gap, x1, y1, z1, x2, y2, z2, *e3, *rate
 
 
-# The surface is the key, as its own attributes would have to be pickled with it.
+# Functions with the surface as key, for attributes of the surface would have to be pickled with it.
 @lru_cache
 def _chart(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
     return differentiated(surface.point, 2)
@@ -206,11 +214,11 @@ def _field(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
 
 
 def _distance_by_nearest(surface: Declared) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Distance, gradient and upper half of the Hessian, one after the other: of floats, and of arrays.
+    """Distance, gradient and upper half of the Hessian in one list, as a function of floats and as one of arrays.
 
     With the nearest point x(u), its tangents T, the metric G = TᵀT and B = e1·∂²x/∂u∂u, a place is p = x - d e1, so
     dp = T (1 + d G⁻¹B) du along the surface, and de1 = -T G⁻¹ B du (Weingarten): ∇d = -e1, and
-    ∇∇d = T G⁻¹ B (G + d B)⁻¹ Tᵀ. No difference is taken.
+    ∇∇d = T G⁻¹ B (G + d B)⁻¹ Tᵀ, without finite differences.
     """
 
     def of_arrays(x: Any, y: Any, z: Any) -> list[Any]:
@@ -233,7 +241,7 @@ def _distance_by_nearest(surface: Declared) -> tuple[Callable[..., Any], Callabl
 
 
 def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tuple[float, ...]:
-    """Components of e1, e2, e3 from the two tangents; NaN where they have no direction."""
+    """Components of e1, e2, e3, nine numbers, from the two tangents; NaN where they are zero or parallel."""
     x1, y1, z1 = y2 * z - z2 * y, z2 * x - x2 * z, x2 * y - y2 * x
     across = math.sqrt(x1 * x1 + y1 * y1 + z1 * z1) or math.nan
     along = math.sqrt(x2 * x2 + y2 * y2 + z2 * z2) or math.nan
@@ -242,7 +250,7 @@ def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tup
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
-    """Numbers and arrays as one array with a last axis for them."""
+    r"""One array of shape (\*shape, parts) from numbers or arrays."""
     if not shape:
         return np.array(parts)
     return np.stack([np.broadcast_to(np.asarray(part, dtype=np.float64), shape) for part in parts], axis=-1)

@@ -1,9 +1,9 @@
-"""Formulas of surfaces: written once, they are calculated with floats and arrays, differentiated, and made series.
+"""Formulas of surfaces: written once, evaluated with floats and arrays, differentiated, and made Taylor series.
 
-A function of ``+ - * /``, ``**`` with a whole number, :func:`sqrt`, :func:`sin` and :func:`cos` is carried out once on
-symbols, by way of :class:`Jet`: numbers that carry their first and second derivatives, forward differentiation by
-truncated Taylor series (Griewank and Walther, Evaluating Derivatives, 2008, chapter 13). What it does is noted as a
-program of plain assignments, which costs a tenth of jets of numbers.
+A function of ``+ - * /``, ``**`` with a whole number, :func:`sqrt`, :func:`sin` and :func:`cos` is evaluated once on
+symbols inside of :class:`Jet`: values with first and second derivatives, forward differentiation by truncated Taylor
+series (Griewank and Walther, Evaluating Derivatives, 2008, chapter 13). The operations are recorded as a program of
+plain assignments, which costs a tenth of jets of numbers.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 
 class Jet:
-    """A value with its gradient and Hessian in a few variables; of numbers of any type that can be calculated with.
+    """A value with its gradient and Hessian in a few variables; the numbers may be of any type with arithmetic.
 
     Attributes:
         value: f.
@@ -31,11 +31,11 @@ class Jet:
 
     @property
     def parts(self) -> list[Any]:
-        """The value, the gradient and the Hessian, one after the other."""
+        """Value, gradient and upper half of the Hessian in one list."""
         return [self.value, *self.first, *self.second]
 
     def through(self, value: Any, slope: Any, bend: Any) -> Jet:
-        """A function of this jet with the given value and derivatives."""
+        """Function of this jet (chain rule), from the function's value, slope and second derivative at it."""
         first, index, second = self.first, 0, []
         for i, one in enumerate(first):
             for other in first[i:]:
@@ -44,7 +44,7 @@ class Jet:
         return Jet(value, [slope * one for one in first], second)
 
     def call(self, name: str, apply: Callable[[str, Any], Any]) -> Jet:
-        """An elementary function, by ``apply`` of its name and a value."""
+        """Elementary function ``name`` of this jet; ``apply`` evaluates a function by name at a value."""
         value = apply(name, self.value)
         if name == "sqrt":
             slope = 0.5 / value
@@ -98,24 +98,24 @@ class Jet:
 
 
 def variables(*values: Any) -> list[Jet]:
-    """The independent variables at these values."""
+    """Independent variables as jets at these values."""
     count = len(values)
     flat = [0.0] * (count * (count + 1) // 2)
     return [Jet(value, [float(i == j) for j in range(count)], flat) for i, value in enumerate(values)]
 
 
 def sqrt(x: Any) -> Any:
-    """Square root of whatever a formula is asked about: a number, an array, a jet, an expression of heyoka."""
+    """Square root of a number, an array, a jet, a symbol, or an expression of heyoka."""
     return _applied("sqrt", x)
 
 
 def sin(x: Any) -> Any:
-    """Sine, as :func:`sqrt`."""
+    """Sine of the same types as :func:`sqrt`."""
     return _applied("sin", x)
 
 
 def cos(x: Any) -> Any:
-    """Cosine, as :func:`sqrt`."""
+    """Cosine of the same types as :func:`sqrt`."""
     return _applied("cos", x)
 
 
@@ -132,7 +132,7 @@ def _applied(name: str, x: Any) -> Any:
 
 
 class _Symbol:
-    """An unknown number in a program; ``program`` has the name that each formula is assigned to."""
+    """An unknown number in a recorded program; ``program`` maps each formula to the name of its result."""
 
     __slots__ = ("program", "text")
 
@@ -140,7 +140,7 @@ class _Symbol:
         self.program, self.text = program, text
 
     def noted(self, formula: str) -> _Symbol:
-        """The result of a formula; the same formula is noted once."""
+        """Result of a formula as a symbol; a repeated formula is recorded once."""
         return _Symbol(self.program, self.program.setdefault(formula, f"n{len(self.program)}"))
 
     def __add__(self, other: Any) -> Any:
@@ -181,9 +181,9 @@ def _text(x: Any) -> str:
 
 
 def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """Value, gradient and upper half of the Hessian of each result, one after the other: of floats, and of arrays.
+    """Value, gradient and upper half of the Hessian of each result, as a function of floats and one of arrays.
 
-    The formula is one of ``count`` numbers, giving one or a tuple of them. Where it has no value, there are NaN.
+    ``formula`` takes ``count`` numbers and returns one or a tuple of them. Where it is undefined, the values are NaN.
     """
     program: dict[str, str] = {}
     given = [f"x{i}" for i in range(count)]
@@ -196,7 +196,7 @@ def differentiated(formula: Callable[..., Any], count: int) -> tuple[Callable[..
     source = f"def calculated({', '.join(given)}):\n{steps}    return {', '.join(parts)},\n"
     of_floats, of_arrays = ({name: getattr(kind, name) for name in ("sqrt", "sin", "cos")} for kind in (math, np))
     for names in (of_floats, of_arrays):
-        exec(source, names)  # arithmetic that was noted above
+        exec(source, names)  # only the arithmetic recorded above
     plain, missing = of_floats["calculated"], (math.nan,) * len(parts)
 
     def floats(*at: float) -> Any:

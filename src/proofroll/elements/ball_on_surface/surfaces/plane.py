@@ -1,4 +1,4 @@
-"""A plane."""
+"""A plane, at rest or turning as a turntable."""
 
 from __future__ import annotations
 

@@ -16,16 +16,16 @@ from proofroll.core.errors import InputError
 from proofroll.elements.ball_on_surface.surfaces.declared import Declared
 from proofroll.elements.ball_on_surface.surfaces.formula import Jet, cos, sin, sqrt, variables
 
-# Places along a curve from which the nearest point is looked for, and steps to it.
+# Number of start points along a curve for the search of the nearest point, of Newton steps, and relative tolerance.
 _PLACES, _NEWTON, _ROUND_OFF = 65, 30, 1e-15
 
 
 class Revolved(Declared):
     """A profile curve in the half-plane of radius r and height z, turned about the axis by the angle gamma.
 
-    A subclass says :meth:`profile` of the curve and ``extent``, and where they have formulas, which are faster,
-    :meth:`away`, :meth:`along` and :meth:`offset`. The second coordinate leads along the curve so that the ball is to
-    its left, seen with r to the right and z upwards.
+    A subclass defines :meth:`profile` and ``extent``, and for speed, where formulas are known, :meth:`away`,
+    :meth:`along` and :meth:`offset`. The second coordinate runs along the curve with the ball to its left, seen with r
+    to the right and z upwards.
     """
 
     units: tuple[str, str] = ("rad", "m")
@@ -33,19 +33,19 @@ class Revolved(Declared):
 
     @property
     def extent(self) -> tuple[float, float]:
-        """Least and largest value of the second coordinate, where the surface is looked at and drawn."""
+        """(least, greatest) of the second coordinate, in which the surface is checked and drawn."""
         raise NotImplementedError
 
     def profile(self, s: Any) -> tuple[Any, Any]:
-        """Radius and height of a point of the curve [m]."""
+        """Radius and height [m] of the point of the curve with the second coordinate ``s``."""
         raise NotImplementedError
 
     def away(self, r: Any, z: Any) -> Any:
-        """Distance from the curve [m], positive where balls are."""
+        """Distance from the curve [m], positive on the side of balls."""
         return Declared.distance(self, r, 0.0, z)
 
     def along(self, r: FloatArray, z: FloatArray) -> FloatArray:
-        """The coordinate of the nearest point of the curve: Newton's method, from the nearest of many."""
+        """Second coordinate of the nearest point of the curve: Newton's method, from the nearest of many points."""
         r, z = np.broadcast_arrays(r, z)
         low, high = self.extent
         known = low + (high - low) * (np.arange(_PLACES) + 0.5) / _PLACES
@@ -97,20 +97,20 @@ def _derivatives(part: Any) -> tuple[Any, Any, Any]:
 
 @dataclass(frozen=True)
 class Parallel(Revolved):
-    """All places at one distance from a surface of revolution; coordinates are those of the nearest point of it.
+    """Surface at a constant distance from a surface of revolution, with the coordinates of the nearest point there.
 
     Attributes:
-        of: the surface.
-        apart: the distance [m], on the side where balls are.
+        of: the surface of revolution.
+        apart: the distance [m], on the side of balls.
     """
 
     of: Revolved
     apart: float
 
     def __post_init__(self) -> None:
-        """Takes over names and periods of the surface; InputError if it is curved more than the ball somewhere."""
-        for said in ("name", "kind", "coordinates", "units", "periods"):
-            object.__setattr__(self, said, getattr(self.of, said))
+        """Copies names and periods of the surface; raises InputError if the surface curves more than the ball."""
+        for key in ("name", "kind", "coordinates", "units", "periods"):
+            object.__setattr__(self, key, getattr(self.of, key))
         bends = float(np.linalg.eigvalsh(self.of.normal_gradient(self.of.position(self.of.places()))).max())
         if not bends * self.apart < 1:
             raise InputError(
@@ -132,7 +132,7 @@ class Parallel(Revolved):
         return Parallel(self.of, self.apart + ball_radius)
 
     def profile(self, s: Any) -> tuple[Any, Any]:
-        """See :class:`Revolved`: along the normal of the curve, by its derivatives."""
+        """See :class:`Revolved`; the point of the original curve, moved along its normal."""
         (r, r_slope, _), (z, z_slope, _) = (_derivatives(part) for part in self.of.profile(variables(s)[0]))
         by = self.apart / sqrt(r_slope * r_slope + z_slope * z_slope)
         return r - z_slope * by, z + r_slope * by
@@ -148,13 +148,13 @@ class Parallel(Revolved):
 
 @dataclass(frozen=True)
 class Cone(Revolved):
-    """Inside of a cone that opens upwards; coordinates are the angle about its axis and the way from its tip.
+    """Inside of a cone that opens upwards; coordinates are the angle about its axis and the distance from its tip.
 
     Attributes:
         name: used by contacts.
         kind: name of the surface in scene files.
         slope: of the wall from the horizontal [rad].
-        length: from the tip to the rim, along the wall [m]; only drawn.
+        length: from the tip to the rim, along the wall [m]; only for drawings and checks.
         tip: height of the tip [m]; 0 for the wall itself.
     """
 
@@ -230,7 +230,7 @@ class Torus(Revolved):
         return dataclasses.replace(self, wire_radius=self.wire_radius + ball_radius)
 
     def profile(self, s: Any) -> tuple[Any, Any]:
-        """See :class:`Revolved`: from the top of the wire, outwards."""
+        """See :class:`Revolved`; the angle starts at the top of the wire and grows outwards."""
         return sin(s) * self.wire_radius + self.ring_radius, cos(s) * self.wire_radius
 
     def away(self, r: Any, z: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Protocol of surfaces on which the centre of a ball moves; only the modules beside this one know any.
+"""Protocol of surfaces on which the centre of a ball moves; only the modules of this folder know particular surfaces.
 
 Each surface gives two independent descriptions of itself: a parametrisation (position, tangents, second
 derivatives; what constraint models need) and a signed distance with its derivatives (what contact models need).
@@ -62,18 +62,18 @@ class Surface(Protocol):
 
     @property
     def length_scales(self) -> tuple[float, float]:
-        """Metres travelled per unit of each coordinate, at most [m/unit]."""
+        """Largest distance travelled per unit of each coordinate [m/unit]."""
 
     @property
     def generators(self) -> tuple[Generator, Generator] | None:
-        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0) and frame(u) alike; None if not homogeneous."""
+        """Motions G1, G2 with p(u) = G1(u1) G2(u2) p(0), likewise frame(u); None for an inhomogeneous surface."""
 
     @property
     def wall_rate(self) -> tuple[float, float, float]:
-        """W: angular velocity with which the wall turns along itself, about the world's origin [rad/s]."""
+        """Angular velocity W of the wall about the world's origin, with which it moves along itself [rad/s]."""
 
     def offset(self, ball_radius: float) -> Surface:
-        """The surface on which the centre of a touching ball of this radius [m] moves."""
+        """Surface on which the centre of a touching ball of this radius [m] moves."""
 
     def position(self, u: npt.ArrayLike) -> FloatArray:
         """p_WB: centre of the ball in the world [m], shape (..., 3)."""
@@ -100,13 +100,13 @@ class Surface(Protocol):
         """∂e1/∂p = -∇∇gap [1/m], shape (..., 3, 3)."""
 
     def nearby(self, x: float, y: float, z: float) -> tuple[float, float, float, float]:
-        """Gap [m] and the components of e1 at one point, for loops that call it at every step."""
+        """Gap [m] and the components of e1 at one point, as floats for loops that call it at every step."""
 
     def triad(self, x: float, y: float, z: float, /) -> tuple[float, ...]:
-        """Components of e1, e2, e3 at one point, one after the other; as :meth:`nearby`."""
+        """Components of e1, e2, e3 at one point, nine floats in this order, for loops that call it at every step."""
 
     def moving_triad(self, x: float, y: float, z: float, vx: float, vy: float, vz: float, /) -> tuple[float, ...]:
-        """Gap [m], :meth:`triad` and (∂e1/∂p) v [1/s] for a velocity v [m/s]: 13 numbers, one after the other."""
+        """Gap [m], :meth:`triad` and (∂e1/∂p) v [1/s] for a velocity v [m/s]: 13 floats in this order."""
 
 
 @lru_cache
