@@ -1,4 +1,4 @@
-"""Commands about balls on surfaces: the time of the first slip, and what becomes of a ball."""
+"""Commands about balls on surfaces: first slips, and maps of regimes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def onset(
         )
     options.show(study, as_json, lambda: [summary(study), _onset_table(study)])
     verdicts = {item.verdict for item in study.engines}
-    # Where nobody asked for that engine in particular it is an answer that it cannot, or that it builds something else.
+    # Unless the engine was named, its refusal, or a model that is another scene, is an answer and no error.
     answers = set() if engine else {Status.REFUSED, Status.WRONG_MODEL}
     if any(item.verdict in {"failed", "refused"} and item.status not in answers for item in study.engines):
         raise typer.Exit(options.ENGINE)
@@ -55,7 +55,7 @@ def onset(
 
 
 def _onset_table(study: OnsetStudy) -> Table:
-    """One line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
+    """Table with a line per engine: its first slip with bracket, the difference from the truth, and the verdict."""
     from rich.table import Column
     from rich.text import Text
 
@@ -72,10 +72,10 @@ def _onset_table(study: OnsetStudy) -> Table:
         Column("verdict", overflow="fold"),
     )
     for item in study.engines:
-        told = first_slip_told(item.onset) if item.onset or item.status is Status.DONE else ("", "")
+        slip_texts = first_slip_told(item.onset) if item.onset or item.status is Status.DONE else ("", "")
         verdict = item.verdict + (f": {item.message}" if item.verdict in {"failed", "refused"} else "")
         label = (item.name, *(item.settings.get(key, "") for key in ("formulation", "preset")))
-        table.add_row(Text(" ".join(filter(None, label))), *told, number(item.difference), Text(verdict))
+        table.add_row(Text(" ".join(filter(None, label))), *slip_texts, number(item.difference), Text(verdict))
     return table
 
 
@@ -105,10 +105,10 @@ def regimes(
 
 
 def _regime_lines(content: Mapping[str, Any], out: Path) -> Iterator[str]:
-    """Lines with the counts of runs by regime for each map, and the place of the maps."""
+    """Lines with the counts of runs by regime for each map, and the files of the maps."""
     for item in content["maps"]:
-        said = ", ".join(f"{count} {name}" for name, count in item["counts"].items())
-        yield f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {said}."
+        counts = ", ".join(f"{count} {name}" for name, count in item["counts"].items())
+        yield f"f = {item['rolling_resistance']:g} m, {item['runs']} runs of {item['until']:g} s: {counts}."
         if item["outside_boundaries"] is not None:
             yield f"  {item['outside_boundaries']} of them on the wrong side of the analytic boundaries."
     yield f"The map is in {out / 'regimes.svg'}, its numbers in {out / 'regimes.json'}."

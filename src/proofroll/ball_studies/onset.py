@@ -1,4 +1,4 @@
-"""First slip: in the truth with its conditioning, and in every engine with its bracket."""
+"""First slip of a ball: in the truth with its conditioning, and in every engine with its bracket."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ if TYPE_CHECKING:
     from proofroll.truth.ball_on_surface.onset import Onset
 
 _EVERY = 0.01  # interval between samples [s]; engines that locate events do better than this
-_SMALLEST = float(np.finfo(float).tiny)  # what is less is round-off of zero
-_LATER = 0.05  # an engine that slips later than the truth by more than this part is run once more, to the end [1]
+_SMALLEST = float(np.finfo(float).tiny)  # smaller times are round-off of zero
+_LATER = 0.05  # first runs end this part later than the truth's slip; engines without a slip by then are run to the end
 
 
 @dataclass(frozen=True)
 class EngineOnset:
-    """The first slip in one engine.
+    """First slip in one engine.
 
     Attributes:
         engine: with the settings that were asked for.
         name: of the engine alone.
-        settings: complete; empty if it could not be asked.
+        settings: complete; empty if the engine could not be asked.
         status, message: end of its run.
         onset: the first slip with its bracket, or None.
-        difference: from the truth's first slip [s]; None where one of them is none.
+        difference: from the truth's first slip [s]; None unless both slip.
         verdict: ``agree``, ``disagree``, ``ill-posed``, ``refused`` or ``failed``.
     """
 
@@ -58,7 +58,7 @@ class EngineOnset:
 
 @dataclass(frozen=True)
 class OnsetStudy:
-    """The truth's onset with its conditioning, and every engine's, in a scene with these parameters."""
+    """First slips of the truth, with its conditioning, and of every engine in a scene with these parameters."""
 
     scene: str
     parameters: Mapping[str, Any]
@@ -68,11 +68,11 @@ class OnsetStudy:
 
 
 def default_engines(workers: Workers | None = None) -> list[str]:
-    """Every formulation of every installed engine that provides bounded friction, with its matched settings."""
+    """Engines with each formulation that provides bounded friction, and names of engines that fail to start."""
     specs: list[str] = []
     for name, told in described(engine_names(), workers).items():
         if isinstance(told, ProofrollError):
-            specs.append(name)  # the row says why it cannot run
+            specs.append(name)  # its row gives the reason
             continue
         provided = told.provides.items()
         specs += [f"{name}[formulation={key}]" for key, texts in provided if BallCapability.BOUNDED_FRICTION in texts]
@@ -89,20 +89,20 @@ def onset_study(
     uncertainty: float = 1e-3,
     progress: Callable[[Case, Result], None] | None = None,
 ) -> OnsetStudy:
-    """Runs the truth and the engines until ``until`` [s] and compares their first slips.
+    """First slips of the truth and of the engines up to ``until`` [s], compared.
 
     Args:
         scene: name of the scene.
         parameters: its parameters; friction must be bounded.
-        runner: where the cases are run.
+        runner: runs the cases.
         engines: engines with settings; all that can slip if empty.
         until: last time to look at [s].
         uncertainty: relative uncertainty of μ and f for which the verdicts hold [1].
-        progress: called with each case that is finished.
+        progress: called with each finished case.
 
     Raises:
-        InputError: the scene is not one ball that begins on its wall, its friction is unbounded, or something does not
-            exist.
+        InputError: the scene is not one ball that begins on its wall, its friction is unbounded, or a name is
+            unknown.
     """
     from proofroll.truth.ball_on_surface.onset import onset
 
@@ -129,7 +129,8 @@ def onset_study(
         results = runner.run(cases, progress)
         return [(results[case.key], _first_slip(runner, case, results[case.key])) for case in cases]
 
-    # What follows the first slip decides nothing and costs most; who slips later than that runs to the end.
+    # The motion after the first slip decides nothing and costs most; only engines without a slip by then run to the
+    # end.
     soon = _soon(truth, until)
     answers = run(asked, soon)
     late = [index for index, (result, first) in enumerate(answers) if first is None and result.status == Status.DONE]
@@ -150,7 +151,7 @@ def onset_study(
 
 
 def _soon(truth: Onset, until: float) -> float:
-    """A time a little after the truth's first slip, as a whole number of samples; ``until`` if there is none [s]."""
+    """Time shortly after the truth's first slip, a whole number of samples [s]; ``until`` without a slip."""
     if truth.time is None:
         return until
     latest = max(truth.time, truth.latest or 0.0)
@@ -165,7 +166,7 @@ def _first_slip(runner: Runner, case: Case, result: Result) -> Event | None:
 
 
 def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
-    """Agreement: the engine's bracket meets the times that the uncertainty of μ and f leaves to the truth."""
+    """Verdict on an engine's first slip: its bracket must overlap the truth's times for the uncertain μ and f."""
     if result.status == Status.REFUSED:
         return "refused"
     if result.status != Status.DONE:
@@ -179,7 +180,7 @@ def onset_verdict(truth: Onset, result: Result, first: Event | None) -> str:
 
 
 def summary(study: OnsetStudy) -> str:
-    """The conditioning of the truth in one paragraph."""
+    """Sentences on the truth's first slip and its conditioning."""
     truth = study.truth
     if truth.time is None:
         return f"In the truth the ball does not slip within {study.until:g} s."
@@ -197,7 +198,7 @@ def summary(study: OnsetStudy) -> str:
 
 
 def first_slip_told(first: Event | None) -> tuple[str, str]:
-    """Time of the first slip, and its bracket, as texts for a person."""
+    """Texts for a person: time of the first slip, and its bracket."""
     if first is None:
         return "no slip", ""
     between = f"{first.time_low:.9g} … {first.time_high:.9g}"

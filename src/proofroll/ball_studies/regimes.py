@@ -1,4 +1,4 @@
-"""Regime maps: what becomes of a ball over its initial speed and static friction, as a file of a study asks for."""
+"""Regime maps (never slips, recovers, falls) over initial speed and static friction, and the files that ask for it."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
 
 STUDY = "regimes"
-# Maps of this process by what they are made from: a report and its figures show the same ones.
+# Maps made in this process, by their study and scenes: a report and its figures share them.
 _MADE: dict[tuple[RegimesStudy, str], list[xr.Dataset]] = {}
 
-_MOST = 1000  # values of an axis: a map has the product of two such numbers of runs
+_MOST = 1000  # largest number of values on an axis; the runs of a map are the product of two
 
 
 @dataclass(frozen=True)
 class EvenValues:
-    """Equally spaced values.
+    """Equally spaced values, as the axis of a map.
 
     Attributes:
         low, high: first and last.
-        count: number of points.
+        count: number of values.
     """
 
     low: float
@@ -49,7 +49,7 @@ class EvenValues:
 
     @property
     def values(self) -> FloatArray:
-        """All values of the range."""
+        """All values, shape (count,)."""
         return np.linspace(self.low, self.high, self.count)
 
     @property
@@ -60,7 +60,7 @@ class EvenValues:
 
 @dataclass(frozen=True)
 class RegimesStudy:
-    """Maps of what becomes of the ball, one for each rolling resistance.
+    """Regime maps of a ball, one for each rolling resistance.
 
     Attributes:
         name: of the file, without ending.
@@ -91,10 +91,10 @@ class RegimesStudy:
 
 
 def load_regimes(name: str) -> RegimesStudy:
-    """Reads a file by its path, its name, or the scene that it is about.
+    """Study from a file, found by its path, its name, or its scene.
 
     Raises:
-        InputError: there is none, it is broken, or its numbers make no sense.
+        InputError: there is no such file, it is broken, or a number is out of bounds.
     """
     path, content = study_file(name, STUDY)
     study = validated(RegimesStudy, content, path.name, name=path.stem)
@@ -117,7 +117,7 @@ def regime_maps(
     progress: Callable[[int], None] | None = None,
     cluster: Cluster | None = None,
 ) -> list[xr.Dataset]:
-    """One map per value of the rolling resistance, see :func:`regime_map`."""
+    """Maps of a study, one per rolling resistance, see :func:`regime_map`; made once in a process."""
     scenes = [load_scene(study.scene, rolling_resistance=f) for f in study.rolling_resistance]
     key = study, "".join(scene.digest for scene in scenes)
     if key not in _MADE:
@@ -139,16 +139,16 @@ def regime_map(
     progress: Callable[[int], None] | None = None,
     cluster: Cluster | None = None,
 ) -> xr.Dataset:
-    """The map over initial speed × static friction; the ratio μk/μs is the scene's (1 where it has no bound).
+    """Map over initial speed × static friction; the ratio μk/μs is the scene's (1 if unbounded).
 
     Args:
         scene: one ball on one surface; its other parameters are kept.
         speeds: of the centre [m/s], shape (n,).
         frictions: μs [1], shape (m,).
         until: length of each run [s].
-        workers: number of processes; 1 runs in this one.
+        workers: number of processes; 1 runs in the present one.
         progress: called with the number of runs just finished.
-        cluster: where the runs are made; None: here.
+        cluster: runs the rows of the map; None: this machine does.
 
     Returns:
         Dataset with dims ``speed``, ``mu_static``: ``regime`` (:class:`Regime`), ``slips`` (count), ``first_slip``
@@ -193,8 +193,8 @@ def regime_map(
 
 
 def _row(body: RollingBall, mus: FloatArray, until: float, speed: float) -> list[tuple[float, float, float]]:
-    here = body.at_speed(speed)
-    return [classify(here.with_contact(mu_static=float(mu)), until) for mu in mus]
+    moving = body.at_speed(speed)
+    return [classify(moving.with_contact(mu_static=float(mu)), until) for mu in mus]
 
 
 strict(RegimesStudy, EvenValues)

@@ -16,15 +16,15 @@ from proofroll.core.number_format import counted, error, number
 from proofroll.files.atomic import ordinary_content
 from proofroll.report.long_table import COLUMNS, TableLine
 
-# Round-off of another build may change an error by this part of the quantity's size, and by this part of itself.
+# Changes of an error that count as round-off of another build: relative to the quantity's size, and to the error.
 _OF_SCALE, _OF_ERROR = 1e-9, 1e-3
-# Intervals of costs that do not meet are news where the costs differ by this factor, too: hundreds are compared, and a
-# machine is slower at one time than at another. It is more where all costs scatter: so many median deviations, which
-# are four standard ones of a normal scatter; one in 20,000 exceeds them.
+# Costs whose intervals do not overlap are reported only if they also differ by this factor, for hundreds are compared
+# and a machine's speed varies. The factor is larger where costs scatter: six median deviations, which are four standard
+# deviations of a normal scatter; one cost in 20,000 exceeds them.
 _COST, _SCATTERS = 1.5, 6.0
-# Digits of errors that changed: as few as tell them apart.
+# Digits for changed errors: the first that shows a difference is taken.
 _DIGITS = (2, 4, 8, 17)
-# So many costs tell how much slower the machine was.
+# Least number of costs that show how much slower the machine was.
 _ENOUGH = 5
 
 
@@ -33,7 +33,7 @@ class RunChange:
     """One run that changed.
 
     Attributes:
-        study, run, place: which.
+        study, run, place: names of the study and the run, and parameters of the run in words.
         kind: ``verdict``, ``value``, ``cost``, ``gone`` or ``new``; the first of these that applies.
         says: the changes as clauses.
     """
@@ -47,15 +47,15 @@ class RunChange:
 
 @dataclass(frozen=True)
 class Against:
-    """An earlier report held against this one.
+    """Comparison of an earlier report with this one.
 
     Attributes:
-        old: its path.
-        date: when it was written.
+        old: path of the earlier report.
+        date: date of the earlier report.
         versions: packages whose version changed: name -> both versions.
-        costs: costs were compared, for both reports are of one machine.
-        drift: median ratio of all costs, by which old ones are multiplied first: the machine's, not the engines'.
-        factor: by which a cost must differ then: more where most costs scatter, on a machine that was busy.
+        costs: True if costs were compared, for both reports are of one machine.
+        drift: median ratio of all costs: the machine's change, by which old costs are multiplied first.
+        factor: least factor between costs that counts as a change; larger where costs scatter.
         compared: number of runs in both.
         changes: the runs that changed.
     """
@@ -71,7 +71,7 @@ class Against:
 
     @property
     def changed(self) -> bool:
-        """True if a run of both reports changed, or one is gone; runs that are new change nothing."""
+        """True if a run of both reports changed or is gone; new runs do not count."""
         return any(item.kind != "new" for item in self.changes)
 
     @property
@@ -85,7 +85,7 @@ class Against:
             "gone": "runs that are gone",
             "new": "new runs",
         }
-        said = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in words.items() if kind in kinds)
+        counts = ", ".join(f"{kinds.count(kind)} {text}" for kind, text in words.items() if kind in kinds)
         costs = f"; costs are {number(self.drift)} of the old ones throughout, which is left out"
         if not self.costs:
             costs = "; costs are of another machine and not compared"
@@ -93,12 +93,12 @@ class Against:
             costs = ""
         if self.costs and self.factor > _COST:
             costs += f"; costs scatter, so that only those count that differ by a factor of {number(self.factor)}"
-        return f"Of {counted(self.compared, 'runs')} in both reports, changed: {said or 'nothing'}{costs}."
+        return f"Of {counted(self.compared, 'runs')} in both reports, changed: {counts or 'nothing'}{costs}."
 
 
 @dataclass(frozen=True)
 class EarlierReport:
-    """Content of an earlier report."""
+    """An earlier report, as far as it is compared: date, machine, versions and long table."""
 
     path: Path
     date: str
@@ -108,17 +108,17 @@ class EarlierReport:
 
     @classmethod
     def read(cls, path: Path, option: str = "--against") -> EarlierReport:
-        """Earlier report from its ``report.json``, which an option of a command names.
+        """Earlier report from its ``report.json``, the value of the command's ``option``.
 
         Raises:
             InputError: it cannot be read, or has no long table.
         """
         try:
-            said: dict[str, Any] = json.loads(ordinary_content(path))
-            table, made = said["table"], said["environment"]
+            content: dict[str, Any] = json.loads(ordinary_content(path))
+            table, made = content["table"], content["environment"]
             rows = [zip(table["columns"], row, strict=True) for row in table["data"]]
             lines = [TableLine(**{name: value for name, value in row if name in COLUMNS}) for row in rows]
-            return cls(path, said["date"], made["machine"], made["versions"], lines)
+            return cls(path, content["date"], made["machine"], made["versions"], lines)
         except OSError as problem:
             raise InputError(option, path, f"cannot be read: {problem.strerror or problem}") from None
         except (KeyError, RecursionError, TypeError, ValueError):
@@ -126,7 +126,7 @@ class EarlierReport:
 
 
 def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versions: dict[str, str]) -> Against:
-    """Holds an earlier report against the lines of this one, in the studies that both have."""
+    """Changes from an earlier report to the lines of this one, in the studies that both have."""
     before, after = runs_of(old.lines), runs_of(lines)
     shared = {study for study, *_ in before} & {study for study, *_ in after}
     costs = old.machine == machine
@@ -154,7 +154,7 @@ def against(old: EarlierReport, lines: Iterable[TableLine], machine: str, versio
 
 
 def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[str, TableLine]]:
-    """Lines by quantity of each run; runs of equal settings are kept apart by their order."""
+    """Lines of each run, by quantity; the key is study, place, settings, and a number among runs of equal settings."""
     rows: dict[tuple[str, str, str], dict[int, dict[str, TableLine]]] = defaultdict(dict)
     for line in lines:
         size = f"{line.resolution} {number(line.step, 6)}" if line.step is not None else ""
@@ -166,7 +166,7 @@ def runs_of(lines: Iterable[TableLine]) -> dict[tuple[str, str, str, int], dict[
 def _changes(
     before: dict[str, TableLine], after: dict[str, TableLine], noise: tuple[float, float] | None
 ) -> Iterator[tuple[str, str]]:
-    """Kind and clause of each change of a run."""
+    """(kind, clause) of each change of a run."""
     one, other = _first(before), _first(after)
     if one.status != other.status:
         yield "verdict", f"{one.status} → {other.status}: {other.message}".removesuffix(": ")
@@ -193,7 +193,7 @@ def _changes(
 
 
 def _beyond(old: TableLine, new: TableLine) -> float:
-    """Change of an error beyond both bars and round-off, in parts of the quantity's size; 0: there is none."""
+    """Change of an error beyond both error bars and round-off, relative to the quantity's size; 0 without one."""
     if not (_finite(old.error) and _finite(new.error)):
         return float(_finite(old.error) != _finite(new.error))
     scale = new.scale or max(old.error, new.error) or 1.0
@@ -203,24 +203,24 @@ def _beyond(old: TableLine, new: TableLine) -> float:
 
 
 def _finite(value: float | None) -> TypeGuard[float]:
-    """True for a number; a file has none for an error that is not finite."""
+    """True if the value is finite; None stands for an error that is not."""
     return value is not None and math.isfinite(value)
 
 
 def _first(run: dict[str, TableLine]) -> TableLine:
-    """A line of a run, for what all of them say."""
+    """Any line of a run, for fields that all its lines share."""
     return next(iter(run.values()))
 
 
 def _interval(line: TableLine) -> tuple[float, float, float] | None:
-    """Lowest, median and highest cost; None: the cost has no interval."""
+    """(lowest, median, highest) cost; None if the cost has no interval."""
     if line.cost is None or line.cost_low is None or line.cost_high is None:
         return None
     return line.cost_low, line.cost, line.cost_high
 
 
 def _noise(pairs: Iterable[tuple[TableLine, TableLine]]) -> tuple[float, float]:
-    """Median ratio of new costs to old ones, and the factor beyond it that is news; 1 and the least where few tell."""
+    """Median ratio of new to old costs, and the factor beyond it that counts as a change; defaults for few costs."""
     both = [(_interval(old), _interval(new)) for old, new in pairs]
     ratios = [math.log(new[1] / old[1]) for old, new in both if old and new and old[1] > 0 and new[1] > 0]
     if len(ratios) < _ENOUGH:
@@ -231,7 +231,7 @@ def _noise(pairs: Iterable[tuple[TableLine, TableLine]]) -> tuple[float, float]:
 
 
 def _cost(old: TableLine, new: TableLine, drift: float, factor: float) -> str:
-    """Clause on a cost that left both intervals; empty: it did not, or an interval is unknown."""
+    """Clause on a cost whose intervals do not overlap; empty without such a change, or without intervals."""
     one, other = _interval(old), _interval(new)
     if one is None or other is None:
         return ""

@@ -1,4 +1,4 @@
-"""Pictures by matplotlib: the same text from the same content."""
+"""Figures by matplotlib, reproducible byte for byte."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from proofroll.core.errors import Missing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Equal contents give equal files, so no date; PNG has no such field.
+# Equal contents must give equal files, hence no date; PNG has no such field.
 _NO_DATE: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 
 
 @contextmanager
 def styled(settings: Mapping[str, Any]) -> Iterator[None]:
-    """Settings of matplotlib, by name, while something is drawn. Raises Missing if matplotlib is not installed."""
+    """Context with settings of matplotlib, by name. Raises Missing if matplotlib is not installed."""
     try:
         import matplotlib as mpl
     except ModuleNotFoundError:
@@ -37,14 +37,14 @@ def drawn_file(
     dpi: float = 100,
     said: Mapping[str, str] = MappingProxyType({}),
 ) -> bytes:
-    """The content of a file with a figure.
+    """Content of a file with a figure.
 
     Args:
         form: ``svg``, ``png`` or ``pdf``.
         settings: of matplotlib, by name.
-        drawn: makes the figure.
-        dpi: dots per inch of what is no line or letter.
-        said: entries of the file about itself, by the names of its format.
+        drawn: function that returns the figure.
+        dpi: dots per inch of parts that are no vectors.
+        said: metadata of the file, by the names of its format.
 
     Raises:
         Missing: matplotlib is not installed.
@@ -56,12 +56,12 @@ def drawn_file(
 
 
 def svg_text(settings: Mapping[str, Any], drawn: Callable[[], Figure]) -> str:
-    """A figure as SVG; see :func:`drawn_file`."""
+    """Figure as SVG text; see :func:`drawn_file`."""
     return drawn_file("svg", settings, drawn).decode()
 
 
 def panels(count: int) -> tuple[Figure, list[Any], int, int]:
-    """A figure with so many panels, two side by side, and how many rows and columns of them it has."""
+    """A figure, its ``count`` panels in at most two columns, and its numbers of rows and columns."""
     from matplotlib.figure import Figure
 
     columns = min(2, count) or 1

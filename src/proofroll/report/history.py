@@ -1,4 +1,4 @@
-"""Reports over time: verdicts, errors and costs of each engine by its versions, and what changed when."""
+"""History of reports: verdicts, errors and costs of each engine by its versions, and changes from report to report."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _COLOURS = ("#c9622f", "#3b6fb6", "#3f8f5b", "#8b5fa8", "#b08a1e", "#b8476b", "#
 
 @dataclass(frozen=True)
 class RunHistory:
-    """One run over all reports: largest relative error and cost in each, None where it has none; if it ever changed."""
+    """One run over all reports: largest relative error and cost in each, or None; ``changed``: at any time."""
 
     run: str
     errors: list[float | None]
@@ -41,7 +41,7 @@ class RunHistory:
 
 @dataclass(frozen=True)
 class EngineHistory:
-    """One engine over all reports: its version in each (empty: it was not run), counts of verdicts, and its runs."""
+    """One engine over all reports: its version in each (empty: not run), counts of verdicts, and its runs."""
 
     engine: str
     versions: list[str]
@@ -51,7 +51,7 @@ class EngineHistory:
 
 @dataclass(frozen=True)
 class History:
-    """Reports of a folder, the oldest first; ``steps``: what changed from each to the next."""
+    """Reports of a folder, the oldest first; ``steps``: changes from each to the next."""
 
     files: list[str]
     dates: list[str]
@@ -60,7 +60,7 @@ class History:
     steps: list[Against]
 
     def lines(self) -> Iterator[str]:
-        """Changes from each report to the next, for the terminal."""
+        """Lines for the terminal: changes from each report to the next."""
         for date, step in zip(self.dates[1:], self.steps, strict=True):
             first, *rest = change_lines(step)
             yield f"{date[:10]} {first[0].lower()}{first[1:]}"
@@ -68,10 +68,10 @@ class History:
 
 
 def read_history(folder: Path) -> History:
-    """Reports of a folder (``*.json`` in it, ``report.json`` in folders of it), by date.
+    """History of the reports in a folder (``*.json`` there, ``report.json`` in its folders), by date.
 
     Raises:
-        InputError: fewer than two, or one that is no report.
+        InputError: there are fewer than two, or one is no report.
     """
     files = sorted([*folder.glob("*.json"), *folder.glob("*/report.json")])
     reports = sorted((EarlierReport.read(file, "--history") for file in files), key=lambda report: report.date)
@@ -133,7 +133,7 @@ def _numbers(run: dict[str, TableLine] | None) -> tuple[float | None, float | No
 
 
 def _drawn(engine: EngineHistory, dates: Sequence[str]) -> Figure:
-    """Errors and costs over the reports: grey what never changed, coloured what did."""
+    """Figure of errors and costs over the reports; runs that never changed are grey."""
     figure, drawn, _, _ = panels(2)
     figure.set_size_inches(10, 3.4)
     at = range(len(dates))

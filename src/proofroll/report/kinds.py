@@ -1,4 +1,4 @@
-"""Additions of a kind of element to the report of a comparison. Each kind brings them as a plug-in."""
+"""Plug-ins by which a kind of element adds to the report of a comparison."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from proofroll.studies.comparison.outcome import Run
 
 GROUP = "proofroll.report_kinds"
-# Group of the scenes for which no kind names one.
+# Group of scenes whose kind names none.
 OTHER = "other scenes"
 
 
@@ -31,10 +31,10 @@ class ReportKind(Protocol):
     Attributes:
         template: in the folder ``templates`` beside the class's module, with the macro
             ``truth(comparison, number, index, truth)``: facts of a truth besides its route; empty: none.
-        names: further names that the template uses; no other kind has them.
+        names: additional names for the template; they must differ from those of other kinds.
         caption: text below the drawings.
-        replay_script: beside the template, what draws its cases of the replay in a browser; empty: it has none. See
-            ``replay.js`` for what it is given and what it gives.
+        replay_script: script in the folder ``templates`` that draws the kind's replays in a browser; empty: none. Its
+            input and output are described in ``replay.js``.
     """
 
     template: ClassVar[str] = ""
@@ -44,7 +44,7 @@ class ReportKind(Protocol):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """True if the kind covers the scene's elements."""
+        """True if the kind covers all elements of the scene."""
 
     @staticmethod
     def group(scene: Scene) -> str:  # noqa: ARG004 -- for those who tell several apart
@@ -53,7 +53,7 @@ class ReportKind(Protocol):
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
-        """Drawings of a comparison's scene for all its cases; and why there are none, if so."""
+        """Drawings of a comparison's scene for all its cases; and the reason if there are none."""
 
     @staticmethod
     def truth_facts(scene: Scene, dataset: xr.Dataset) -> Any:  # noqa: ARG004 -- for those who have any
@@ -62,12 +62,12 @@ class ReportKind(Protocol):
 
     @staticmethod
     def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run]) -> Sequence[Any]:  # noqa: ARG004 -- as above
-        """Facts of each run of a comparison besides its verdicts: a record or None; truths have :meth:`truth_facts`."""
+        """Facts of each run of a comparison besides its verdicts, a record or None each."""
         return [None] * len(runs)
 
     @staticmethod
     def curves(scene: Scene, truth: xr.Dataset) -> Sequence[Observable]:  # noqa: ARG004 -- as above
-        """Curves over time besides the scene's own observables, each judged within one of them."""
+        """Curves over time besides the scene's own observables; each is part of a judged observable."""
         return ()
 
     @staticmethod
@@ -77,31 +77,31 @@ class ReportKind(Protocol):
 
     @staticmethod
     def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:  # noqa: ARG004 -- as above
-        """The curves of a comparison with its marks."""
+        """Curves of a comparison with the kind's marks added."""
         return curves
 
     @staticmethod
     def replay() -> ReplayKind:
-        """Drawing of its scenes in the replay."""
+        """Drawing of the kind's scenes in the replay."""
 
 
 @cache
 def report_kinds() -> Mapping[str, type[ReportKind]]:
-    """All report kinds that installed packages announce, by name."""
+    """Report kinds that installed packages announce, by name."""
     return {point.name: kind for point, kind in loaded(GROUP, like=ReportKind)}
 
 
 def kind_name(scene: Scene) -> str:
-    """Name of the kind that covers the scene; empty: none does."""
+    """Name of the kind that covers the scene; empty without one."""
     return next((name for name, kind in report_kinds().items() if kind.covers(scene)), "")
 
 
 def kind_of(scene: Scene) -> type[ReportKind] | None:
-    """The kind that covers the scene, if any."""
+    """Kind that covers the scene, or None."""
     return report_kinds().get(kind_name(scene))
 
 
 def group_of(scene: Scene) -> str:
-    """Group of scenes to which a scene belongs: a column of the matrix of engines and scenes."""
+    """Group of a scene: a column of the matrix of engines and scenes."""
     kind = kind_of(scene)
     return OTHER if kind is None else kind.group(scene)

@@ -1,4 +1,4 @@
-"""Names in the report: rows, symbols of quantities, steps."""
+"""Labels in the report: rows, symbols of quantities, steps."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ MEANINGS = {
 
 
 def precision_words(precision: str) -> tuple[str, ...]:
-    """Text of a precision beside an engine's settings; empty for double."""
+    """Label of a precision beside an engine's settings; empty for double."""
     return ("f32",) if precision == "single" else ()
 
 
@@ -53,9 +53,9 @@ def unjudged(content: ReportedComparison) -> int:
 
 
 def verdict_text(row: ReportedRow) -> str:
-    """The verdict of a row; where its cases have several, how many have which: ``failed 1/11 ✗2 ✓8``.
+    """Verdict of a row, with the counts of its cases if their verdicts differ: ``failed 1/11 ✗2 ✓8``.
 
-    A star leads to what is remarked under the table.
+    A star refers to a remark below the table.
     """
     star = "*" if row.remarks else ""
     counts = {word: row.verdicts[word] for word in SYMBOLS if row.verdicts.get(word)}
@@ -66,7 +66,7 @@ def verdict_text(row: ReportedRow) -> str:
 
 
 def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
-    """Detail beside the verdict of a row, a run or a judgement, in few words."""
+    """Short detail beside the verdict of a row, a run or a judgement; empty for most verdicts."""
     match entry.verdict:
         case "differs":
             return {"no ladder": "one step only"}.get(entry.limit, str(entry.limit))
@@ -79,12 +79,12 @@ def detail(entry: ReportedRow | ReportedRun | Judgement) -> str:
 
 
 def unit(text: str) -> str:
-    """Unit as it is shown; empty for a number without unit."""
+    """Unit as shown to readers; empty for a number without unit."""
     return "" if text == "1" else text.replace("^2", "²").replace("^3", "³")
 
 
 def symbol(name: str) -> str:
-    """A quantity's name with the name of a Greek letter, and a number after it, as one reads them: γ, ω1."""
+    """Symbol of a quantity: a Greek letter for its name, with a number after it (γ, ω1); else its name with spaces."""
     letters = name.rstrip("0123456789")
     try:
         return unicodedata.lookup(f"GREEK SMALL LETTER {letters.upper()}") + name[len(letters) :]
@@ -99,19 +99,19 @@ def off_by(judgement: Judgement) -> str:
 
 
 def step(resolution: str | None, value: float | None) -> str:
-    """The setting that trades speed for accuracy: ``dt 2.5e-3 s``, ``rtol 2.2e-14``; nothing where there is none."""
+    """Text of the setting that trades speed for accuracy: ``dt 2.5e-3 s``, ``rtol 2.2e-14``; empty without one."""
     if not resolution or value is None:
         return ""
     return f"dt {number(value, 3)} s" if resolution == "dt" else f"{resolution} {number(value)}"
 
 
 def setting(row: Setting) -> str:
-    """Formulation and preset of a row, or what the comparison file calls it."""
+    """Formulation and preset of a row, or else its text in the comparison file."""
     return " ".join(str(part) for part in (row.formulation, row.setting) if part) or str(row.engine)
 
 
 def names(rows: Sequence[Setting]) -> list[str]:
-    """A short name for each row, unlike that of any other row: the comparison file's text where need be."""
+    """Unique short name of each row; its text in the comparison file if short names coincide."""
     short = []
     for row in rows:
         words = [str(word) for word in (row.name, row.formulation, row.setting) if word]
@@ -121,7 +121,7 @@ def names(rows: Sequence[Setting]) -> list[str]:
 
 
 def name_of(point: BoundaryPoint | MeasuredPoint) -> str:
-    """Engine, formulation and preset of a point of a study, and f32."""
+    """Engine, formulation and preset of a point of a study, and ``f32`` if single precision."""
     settings = point.settings
     words = point.engine, settings.get("formulation"), settings.get("preset"), *precision_words(point.precision)
     return " ".join(filter(None, words))
@@ -133,31 +133,31 @@ def listed(parameters: Mapping[str, float]) -> str:
 
 
 def with_caveat(name: str, caveat: str) -> str:
-    """A name, and in brackets what of it is not the engine's own."""
+    """A name with its caveat in brackets: the part that is not the engine's own."""
     return f"{name} ({caveat})" if caveat else name
 
 
 def family_and_caveat(point: Any) -> str:
-    """Family and caveat of a measured point, in one clause; empty: none."""
+    """Family and caveat of a measured point, in one clause; empty without either."""
     return "; ".join(filter(None, (point.family, point.caveat)))
 
 
 def caveat_lines(rows: Sequence[Setting]) -> list[str]:
-    """Families and caveats of settings: one sentence for each, with the settings that have it."""
+    """Sentences on families and caveats of settings, each with the settings that have it."""
     settings: dict[str, list[str]] = {}
-    for told in ([row.family for row in rows], [row.caveat for row in rows]):
-        for row, said in zip(rows, told, strict=True):
-            if said:
+    for notes in ([row.family for row in rows], [row.caveat for row in rows]):
+        for row, note in zip(rows, notes, strict=True):
+            if note:
                 where = " ".join(str(part) for part in (row.formulation, row.setting) if part)
-                settings.setdefault(f"{said}: {row.name}", []).append(where)
-    return [f"{said[0].upper()}{said[1:]} {', '.join(dict.fromkeys(where))}." for said, where in settings.items()]
+                settings.setdefault(f"{note}: {row.name}", []).append(where)
+    return [f"{note[0].upper()}{note[1:]} {', '.join(dict.fromkeys(where))}." for note, where in settings.items()]
 
 
 def settings_text(settings: dict[str, Any]) -> str:
-    """Complete settings in one line, without those that are left to the engine."""
+    """Settings in one line, without those left to the engine (None)."""
     return ", ".join(f"{key}={value}" for key, value in settings.items() if value is not None)
 
 
 def values(numbers: list[float | None]) -> str:
-    """One number, or the components of a vector."""
+    """A number, or the components of a vector, as text."""
     return ", ".join(number(value, 8, none="not finite") for value in numbers)

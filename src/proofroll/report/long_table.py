@@ -1,4 +1,4 @@
-"""The long table: one line for each quantity of each run, with flat values alone; the files of a report hold it."""
+"""Long table of a report: one line for each quantity of each run, with flat values, in JSON and CSV."""
 
 import csv
 import io
@@ -12,19 +12,20 @@ from proofroll.files.json_data import plain
 
 @dataclass(frozen=True, kw_only=True)
 class TableLine:
-    """One quantity of one run, or a run without any.
+    """One quantity of one run, or a run without quantities.
 
     Attributes:
         study: name of the file that asked for the run.
-        group: of scenes like this one.
+        group: group of the scene.
         scene: name of the scene.
         place: parameters of the run in words; empty: the scene's own.
         row: number of the run's row in its study.
-        engine, version, formulation, preset, setting, precision: which; ``setting`` has preset and further options.
+        engine, version, formulation, preset, setting, precision: of the run; ``setting`` has preset and further
+        options.
         own_equations: the run solves equations derived for the scene, as its truth does.
         resolution, step: setting that trades speed for accuracy, and its value.
         status, message: end of the run.
-        verdict: of the quantity, of a run without quantities that of the run; empty: none was given.
+        verdict: of the quantity, or of a run without quantities; empty: none was given.
         limit: result of a ladder of steps for the quantity.
         quantity, unit, role: the measured quantity and its role (:class:`proofroll.core.observable.Role`).
         headline: summaries show it.
@@ -35,8 +36,8 @@ class TableLine:
         order: observed order of the time step.
         cost: wall seconds per simulated second.
         cost_low, cost_high: its interval; None: it was measured once.
-        clean: the cost was measured in clean runs of their own; otherwise it is that of the sampled run, beside which
-            others ran.
+        clean: True if clean runs of their own measured the cost; else it is that of the sampled run, during which other
+            processes ran.
     """
 
     study: str
@@ -73,7 +74,7 @@ class TableLine:
 
     @property
     def relative(self) -> float:
-        """Error with the truth's error bar in parts of the quantity's size: the truth vouches for no more."""
+        """Error plus the truth's error bar, relative to the quantity's size; inf without either."""
         if self.error is None or not self.scale:
             return math.inf
         return (self.error + (self.truth_error_bar or 0.0)) / self.scale
@@ -84,17 +85,17 @@ COLUMNS = tuple(item.name for item in fields(TableLine))
 
 @dataclass(frozen=True)
 class LongTable:
-    """The lines of a report."""
+    """Lines of a report, as JSON and CSV."""
 
     lines: Sequence[TableLine]
 
     def as_dict(self) -> dict[str, Any]:
-        """Names of columns once, then the values of each line, for JSON; ``pandas.DataFrame(**table)`` reads it."""
+        """Names of columns, and the values of each line, for JSON; ``pandas.DataFrame(**table)`` reads it."""
         return {"columns": COLUMNS, "data": [[getattr(line, name) for name in COLUMNS] for line in self.lines]}
 
     @property
     def csv(self) -> str:
-        """All lines as CSV; a value that is missing or not finite is an empty field."""
+        """Lines as CSV; a value that is missing or not finite is an empty field."""
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(COLUMNS)

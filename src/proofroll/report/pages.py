@@ -1,4 +1,4 @@
-"""Parts of every page: templates that escape, pictures as elements, and large contents compressed."""
+"""Utilities of every page: templates with escaping, figures as elements, compressed contents."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 
 def environment(*folders: Path) -> jinja2.Environment:
-    """The report's templates and those of further folders, as they are now: a long run ends with what it began with.
+    """Templates of the report and of further folders, read now, so that changes during a long run have no effect.
 
-    Everything is escaped, save what they mark as ours.
+    All values are escaped but those that templates mark as safe.
     """
     import jinja2
 
-    places = dict.fromkeys([Path(__file__).parent / "templates", *folders])  # of equal names the first counts
+    places = dict.fromkeys([Path(__file__).parent / "templates", *folders])  # the first of equal names counts
     files = [path for place in reversed(places) if place.is_dir() for path in place.iterdir() if path.is_file()]
     return jinja2.Environment(
         loader=jinja2.DictLoader({path.name: path.read_text(encoding="utf-8") for path in files}),
@@ -32,21 +32,21 @@ def environment(*folders: Path) -> jinja2.Environment:
 
 
 def rendered(templates: jinja2.Environment, name: str, **said: Any) -> str:
-    """A page; a lone surrogate from an engine's message becomes a question mark."""
+    """Rendered page; a lone surrogate from an engine's message becomes a question mark."""
     return templates.get_template(name).render(**said).encode("utf-8", "replace").decode("utf-8")
 
 
 def packed(content: bytes) -> str:
-    """Bytes as text that ``templates/unpack.js`` reads: gzip in base64, so no markup; always the same of the same."""
+    """Bytes as text for ``templates/unpack.js``: gzip in base64, without markup, reproducible byte for byte."""
     return base64.b64encode(gzip.compress(content, compresslevel=9, mtime=0)).decode("ascii")
 
 
 def folded(html: str) -> str:
-    """A page whose closed folds (``<details>``) are built when they are opened.
+    """Page whose closed folds (``<details>``) are built only when they are opened.
 
-    What follows the summary of each is moved into the element with the id ``folds``, compressed; ``templates/page.js``
-    puts it back. A fold within a fold is one of its own, and one with the attribute ``data-whole`` stays as it is.
-    So a browser reads, places and paints only what is open.
+    The content of each fold but its summary is moved into the element with the id ``folds``, compressed;
+    ``templates/page.js`` puts it back. Folds within a fold are moved separately; one with the attribute ``data-whole``
+    stays. So a browser parses, lays out and paints only what is open.
     """
     texts: list[str] = []
     levels: list[list[str]] = [[]]
@@ -65,13 +65,13 @@ def folded(html: str) -> str:
 
 
 def element(text: str, prefix: str) -> str:
-    """A picture from matplotlib as an element: its ids begin with ``prefix``, and no style of it reaches the page."""
+    """SVG element of a matplotlib figure: its ids begin with ``prefix``, and its styles are removed."""
     text = text[text.index("<svg") :]
     text = re.sub(r"<(metadata|style)\b.*?</\1>", "", text, flags=re.DOTALL)
     start, _, rest = text.partition(">")
     start = re.sub(r' (?:xmlns(?::\w+)?|version|width|height)="[^"]*"', "", start)
-    text = f'{start} aria-hidden="true">{rest}'  # whoever shows it says in words what is on it
-    # Only ids that something refers to: equal images would share theirs.
+    text = f'{start} aria-hidden="true">{rest}'  # the surrounding text describes it
+    # Keeps only ids that are referred to, for equal images would share the others.
     text = re.sub(r' id="([^"]*)"', lambda found: f' id="{prefix}{found[1]}"' if f"#{found[1]}" in text else "", text)
     text = re.sub(r'href="#', f'href="#{prefix}', text)
     return re.sub(r"url\(#", f"url(#{prefix}", text)

@@ -1,4 +1,4 @@
-"""The parts of a report besides the comparisons: each is a file of a study, what is known of it, and how to make it.
+"""Parts of a report besides the comparisons: file of a study, its stored results, and the run that makes them.
 
 Kinds of parts are plug-ins, our own too: entry points of the group ``proofroll.report_parts``.
 """
@@ -28,11 +28,11 @@ class PartEntry:
     """Entry of a part in a report.
 
     Attributes:
-        name, title, question, scene, command: as its ``head`` has them.
-        missing: reason for which there is nothing, and the command that makes it; empty: there is something.
+        name, title, question, scene, command: as in its ``head``.
+        missing: reason why there are no results, and the command that makes them; empty: there are.
         study: its stored results, or None.
-        contradictions: sentences about what was claimed and is not so.
-        lost: sentences about engines without which it is not whole.
+        contradictions: sentences on claims that do not hold.
+        lost: sentences on missing engines, without which the study is incomplete.
     """
 
     name: str
@@ -51,15 +51,15 @@ class Part(Protocol):
 
     Attributes:
         kind: of the study, as its files have it: ``study = "…"``.
-        key: under which the content lists it.
-        order: place among the parts of a report, the smallest first.
+        key: name of its list in the content of a report.
+        order: position among the parts of a report, the smallest first.
         words: name of the part, for a person.
-        command: of ``proofroll`` that makes it, with fields of ``asked`` as in ``stability {.scene}``.
+        command: arguments of ``proofroll`` that make it, with fields of ``asked`` as in ``stability {.scene}``.
         template: in the folder ``templates`` beside the class's module, with the macros
             ``section(entry, index, pictures, content)`` and ``link(entry, index, count)``; the latter for the contents.
-        names: further names that the template uses; no other part has them.
+        names: additional names for the template; they must differ from those of other parts.
         asked: content of its file.
-        engines: to which it is restricted; none: all.
+        engines: engines that the study is restricted to; empty: all.
     """
 
     kind: ClassVar[str]
@@ -74,15 +74,15 @@ class Part(Protocol):
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> Part:
-        """The part that a file asks for, restricted to some engines. Raises InputError if the file is broken."""
+        """Part from a study's file, restricted to some engines. Raises InputError if the file is broken."""
 
     @staticmethod
     def line(entry: Any) -> str:
-        """Result in one line, without its name and a full stop, for the terminal."""
+        """Result of an entry in one line for the terminal, without name and full stop."""
 
     @property
     def on_request(self) -> bool:
-        """True if a report without names leaves it out unless it is kept; as its file says."""
+        """True if a report of all studies has the part only if its results are stored; set in the study's file."""
         return getattr(self.asked, "on_request", False)
 
     @property
@@ -93,36 +93,36 @@ class Part(Protocol):
         return {key: getattr(self.asked, key) for key in ("name", "title", "question", "scene")} | {"command": command}
 
     def keeps(self, out: Path) -> bool:  # noqa: ARG002 -- for those that keep something
-        """Takes what is kept under ``out`` and still holds; False: there is nothing."""
+        """True if results under ``out`` are stored and still valid; the part then holds them."""
         return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
         """Runs the study with the least effort that gives a result."""
 
     def entry(self) -> PartEntry:
-        """Entry of the part, with the further names of its template; only after it was made or taken."""
+        """Entry of the part, with the additional names of its template; only after :meth:`make` or :meth:`keeps`."""
 
     def lines(self) -> Sequence[TableLine]:
-        """Its runs in the long table; only after it was made or taken."""
+        """Lines of its runs in the long table; only after :meth:`make` or :meth:`keeps`."""
         return ()
 
     def pictures(self, prefix: str) -> dict[str, str]:  # noqa: ARG002 -- for those that have any
-        """Its pictures as markup, by name; every id in them begins with ``prefix``."""
+        """Pictures as markup, by name; every id in them begins with ``prefix``."""
         return {}
 
 
 @cache
 def part_kinds() -> tuple[type[Part], ...]:
-    """All kinds of parts that installed packages announce, in the order of a report."""
+    """Kinds of parts that installed packages announce, in the order of a report."""
     return tuple(sorted((kind for _, kind in loaded(GROUP, like=Part)), key=lambda kind: kind.order))
 
 
 def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], list[Part]]:
-    """The names of comparisons, and the parts that other names stand for.
+    """Names of comparisons, and parts for the other names.
 
     Args:
         names: of comparisons, scenes and files for other studies, or paths, of robot files too.
-        engines: to which studies are restricted.
+        engines: engines that studies are restricted to.
 
     Raises:
         InputError: a file is broken, or asks for something that is no part of a report.
@@ -142,27 +142,27 @@ def parts_of(names: Sequence[str], engines: Sequence[str]) -> tuple[list[str], l
 
 
 def all_parts(engines: Sequence[str], out: Path) -> list[Part]:
-    """Parts of all studies' files in the order of a report; parts on request only where ``out`` has their results."""
+    """Parts of all studies' files in the order of a report; those on request only if ``out`` has their results."""
     parts = [kind.load(path, engines) for kind in part_kinds() for path, _ in study_files(kind.kind)]
     return [part for part in parts if not part.on_request or part.keeps(out)]
 
 
 def attempt(part: Part, action: Callable[[], bool | None]) -> PartEntry | None:
-    """The entry of a part on which something was done; None where that was False: there is nothing.
+    """Entry of a part after an action on it; None if the action returned False, for lack of results.
 
-    Whatever happens in it, a report goes on: the entry then says what.
+    A failure of any kind becomes an entry with its reason, so that the report goes on.
     """
     try:
         return None if action() is False else part.entry()
     except ProofrollError as error:
         return absent(part, str(error))
     except Exception as error:
-        said = f"{type(error).__name__}: {error}".strip(": ")
-        return absent(part, f"an error of proofroll's own, {said}")
+        reason = f"{type(error).__name__}: {error}".strip(": ")
+        return absent(part, f"an error of proofroll's own, {reason}")
 
 
 def absent(part: Part, reason: str) -> PartEntry:
-    """Entry of a missing part; one sentence gives the reason, and the command that makes it."""
+    """Entry of a missing part; one sentence gives the reason and the command that makes it."""
     missing = f"{' '.join(reason.split()).rstrip('.')}; {part.head['command']} makes it."
     return PartEntry(**part.head, missing=missing)
 

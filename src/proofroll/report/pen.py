@@ -1,4 +1,4 @@
-"""Lines, arrows and letters of a drawing: points in space go in, marks of an SVG picture come out."""
+"""Drawings of lines, arrows and letters: from points in space to marks of an SVG picture."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from proofroll.core.arrays import FloatArray
 
-# Points along a whole circle: as smooth as a screen can show.
+# Points along a whole circle, enough to look smooth on a screen.
 _ROUND = 72
 _HEAD = 8.0  # length of an arrow's head [px]
 _LETTER = 8.0  # width of a letter [px]
@@ -45,7 +45,7 @@ class View:
 
 @dataclass(frozen=True)
 class Polyline:
-    """A line through places of the picture, closed or not."""
+    """A line through places of the picture [px], closed or not."""
 
     points: list[list[float]]
     closed: bool
@@ -54,7 +54,7 @@ class Polyline:
 
 @dataclass(frozen=True)
 class Disc:
-    """A circle of the picture."""
+    """A circle of the picture [px]."""
 
     centre: list[float]
     radius: float
@@ -63,7 +63,7 @@ class Disc:
 
 @dataclass(frozen=True)
 class Letters:
-    """Letters or an index (``sub``)."""
+    """Part of a lettering: plain letters, or an index (``sub``)."""
 
     text: str
     sub: bool
@@ -71,7 +71,7 @@ class Letters:
 
 @dataclass(frozen=True)
 class Lettering:
-    """Letters around a place of the picture."""
+    """Letters centred at a place of the picture [px]."""
 
     x: float
     y: float
@@ -81,7 +81,7 @@ class Lettering:
 
 @dataclass(frozen=True)
 class Picture:
-    """Marks in the order in which they are drawn; ``box``: x, y, width and height that hold them [px]."""
+    """A finished picture: marks in drawing order; ``box``: x, y, width and height around all of them [px]."""
 
     box: list[float]
     marks: list[Polyline | Disc | Lettering]
@@ -90,11 +90,11 @@ class Picture:
 
 @dataclass
 class Drawing:
-    """Marks of a picture.
+    """A picture in the making.
 
-    ``look`` of a mark names how it looks: ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``, ``ghost``,
-    ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for the filled heads of arrows, and ``letter``,
-    ``motion-letter``, ….
+    ``look`` of a mark is the name of its style: ``line``, ``thin``, ``hidden``, ``axis``, ``wall``, ``ball``,
+    ``ghost``, ``faint``, ``motion``, ``force``, ``frame``, the same with ``-head`` for the filled heads of arrows, and
+    ``letter``, ``motion-letter``, ….
     """
 
     marks: list[Polyline | Disc | Lettering] = field(default_factory=list)
@@ -102,29 +102,29 @@ class Drawing:
 
     @property
     def box(self) -> list[float]:
-        """The x, y, width and height that hold everything so far [px]."""
+        """x, y, width and height around all marks so far [px]."""
         places = np.concatenate(self._bounds)
         low, high = np.floor(places.min(axis=0)) - _MARGIN, np.ceil(places.max(axis=0)) + _MARGIN
         return [*low.tolist(), *(high - low).tolist()]
 
     def picture(self, label: str) -> Picture:
-        """The finished picture; ``label`` says what it shows."""
+        """Finished picture; ``label`` describes it."""
         return Picture(self.box, self.marks, label)
 
     def path(self, points: npt.ArrayLike, look: str, closed: bool = False) -> None:
-        """A line through places of the picture, shape (n, 2)."""
+        """Draws a line through places of the picture, shape (n, 2)."""
         places = np.asarray(points, dtype=np.float64)
         self._bounds.append(places)
         self.marks.append(Polyline(np.round(places, 1).tolist(), closed, look))
 
     def disc(self, centre: Sequence[float], radius: float, look: str) -> None:
-        """A circle in the plane of the picture, the outline of a ball from any side."""
+        """Draws a circle in the plane of the picture, for example the outline of a ball."""
         (x, y), r = centre, radius
         self._bounds.append(np.array([[x - r, y - r], [x + r, y + r]]))
         self.marks.append(Disc([round(x, 1), round(y, 1)], round(r, 1), look))
 
     def arrow(self, points: npt.ArrayLike, look: str) -> None:
-        """A line through places of the picture, straight or curved, with a head at its end; shape (n, 2)."""
+        """Draws an arrow along a line through places of the picture, straight or curved, shape (n, 2)."""
         places = np.asarray(points, dtype=np.float64)
         self.path(places, look)
         tip = places[-1]
@@ -144,7 +144,7 @@ class Drawing:
     def text(
         self, place: npt.ArrayLike, symbol: str, look: str = "letter", beside: tuple[float, float] = (0.0, 0.0)
     ) -> None:
-        """Letters around a place of the picture, or so many pixels ``beside`` it.
+        """Writes letters centred at a place of the picture, shifted by ``beside`` [px].
 
         ``_`` begins an index of one character: ``V_0``, ``c = b − a``.
         """
@@ -156,7 +156,7 @@ class Drawing:
             rest = piece[1:] if number else piece
             if rest:
                 parts.append(Letters(rest, False))
-        # Letters are about so wide and high; where they are a little more, the margin holds them.
+        # Letters are about as wide and high as this; the margin holds the rest of wider ones.
         width = _LETTER * sum(len(part.text) for part in parts)
         left = x - width / 2
         self._bounds.append(np.array([[left, y - 1.5 * _LETTER], [left + width, y + 0.5 * _LETTER]]))
@@ -164,12 +164,12 @@ class Drawing:
 
 
 def turn(start: float, end: float) -> FloatArray:
-    """Angles from one to the other [rad], so close that a circle through them looks round."""
+    """Angles from ``start`` to ``end`` [rad], close enough for a smooth circle."""
     return np.linspace(start, end, max(2, round(_ROUND * abs(end - start) / (2 * math.pi)) + 1))
 
 
 def circle(centre: npt.ArrayLike, one: npt.ArrayLike, other: npt.ArrayLike, angles: Iterable[float]) -> FloatArray:
-    """Points of a circle in space at angles from its radius ``one`` to its radius ``other``, shape (n, 3)."""
+    """Points of a circle in space at angles [rad] from the radius ``one`` towards ``other``, shape (n, 3)."""
     phi = np.asarray(list(angles), dtype=np.float64)[:, None]
     return np.asarray(np.asarray(centre) + np.cos(phi) * np.asarray(one) + np.sin(phi) * np.asarray(other))
 

@@ -7,7 +7,7 @@ from proofroll.report.comparison.records import ReportedRow
 
 DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot")
 COLOURS = 8
-# plotly's names of symbols, each with its outline around (0, 0) for the legend.
+# plotly's names of symbols, each with its outline around (0, 0) for the legend, as an SVG path.
 OUTLINES = {
     "circle": "M-3.4 0a3.4 3.4 0 1 0 6.8 0a3.4 3.4 0 1 0 -6.8 0Z",
     "square": "M-3 -3H3V3H-3Z",
@@ -26,7 +26,7 @@ OUTLINES = {
 
 @dataclass(frozen=True)
 class Style:
-    """Number of the colour, plotly's names of dashes and symbol, width of the line [px], and opacity."""
+    """Style of a row: number of the colour, plotly's dashes and symbol, width of the line [px], and opacity."""
 
     colour: int
     dash: str
@@ -36,7 +36,7 @@ class Style:
 
 
 def styles(rows: Sequence[ReportedRow]) -> list[Style]:
-    """Style of each row: colour by engine, dashes by formulation, width by preset, symbol by place."""
+    """Style of each row: colour by engine, dashes by formulation, width by preset, symbol by number in the engine."""
     engines = list(dict.fromkeys(row.name for row in rows))
     formulations = {name: list(dict.fromkeys(r.formulation for r in rows if r.name == name)) for name in engines}
     widths = {"default": 1.1, "tuned": 2.4}
@@ -51,7 +51,7 @@ def styles(rows: Sequence[ReportedRow]) -> list[Style]:
                 dash=DASHES[formulations[row.name].index(row.formulation) % len(DASHES)],
                 width=widths.get(row.preset or "", 1.7),
                 symbol=names[place % len(names)] + ("-open" if place // len(names) % 2 else ""),
-                opacity=0.5 if row.verdict in {"differs", "failed"} else 1,  # not to hide those that agree
+                opacity=0.5 if row.verdict in {"differs", "failed"} else 1,  # so that they do not hide rows that agree
             )
         )
     return looks

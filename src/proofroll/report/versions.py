@@ -1,4 +1,4 @@
-"""One engine in two versions, for a person: a table, sentences, and a page."""
+"""Comparison of two versions of an engine for readers: a table, sentences, and a page."""
 
 from collections.abc import Iterator
 
@@ -13,7 +13,7 @@ from proofroll.running.case import told_hosts
 from proofroll.studies.versions.difference import NumberKind
 from proofroll.studies.versions.versions import SettingDifference, VersionsStudy
 
-_MOST = 12  # sentences of a kind on the terminal; the JSON document has all
+_MOST = 12  # most sentences of a kind on the terminal; the JSON document has all
 
 
 def heading(content: VersionsStudy) -> str:
@@ -25,8 +25,8 @@ def heading(content: VersionsStudy) -> str:
 def answer(content: VersionsStudy) -> str:
     """Summary of the changes, in one sentence."""
     if content.robot is not None:
-        said = f"{counted(len(content.changed), 'changes')} in how they hold {content.robot.file}"
-        return said if content.changed else f"Both hold {content.robot.file} alike."
+        changes = f"{counted(len(content.changed), 'changes')} in how they hold {content.robot.file}"
+        return changes if content.changed else f"Both hold {content.robot.file} alike."
     cases = content.cases
     changed = sum(bool(case.changed) for case in cases)
     kinds = [case.numbers.kind for case in cases if case.numbers]
@@ -41,7 +41,7 @@ def answer(content: VersionsStudy) -> str:
 
 
 def cells(row: SettingDifference) -> list[str]:
-    """The setting, and then and now its verdicts over all cases, the largest difference, the orders, and the time."""
+    """Cells of a row: setting, verdicts then and now, largest difference, declared orders, and ratio of times."""
     before, after = (
         " ".join(f"{SYMBOLS[word]}{row.verdicts[side][word]}" for word in SYMBOLS if word in row.verdicts[side])
         for side in ("old", "new")
@@ -63,7 +63,7 @@ def cells(row: SettingDifference) -> list[str]:
 
 
 def table(content: VersionsStudy) -> Table:
-    """One line for each setting of each comparison."""
+    """Table with a line for each setting of each comparison."""
     made = plain_table(
         Column("setting", overflow="fold", min_width=16),
         Column("verdicts"),
@@ -81,7 +81,7 @@ def table(content: VersionsStudy) -> Table:
 
 
 def robot_table(content: VersionsStudy) -> Table:
-    """One line for each layer of a robot's check."""
+    """Table with a line for each layer of a robot's check."""
     made = plain_table(*map(Column, ("layer", content.old.version, content.new.version)))
     for layer in content.robot.layers:
         shown = ["–" if layer_text is None else layer_text for layer_text in (layer.old, layer.new)]
@@ -90,13 +90,13 @@ def robot_table(content: VersionsStudy) -> Table:
 
 
 def short(setting: str) -> str:
-    """Settings in few characters: formulation and preset without their keys."""
+    """Short text of a setting: formulation and preset without their keys."""
     parts = (part.split("=", 1) for part in setting.split(", "))
     return " ".join(part[-1] if part[0] in {"formulation", "preset"} else "=".join(part) for part in parts)
 
 
 def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
-    """Changes, in sentences; ``!!`` before those that decide the exit code."""
+    """Sentences on the changes; ``!!`` precedes those that decide the exit code."""
     yield from _some([f"!! {sentence}" for sentence in _changes(content)], most)
     orders = [
         f"{row.comparison}: {short(row.setting)}: observed order of {order.quantity} {order.old:.2f} → {order.new:.2f}"
@@ -115,7 +115,7 @@ def lines(content: VersionsStudy, most: int | None = _MOST) -> Iterator[str]:
 
 
 def _changes(content: VersionsStudy) -> list[str]:
-    """Changes of verdicts, each once with its points."""
+    """Sentences on changed verdicts, each once with its points."""
     if content.robot is not None:
         return list(content.changed)
     points: dict[tuple[str, str, str], list[str]] = {}
@@ -136,7 +136,7 @@ def _some(sentences: list[str], most: int | None) -> Iterator[str]:
 
 
 def page(content: VersionsStudy) -> str:
-    """The HTML page; everything from engines and files is escaped."""
+    """HTML page of the study; text from engines and files is escaped."""
     return rendered(
         environment(),
         "versions.html",

@@ -1,4 +1,4 @@
-"""Drawings of a ball with symbols: where it touches, and as a whole, by the kind of its wall or as coordinate lines."""
+"""Drawings of a ball with symbols: its contact enlarged, and the whole scene by the kind of its wall."""
 
 import itertools
 from functools import singledispatch
@@ -12,16 +12,16 @@ from proofroll.report.labels import symbol
 from proofroll.report.pen import Drawing, View, circle, turn
 
 _BALL = 84.0  # radius of the ball [px]
-# How far rolling resistance shifts the normal force, in radii: millimetres would not be seen.
+# Shift of the normal force by rolling resistance, in radii; the true one would be invisible.
 _SHIFT = 0.3
 E1, E2, E3 = np.eye(3)
 
 
 def contact(body: RollingBall, viewer: tuple[float, float, float], up: tuple[float, float, float]) -> Drawing:
-    """The ball, enlarged, in its local frame at the start of the motion.
+    """Drawing of the ball, enlarged, in its local frame at the start of the motion.
 
     Args:
-        body: the scene's ball; of it the direction of gravity, and whether there is rolling resistance, are drawn.
+        body: the scene's ball; gives the direction of motion, and whether there is rolling resistance.
         viewer: direction towards the viewer, in the frame e1, e2, e3.
         up: direction that is upright in the picture, in the same frame.
     """
@@ -37,13 +37,13 @@ def contact(body: RollingBall, viewer: tuple[float, float, float], up: tuple[flo
 
 
 def _wall(drawn: Drawing, at: View) -> None:
-    """A piece of the wall's tangent plane at the contact."""
+    """Draws a piece of the wall's tangent plane at the contact."""
     corners = [E1 + 1.05 * i * E2 + 1.05 * j * E3 for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     drawn.path(at(corners), "wall", closed=True)
 
 
 def _frame(drawn: Drawing, at: View) -> None:
-    """Unit vectors at the centre, and the angular velocity that goes with each."""
+    """Draws the unit vectors at the centre, and the component of angular velocity about each."""
     for index, axis in enumerate((E1, E2, E3)):
         drawn.vector(at([0 * axis, 1.7 * axis]), "frame", f"e_{index + 1}")
         one, other = np.roll(E1, index + 1), np.roll(E1, index + 2)
@@ -52,7 +52,7 @@ def _frame(drawn: Drawing, at: View) -> None:
 
 
 def _aside(at: View, place: FloatArray, axis: FloatArray, by: float) -> FloatArray:
-    """The place of a letter beside an axis: to the right of one that is upright, else above it."""
+    """Place of a letter beside an axis: right of an upright axis, above any other."""
     a, b = at([0 * axis, axis])
     along = (b - a) / (np.linalg.norm(b - a) or 1.0)
     across = np.array([-along[1], along[0]])
@@ -62,7 +62,7 @@ def _aside(at: View, place: FloatArray, axis: FloatArray, by: float) -> FloatArr
 
 
 def _drawn_radius(drawn: Drawing, at: View) -> None:
-    """The radius a, where nothing else is."""
+    """Draws the radius a, in the widest gap between the other lines."""
     axes = at(np.concatenate([np.eye(3), [-E1, E1 + E2, E1 + E3]])) - at(np.zeros(3))
     taken = np.arctan2(axes[:, 1], axes[:, 0])
     angles = np.linspace(-np.pi, np.pi, 37)
@@ -74,7 +74,7 @@ def _drawn_radius(drawn: Drawing, at: View) -> None:
 
 
 def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
-    """N against e1, F2 and F3 on the ball at the contact; with rolling resistance N is shifted forward."""
+    """Draws N along -e1, and F2 and F3 on the ball at the contact; rolling resistance shifts N forward."""
     drawn.disc(at(E1).tolist(), 2.6, "force-head")
     for axis, letter in ((E2, "F_2"), (E3, "F_3")):
         drawn.vector(at([E1, E1 + 1.05 * axis]), "force", letter, by=13.0)
@@ -88,13 +88,13 @@ def _forces(drawn: Drawing, at: View, body: RollingBall) -> None:
 
 
 def _forward(body: RollingBall) -> FloatArray:
-    """Unit direction of the centre's velocity at the start, in the local frame; e2 where it stands still."""
+    """Unit direction of the centre's velocity at the start, in the local frame; e2 at rest."""
     local = body.surface.frame(body.u0).T @ body.v0
     speed = float(np.linalg.norm(local))
     return np.asarray(local / speed) if speed else E2
 
 
-_SIZE = 128.0  # half the width of what is drawn of a wall [px]
+_SIZE = 128.0  # half the width of the drawn part of a wall [px]
 _LEVEL = 0.02  # angles below this have no arc [rad]
 _LINES, _FINE = 13, 61  # lines of a net along each coordinate, and points of each
 
@@ -112,7 +112,7 @@ def overview(wall: Surface, body: RollingBall) -> list[Drawing]:  # noqa: ARG001
 
 @overview.register
 def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
-    """A cylinder cut open: axis, radii, the circle of the centre, the ball at its start and somewhere below."""
+    """Drawings of a cylinder cut open: axis, radii, circle of the centre, the ball at its start and later."""
     b, surface = wall.radius, body.surface
     drawn, at = Drawing(), View(_direction(-68, 24), (0, 0, 1), _SIZE / b)
     top, bottom, here = 0.62 * b, -1.3 * b, (2.55, -0.72 * b)
@@ -144,7 +144,7 @@ def _cylinder(wall: Cylinder, body: RollingBall) -> list[Drawing]:
 
 @overview.register
 def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
-    """A slope with its angle, the ball on it or above, and its speeds down and across."""
+    """Drawings of a slope with its angle, the ball on or above it, and its speeds down and across."""
     a, surface = body.ball.radius, body.surface
     size = max(6.0 * a, body.gap0)
     drawn, at = Drawing(), View(_direction(-62, 22), (0, 0, 1), _SIZE / size)
@@ -171,7 +171,7 @@ def _plane(wall: Plane, body: RollingBall) -> list[Drawing]:
 
 @overview.register
 def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
-    """The net over the whole domain, the ball at its start, its velocity and the directions of the coordinates."""
+    """Drawings of coordinate lines over the whole domain, with the ball at its start and its velocity."""
     (low, high), (lowest, highest) = wall.domain
     middle = wall.position(wall.places())
     size = 0.5 * float(np.max(np.ptp(middle, axis=0)))
@@ -203,7 +203,7 @@ def _net(wall: Declared, body: RollingBall) -> list[Drawing]:
 
 
 def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
-    """The angle of a line from the horizontal, at its lower end; nothing where it is level."""
+    """Draws the angle of a line from the horizontal, at its lower end; nothing for a level line."""
     if low[2] > high[2]:
         low, high = high, low
     flat = np.array([high[0], high[1], low[2]])
@@ -219,13 +219,13 @@ def _slope(drawn: Drawing, at: View, low: FloatArray, high: FloatArray) -> None:
 
 
 def _right(at: View) -> FloatArray:
-    """The level direction that is to the right in the picture."""
+    """Unit horizontal direction, in the world, that points to the right in the picture."""
     across = np.cross(np.array([0.0, 0.0, 1.0]), np.asarray(at.viewer, dtype=np.float64))
     return np.asarray(across / np.linalg.norm(across))
 
 
 def _tube(drawn: Drawing, at: View, wall: Cylinder, top: float, bottom: float) -> None:
-    """Rims and outline of a cylinder; what lies behind it is dashed."""
+    """Draws rims and outline of a cylinder; the part behind is dashed."""
     round_ = turn(0, 2 * np.pi)
     facing = at.towards(wall.frame(_ring(round_, 0.0))[..., :, 0])
     edges = np.flatnonzero(np.diff(np.sign(facing)))
@@ -247,21 +247,21 @@ def _rising(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _ring(angles: FloatArray, height: float | FloatArray) -> FloatArray:
-    """Coordinates of points around an axis, shape (n, 2)."""
+    """Coordinates (angle, height) of points around an axis, shape (n, 2)."""
     return np.stack([angles, np.broadcast_to(height, angles.shape)], axis=-1)
 
 
 def _radius(
     drawn: Drawing, at: View, centre: FloatArray, rim: FloatArray, letter: str, beside: tuple[float, float]
 ) -> None:
-    """An arrow along a radius, and its letter beside the middle of it [px]."""
+    """Draws an arrow along a radius, and its letter ``beside`` the middle [px]."""
     ends = at([centre, rim])
     drawn.arrow(ends, "thin")
     drawn.text(ends.mean(axis=0) + beside, letter)
 
 
 def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> None:
-    """The direction of gravity at a place of the picture; nothing where there is none."""
+    """Draws the direction of gravity at a place of the picture; nothing without gravity."""
     size = float(np.linalg.norm(body.gravity))
     if not size:
         return
@@ -271,6 +271,6 @@ def _gravity(drawn: Drawing, at: View, body: RollingBall, place: FloatArray) -> 
 
 
 def _direction(azimuth: float, elevation: float) -> tuple[float, float, float]:
-    """Towards a viewer at these angles [deg]."""
+    """Direction towards a viewer at these angles [deg], in the world."""
     az, el = np.radians([azimuth, elevation])
     return float(np.cos(el) * np.cos(az)), float(np.cos(el) * np.sin(az)), float(np.sin(el))

@@ -29,12 +29,12 @@ class BallReport(ReportKind):
 
     @staticmethod
     def covers(scene: Scene) -> bool:
-        """True for one ball on one surface."""
+        """True if one ball on one surface is the scene's only element."""
         return len(scene.elements) == 1 and isinstance(scene.elements[0], BallOnSurface)
 
     @staticmethod
     def group(scene: Scene) -> str:
-        """Group of the ball's contact with the wall: impacts, slipping, or rolling alone."""
+        """Group of the ball's contact with the wall: impacts, slipping, or rolling."""
         needs = scene.elements[0].requires
         if BallCapability.IMPACTS in needs:
             return "ball impacts"
@@ -42,7 +42,7 @@ class BallReport(ReportKind):
 
     @staticmethod
     def drawings(scenes: Sequence[Scene]) -> tuple[list[Picture], str]:
-        """One drawing for all cases; it shows rolling resistance if some case has it."""
+        """Drawings that serve all cases; they show rolling resistance if some case has it."""
         from proofroll.ball_studies.report.drawings import overview
 
         shown = max((rolling_ball(scene) for scene in scenes), key=lambda body: body.contact.rolling_resistance)

@@ -1,4 +1,4 @@
-"""Bounded friction in the report: what happened when, in the truth and in every run, and how well that is posed."""
+"""Slips in the report: events in the truth and in every run, and the conditioning of the first slip."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from proofroll.report.page.records import ReportedTruth
     from proofroll.studies.comparison.outcome import Run
 
-# The curve on which onsets are marked.
+# Curve on which first slips are marked.
 CURVE = "needed_friction"
 
 
 @dataclass(frozen=True)
 class TrueSlips:
-    """Slips of the truth in the report: the bounds of friction, the first slip and all events."""
+    """Slips of the truth: coefficients of friction, the first slip with its conditioning, and all events."""
 
     mu_static: float | None
     mu_kinetic: float | None
@@ -42,14 +42,14 @@ class TrueSlips:
 
 @dataclass(frozen=True)
 class RunSlips:
-    """The events of a run, and where friction is bounded what its first slip is to the truth's."""
+    """Events of a run; with bounded friction also the verdict on its first slip."""
 
     events: list[Event]
     onset_verdict: str | None = field(default=None, metadata=OPTIONAL)
 
 
 def truth_facts(scene: Scene, dataset: xr.Dataset) -> TrueSlips | None:
-    """The truth's slips; None where friction has no bound."""
+    """Slips of the truth; None with unbounded friction."""
     if "onset" not in dataset.attrs:
         return None
     contact = rolling_ball(scene).contact
@@ -58,11 +58,11 @@ def truth_facts(scene: Scene, dataset: xr.Dataset) -> TrueSlips | None:
 
 
 def run_facts(truths: Sequence[ReportedTruth], runs: Sequence[Run]) -> list[RunSlips]:
-    """The slips of each run.
+    """Slips of each run of a comparison.
 
     Args:
-        truths: of a comparison, with their :func:`truth_facts`.
-        runs: of the comparison.
+        truths: truths of the comparison, with their :func:`truth_facts`.
+        runs: runs of the comparison.
     """
     known = {truth.point: truth.own.onset for truth in truths if truth.own is not None}
     return [_run_facts(known.get(point_name(run.parameters)), run) for run in runs]
@@ -92,7 +92,7 @@ def ill_posed(truths: Sequence[ReportedTruth]) -> list[str]:
 
 
 def mark(content: ReportedComparison, curves: Sequence[PointCurves]) -> list[PointCurves]:
-    """The curves of a comparison with the bounds of friction and every first slip on that of needed friction."""
+    """Curves of a comparison; on that of needed friction, bounds of friction and first slips are marked."""
     truths = content.evidence.truths if content.evidence else []
     slips = {truth.point: truth.own for truth in truths if truth.own is not None}
     return [_marked(content, entry, slips[entry.point]) if entry.point in slips else entry for entry in curves]
@@ -111,19 +111,19 @@ def _marked(content: ReportedComparison, curves: PointCurves, truth: TrueSlips) 
 
 
 def first_slip(events: Sequence[Event]) -> Event | None:
-    """The first slip that has a time."""
+    """First slip with a finite time, or None."""
     return next((event for event in events if event.kind == "slip" and math.isfinite(event.time)), None)
 
 
-# Events that the table shows; the page says how many more there are.
+# Largest number of events in the table; the page counts the rest.
 SHOWN = 4
-# How the page paints a verdict on the onset, and the sign that goes with it: as the verdict of the same meaning.
+# Verdict on a first slip -> verdict whose colour and sign the page uses.
 PAINTED = {"agree": "agrees", "disagree": "differs", "ill-posed": "ill-posed", "refused": "refused", "failed": "failed"}
 
 
 @dataclass(frozen=True)
 class EventCell:
-    """One event beside the truth's of the same number: its ``difference`` [s], and what is ``wrong`` with it."""
+    """An event beside the truth's event of the same number: ``difference`` [s]; ``wrong``: why they do not match."""
 
     event: Event | None
     difference: str
@@ -132,7 +132,7 @@ class EventCell:
 
 @dataclass(frozen=True)
 class SlipLine:
-    """Slips of the truth or of a ``run``, with the ``count`` of all its events; no cells where it failed."""
+    """Line of a table: slips of the truth or of a ``run``; ``count``: of all its events; a failed run has no cells."""
 
     run: ReportedRun | None
     first: Event | None
@@ -144,7 +144,7 @@ class SlipLine:
 
 @dataclass(frozen=True)
 class SlipTable:
-    """The truth on top, then one line for each run; ``wrong``: what a wrong event is called here."""
+    """Table of slips: the truth, then a line for each run; ``wrong``: verdict that wrong events have here."""
 
     columns: int
     wrong: str
@@ -153,7 +153,7 @@ class SlipTable:
 
 
 def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
-    """The truth's onset and how it hangs on the parameters, as names and texts."""
+    """Names and texts on the truth's first slip and its sensitivity to the parameters."""
     onset = truth.onset
     known = f"{100 * onset.uncertainty:.3g} %"
     facts = []
@@ -169,15 +169,15 @@ def conditioning(truth: TrueSlips, until: float) -> list[tuple[str, str]]:
         facts.append(("d ln t / d ln μ", number(onset.by_mu, 4)))
         facts.append(("d ln t / d ln f", number(onset.by_f, 4)))
     edges = [(onset.edge_below, "below"), (onset.edge_above, "above")]
-    said = [f"μ = {value:.6g} {side}" for value, side in edges if value is not None]
-    if said and math.isfinite(onset.distance):
-        said.append(f"the nearest {number(100 * onset.distance, 3)} % from μ = {truth.mu_static:.6g}")
-    facts.append(("Stair edges", ", ".join(said) or f"none until {until:g} s"))
+    edge_texts = [f"μ = {value:.6g} {side}" for value, side in edges if value is not None]
+    if edge_texts and math.isfinite(onset.distance):
+        edge_texts.append(f"the nearest {number(100 * onset.distance, 3)} % from μ = {truth.mu_static:.6g}")
+    facts.append(("Stair edges", ", ".join(edge_texts) or f"none until {until:g} s"))
     return facts
 
 
 def slip_table(content: ReportedComparison, at: str, truth: TrueSlips) -> SlipTable:
-    """First slips and the first events at one point, which is named ``at``."""
+    """Table of first slips and first events at the point ``at``."""
     runs = [run for run in content.runs if run.point == at]
     columns = min(SHOWN, max(len(slips.events) for slips in (truth, *(run.own for run in runs))))
 
@@ -198,17 +198,17 @@ def slip_table(content: ReportedComparison, at: str, truth: TrueSlips) -> SlipTa
 
 
 def clock(event: Event) -> str:
-    """The time of an event [s], to the digits that its bracket leaves."""
+    """Time of an event [s] as text, with the digits that its bracket justifies."""
     return _to_digits(event.time, event, most=9)
 
 
 def between(event: Event) -> str:
-    """The bracket of an event [s], to the digits of its width."""
+    """Bracket of an event [s] as text, with the digits of its width."""
     return " … ".join(_to_digits(time, event, most=12) for time in (event.time_low, event.time_high))
 
 
 def bracket(event: Event) -> str:
-    """Bracket of an event around its time [s]: ``±5e-4``, or ``-1e-3 +2e-9`` where the sides are unlike."""
+    """Bracket of an event around its time [s]: ``±5e-4``, or ``-1e-3 +2e-9`` if the sides differ."""
     low, high = event.time - event.time_low, event.time_high - event.time
     if not (math.isfinite(low) and math.isfinite(high)):
         return "no bracket"
@@ -218,12 +218,12 @@ def bracket(event: Event) -> str:
 
 
 def signed(value: float) -> str:
-    """A difference with its sign."""
+    """Text of a difference with its sign."""
     return f"+{number(value)}" if value > 0 else number(value)
 
 
 def _cell(events: Sequence[Event], true: Sequence[Event], index: int, own: bool = False) -> EventCell:
-    """One event beside the truth's event with the same number."""
+    """Cell that compares an event with the truth's event of the same number."""
     event = events[index] if index < len(events) else None
     twin = true[index] if index < len(true) else None
     like = event is not None and twin is not None and event.kind == twin.kind
@@ -237,7 +237,7 @@ def _time(value: float | None, digits: int = 6) -> str:
 
 
 def _to_digits(value: float, event: Event, most: int) -> str:
-    """A time [s] with one digit more than the width of the event's bracket has."""
+    """Text of a time [s] with one digit more than the width of the event's bracket."""
     if not math.isfinite(value):
         return "–"
     width = event.time_high - event.time_low

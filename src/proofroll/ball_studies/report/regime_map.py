@@ -1,4 +1,4 @@
-"""The regime maps as a picture and as plain data."""
+"""Regime maps as a picture and as plain data."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 # Width of an entry of the legend [inch].
 _ENTRY = 3.4
 _WORDS = {Regime.NEVER_SLIPS: "never slips", Regime.RECOVERS: "slips and recovers", Regime.FALLS: "falls"}
-# From light to dark, so that they differ in grey too.
+# From light to dark, so that they differ in grey, too.
 _COLOURS = {Regime.NEVER_SLIPS: "#d5e8de", Regime.RECOVERS: "#e8b64c", Regime.FALLS: "#a63c33"}
-# The analytic boundaries: how each is drawn, and what it parts.
+# Analytic boundaries: style of the line, and its meaning.
 _LINES = {"mu_falls": ("--", "below it falls (f = 0)"), "mu_slips": ("-", "above it never slips (f = 0)")}
 
 
 def regime_content(maps: Sequence[xr.Dataset]) -> dict[str, Any]:
-    """Counts, axes and the maps themselves."""
+    """Plain data of the maps: axes, regimes, first slips, and counts."""
     content = {
         "maps": [
             {
@@ -52,7 +52,7 @@ def regime_content(maps: Sequence[xr.Dataset]) -> dict[str, Any]:
 
 
 def _outside(item: xr.Dataset) -> int | None:
-    """Count of runs without resistance that contradict the analytic boundaries; None without boundaries."""
+    """Count of runs that contradict the analytic boundaries; None without boundaries or with rolling resistance."""
     if item.attrs["rolling_resistance"] > 0 or "mu_falls" not in item:
         return None
     mu = item["mu_static"].to_numpy()
@@ -62,7 +62,7 @@ def _outside(item: xr.Dataset) -> int | None:
 
 
 def counts(maps: Sequence[xr.Dataset]) -> list[dict[str, Any]]:
-    """Summary of the maps for a report: counts of runs by regime, and the analytic boundaries."""
+    """Summary of the maps for a report: counts of runs by regime, axes, and the analytic boundaries."""
     kept = ("rolling_resistance", "until", "runs", "counts", "outside_boundaries")
     summaries = [{key: item[key] for key in kept} for item in regime_content(maps)["maps"]]
     for entry, item in zip(summaries, maps, strict=True):
@@ -75,7 +75,7 @@ def counts(maps: Sequence[xr.Dataset]) -> list[dict[str, Any]]:
 
 
 def boundaries(item: xr.Dataset) -> dict[str, str]:
-    """The analytic boundaries of a map with their formula; empty where there are none."""
+    """Formulas of a map's analytic boundaries; empty without any."""
     if "mu_falls" not in item:
         return {}
     factor = Fraction(float(item["mu_slips"][0] / item["mu_falls"][0])).limit_denominator(1000)
@@ -88,7 +88,7 @@ def draw(maps: Sequence[xr.Dataset], path: Path) -> None:
 
 
 def inline(maps: Sequence[xr.Dataset], prefix: str) -> str:
-    """The picture as an element of a page: its ids begin with ``prefix``, and it has no style that others would see.
+    """SVG element of the maps for a page: its ids begin with ``prefix``, and its styles are removed.
 
     Raises:
         Missing: matplotlib is not installed.
@@ -101,7 +101,7 @@ def _svg(maps: Sequence[xr.Dataset]) -> str:
 
 
 def picture(maps: Sequence[xr.Dataset], form: str, style: Any, size: tuple[float, float]) -> bytes:
-    """The maps side by side as the content of a file.
+    """File content with the maps side by side.
 
     Args:
         maps: one for each rolling resistance.

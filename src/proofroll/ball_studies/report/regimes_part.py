@@ -43,11 +43,11 @@ class RegimesPart(Part):
         return ", ".join(f"{count} {word}" for word, count in total.items())
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
-        """The maps, briefly."""
+        """Makes the maps of a smaller study, see :meth:`RegimesStudy.briefly`."""
         self.maps = regime_maps(self.asked.briefly(), runner.jobs, lambda _: tell("runs of the truth", 0))
 
     def entry(self) -> PartEntry:
-        """Counts and analytic boundaries."""
+        """Entry with counts, analytic boundaries, and the number of runs left out."""
         from proofroll.ball_studies.report.regime_map import counts
 
         maps = counts(self.maps)
@@ -55,7 +55,7 @@ class RegimesPart(Part):
         return PartEntry(**self.head, study={"maps": maps, "left_out": left_out})
 
     def pictures(self, prefix: str) -> dict[str, str]:
-        """All maps side by side."""
+        """SVG element of all maps side by side."""
         from proofroll.ball_studies.report.regime_map import inline
 
         return {"maps": inline(self.maps, f"{prefix}maps-")}

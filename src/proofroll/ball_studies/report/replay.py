@@ -1,4 +1,4 @@
-"""Balls on surfaces in the replay: the wall, the balls, what presses between them."""
+"""Replay of balls on surfaces: the wall, the balls, and the contact force."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
 
-# Variables of a trajectory, by their names there; "time" among them.
+# Variables of a trajectory by name, "time" included.
 Sampled = Mapping[str, npt.NDArray[Any]]
-# Those that a replay needs, where they are.
+# Names of the variables that a replay uses, if present.
 NEEDED = (
     "time", "p_WB", "v_WB", "w_WB", "q_WB", "omega1", "omega2", "omega3", "N", "F2", "F3", "sticking", "event_kind",
     "event_time",
@@ -42,17 +42,17 @@ _AFTER = {"slip": SLIPS, "stick": STICKS, "lift_off": AWAY, "bounce": AWAY, "set
 
 @dataclass(frozen=True)
 class Poses:
-    """A ball at n frames.
+    """Poses of a ball at n frames.
 
     Attributes:
         time: of the frames [s], shape (n,).
         p_WB: centre [m], shape (n, 3).
-        q_WB: orientation, scalar first, shape (n, 4), or None if there is none.
+        q_WB: orientation, scalar first, shape (n, 4); None: unknown.
         contact: point of the wall's surface that the ball touches or is nearest to [m], shape (n, 3).
         normal: e1, from the ball towards the wall, shape (n, 3).
-        press: N [N], shape (n,), or None if no force is reported.
+        press: normal force N [N], shape (n,); None: not reported.
         friction: F2 e2 + F3 e3, on the ball, in the world [N], shape (n, 3), or None.
-        state: SLIPS, STICKS or AWAY, shape (n,), or None if unknown.
+        state: SLIPS, STICKS or AWAY, shape (n,); None: unknown.
     """
 
     time: FloatArray
@@ -66,11 +66,11 @@ class Poses:
 
 
 def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
-    """The ball of a trajectory at the frames that it reaches.
+    """Poses of a ball at the frames up to the end of its trajectory.
 
     Args:
         body: the scene's ball.
-        sampled: its samples: the variables :data:`NEEDED`, those that it has.
+        sampled: samples of those of the variables :data:`NEEDED` that the trajectory has.
         times: of the frames [s], rising from 0.
     """
     from scipy.interpolate import CubicHermiteSpline
@@ -100,16 +100,16 @@ def poses(body: RollingBall, sampled: Sampled, times: FloatArray) -> Poses:
 
 
 def _state(sampled: Sampled, times: FloatArray, flies: bool) -> npt.NDArray[np.uint8] | None:
-    """State of the contact at each frame, from the events, which are finer in time than the samples.
+    """State of the contact at each frame, from the events, whose times are finer than the samples; None: unknown.
 
-    Without a bound on its friction a ball that touches the wall sticks; ``flies``: it does not touch it at first.
+    With unbounded friction a ball on the wall sticks; ``flies``: it starts off the wall.
     """
     if "sticking" not in sampled and not flies and not len(sampled.get("event_kind", ())):
         return None
     first = AWAY if flies else int(sampled["sticking"][0]) if "sticking" in sampled else STICKS
     state = np.full(times.shape, first, dtype=np.uint8)
     for kind, time in zip(sampled.get("event_kind", ()), sampled.get("event_time", ()), strict=True):
-        state[times >= time] = _AFTER[kind.decode() if isinstance(kind, bytes) else str(kind)]  # never, if it is NaN
+        state[times >= time] = _AFTER[kind.decode() if isinstance(kind, bytes) else str(kind)]  # never at NaN
     return state
 
 
@@ -121,8 +121,9 @@ def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> Float
     grid, stored = sampled["time"], sampled["q_WB"]
     if times.size < 2:
         return np.asarray(stored[:1])
-    # Its own orientation at every sample, carried by its own spin in between. Two orientations with one spin differ by
-    # a rotation that stands still in the ball; how it changes is what the spin does not explain, spread evenly.
+    # The stored orientation at every sample, moved by the ball's own spin in between. Orientations with the same spin
+    # differ by a constant rotation in the ball's frame; its change between samples, which the spin does not explain, is
+    # interpolated.
     everywhere = np.union1d(grid, times)
     carried = _turned(surface, sampled, everywhere)
     apart = carried[np.searchsorted(everywhere, grid)].inv() * Rotation.from_quat(stored, scalar_first=True)
@@ -131,11 +132,11 @@ def _orientation(surface: Surface, sampled: Sampled, times: FloatArray) -> Float
 
 
 def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> Rotation:
-    """Orientations at rising times from 0 [s] by quadrature of the spin, identity at the first.
+    """Orientations at rising times from 0 [s] by quadrature of the spin; identity at the first time.
 
-    The components of the spin in the local frame change slowly, those in the world as fast as the ball goes round:
-    the former are interpolated. Each step is the fourth-order Magnus step with two Gauss points (Iserles and Norsett
-    1999, Phil. Trans. R. Soc. A 357, 983-1019, equation 4.5 with the commutator as a cross product).
+    The components of the spin in the local frame, which vary slowly, are interpolated; those in the world vary as fast
+    as the ball goes round. Each step is the fourth-order Magnus step with two Gauss points (Iserles and Norsett 1999,
+    Phil. Trans. R. Soc. A 357, 983-1019, equation 4.5 with the commutator as a cross product).
     """
     from scipy.interpolate import Akima1DInterpolator, CubicHermiteSpline
     from scipy.spatial.transform import Rotation
@@ -154,30 +155,30 @@ def _turned(surface: Surface, sampled: Sampled, times: FloatArray) -> Rotation:
     early, late = (world((middle + sign * np.sqrt(3) / 6 * h)[:, 0]) for sign in (-1, 1))
     steps = Rotation.from_rotvec(h / 2 * (early + late) + np.sqrt(3) / 12 * h**2 * np.cross(late, early))
     turned = Rotation.concatenate([Rotation.identity(), steps])
-    reach = 1  # each has been turned by so many steps before it, in the end by all
+    reach = 1  # number of steps that each product spans, at last all before it
     while reach < len(turned):
         turned = Rotation.concatenate([turned[:reach], turned[reach:] * turned[:-reach]])
         reach *= 2
     return turned[::_SUBSTEPS]
 
 
-# Divisions of a coordinate that comes round, and every how many of them a line is drawn: every 30 degrees.
+# Divisions of a periodic coordinate, and number of divisions between drawn lines (30 degrees).
 _ROUND, _ROUND_LINES = 72, 6
-# Lines along the other coordinates: so far apart that the ball is near one, but no more than these.
+# Largest number of lines along a coordinate without a period; they are far enough apart for the ball to be near one.
 _MOST_LINES = 100
-# How far the wall goes beyond the path, in radii of the ball.
+# Margin of the wall beyond the path, in radii of the ball.
 _MARGIN = 3.0
 
 
 @dataclass(frozen=True)
 class Wall:
-    """A grid of points on the wall.
+    """Grid of points on the wall.
 
     Attributes:
         points: position [m], shape (rows, columns, 3): along the first coordinate in a row, along the second in a
             column.
         normals: e1 there, shape (rows, columns, 3).
-        lines: every how many rows and columns a line is drawn.
+        lines: number of rows, and of columns, from one drawn line to the next.
     """
 
     points: FloatArray
@@ -186,13 +187,13 @@ class Wall:
 
 
 def wall(body: RollingBall, u: FloatArray) -> Wall:
-    """The wall around a path.
+    """Grid of the wall around a path.
 
     Args:
         body: the scene's ball.
         u: the path in the surface's coordinates, shape (n, 2).
     """
-    # Equal coordinates of the wall and of the centre's surface need not lie opposite.
+    # Coordinates of the wall and of the centre's surface may differ at opposite points.
     u = body.wall.locate(body.surface.position(u))
     domain = body.wall.domain if isinstance(body.wall, Declared) else ((-math.inf, math.inf),) * 2
     grids: list[npt.NDArray[np.floating]] = []
@@ -226,20 +227,20 @@ def middle(body: RollingBall, u: FloatArray) -> FloatArray:
 
 
 def _round_step(least: float) -> float:
-    """The smallest of 1, 2 and 5 times a power of ten that is not below."""
+    """Smallest of 1, 2 and 5 times a power of ten that is at least ``least``."""
     power = 10.0 ** math.floor(math.log10(least))
     return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= least * (1 - 1e-9))
 
 
-# What the numbers of the picture are rounded to, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N. None is seen.
+# Rounding of the picture's numbers, powers of two: 8e-6 m, 6e-5 of a quaternion, 1e-3 N; all invisible.
 LENGTH, TURN, FORCE = 2.0**-17, 2.0**-14, 2.0**-10
-# A ball that is further from the true one than this many lengths of the scene has left the picture.
+# Distance from the true ball, in lengths of the scene, beyond which a ball has left the picture.
 _FAR = 20.0
-# What is off by less than this part of the ball's radius looks right.
+# Largest invisible error, in radii of the ball.
 _SEEN = 0.01
-# Over real time: a ball that rolls turns too fast for the eye at full speed.
+# Speed of the replay relative to real time: at full speed a rolling ball turns too fast for the eye.
 _SPEED = 0.1
-# Where the camera stands: about the vertical and above the horizon [rad].
+# Angles of the camera, about the vertical and above the horizon [rad].
 _FROM = (-1.15, 0.5)
 
 
@@ -300,7 +301,7 @@ def _events(sampled: Sampled) -> list[dict[str, Any]]:
 
 
 def _reachable(shown: Poses, true: Poses, body: RollingBall) -> Poses:
-    """The frames until a ball leaves the picture for good: coordinates that grow without bound draw nothing."""
+    """Frames until a ball leaves the picture for good: unbounded coordinates would make the picture useless."""
     centre = true.p_WB.mean(axis=0)
     size = float(np.linalg.norm(true.p_WB - centre, axis=1).max()) + body.ball.radius
     last = in_sight(np.linalg.norm(shown.p_WB - centre, axis=1) > _FAR * size)

@@ -99,7 +99,7 @@ def contradicted(times: Sequence[float], sticking: Sequence[bool | None], events
 
 
 def between_samples(times: Sequence[float], sticking: Sequence[bool]) -> list[Event]:
-    """Slip and stick events between consecutive samples [s] of which one sticks and the other slips."""
+    """Slip and stick events between consecutive samples [s] that differ in sticking."""
     return [
         Event("stick" if after else "slip", 0.5 * (low + high), low, high)
         for before, after, low, high in zip(sticking, sticking[1:], times, times[1:], strict=False)

@@ -56,7 +56,7 @@ def turn_interval(body: RollingBall) -> float | None:
         return None
     gravity, bend = float(np.linalg.norm(body.gravity)), float(np.linalg.norm(body.surface.normal_gradient(body.p0), 2))
     swing = 2 * math.pi / math.sqrt(gravity * bend) if gravity * bend else math.inf
-        # Round a cylinder a ball runs evenly, however fast.
+    # Round a cylinder a ball runs evenly, however fast.
     return max(EVERY, PART_OF_TURNS * min(natural_time(body), swing))
 
 

@@ -1,4 +1,4 @@
-"""Growth of cost with the one number that a comparison varies."""
+"""Growth of cost with the only parameter that a comparison varies."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
     from proofroll.report.comparison.records import ReportedComparison
     from proofroll.report.page.records import ReportedTruth
 
-# Fewer points tell no exponent.
+# Least number of points for an exponent.
 _FEWEST = 3
 
 
 @dataclass(frozen=True)
 class GrowthLine:
-    """The cost of one setting (of computing per simulated second) or of the truth (in all) at each value, or None.
+    """Cost of one setting (per simulated second) or of the truth (in total) at each value of the parameter.
 
     Attributes:
-        name: whose.
-        seconds: cost at each value [s].
-        exponent, bar: of its growth, or None.
+        name: of the setting, or words for the truth.
+        seconds: cost at each value [s]; None: unknown.
+        exponent, bar: of its growth, with error bar, or None.
     """
 
     name: str
@@ -36,7 +36,7 @@ class GrowthLine:
 
 @dataclass(frozen=True)
 class Growth:
-    """Cost over the values of one parameter."""
+    """Cost over the values of one parameter, of each setting and of the truth."""
 
     parameter: str
     values: list[float]
@@ -47,10 +47,10 @@ def growth(content: ReportedComparison, truths: Sequence[ReportedTruth]) -> Grow
     """Cost of each setting and of the truth over a varied parameter, and the exponent of its growth.
 
     The exponent is the slope of the least-squares line through the logarithms of value and cost; its error bar is the
-    slope's standard error. The larger half of the values is used: a cost that does not hang on the parameter hides the
-    growth of the rest where the parameter is small.
+    slope's standard error. Only the larger half of the values is used, for at small values a constant part of the cost
+    hides the growth.
 
-    None where not exactly one parameter is varied, over too few positive values, or nothing was timed.
+    None unless exactly one parameter is varied, over enough positive values, and something was timed.
     """
     if len(content.vary) != 1 or content.points:
         return None
@@ -76,7 +76,7 @@ def growth(content: ReportedComparison, truths: Sequence[ReportedTruth]) -> Grow
 
 
 def _slope(costs: dict[float, float], values: list[float]) -> tuple[float | None, float | None]:
-    """Exponent and its standard error over the larger values, but over three at least."""
+    """Exponent and its standard error over the larger half of the values, at least three; None: too few values."""
     used = [value for value in values if value in costs][-max(_FEWEST, (len(values) + 1) // 2) :]
     if len(used) < _FEWEST:
         return None, None

@@ -1,4 +1,4 @@
-"""The runs of a comparison as lines of the long table, those of its ladders of steps among them."""
+"""Lines of the long table for the runs of a comparison and of its ladders of steps."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,7 +15,7 @@ from proofroll.studies.comparison.planning import point_name
 
 
 def lines_of(outcome: Outcome) -> list[TableLine]:
-    """A line for each judgement, and for each error of a rung, to which no verdict belongs."""
+    """Lines for each judgement, and for each error of a rung of a ladder, which has no verdict."""
     numbers = {key: number for number, key in enumerate(by_row(outcome))}
     lines: list[TableLine] = []
     for run in outcome.runs:
@@ -28,7 +28,7 @@ def lines_of(outcome: Outcome) -> list[TableLine]:
 
 def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
     """Fields shared by all lines of a run."""
-    comparison, said = outcome.comparison, settings_of(run)
+    comparison, words = outcome.comparison, settings_of(run)
     point = outcome.points.get(point_name(run.parameters))
     return TableLine(
         study=comparison.name,
@@ -36,22 +36,22 @@ def _plain(outcome: Outcome, run: Run, row: int) -> TableLine:
         scene=comparison.scene,
         place=point_name(run.parameters),
         row=row,
-        engine=said["name"],
+        engine=words["name"],
         version=run.facts.version if run.facts else "",
-        formulation=said["formulation"] or "",
-        preset=said["preset"] or "",
-        setting=said["setting"],
-        precision=said["precision"],
+        formulation=words["formulation"] or "",
+        preset=words["preset"] or "",
+        setting=words["setting"],
+        precision=words["precision"],
         own_equations=bool(run.shared),
-        resolution=said["resolution"] or "",
-        step=said["resolution_value"],
+        resolution=words["resolution"] or "",
+        step=words["resolution_value"],
         verdict=run.verdict,
         **_ended(outcome, run.result),
     )
 
 
 def _ended(outcome: Outcome, result: Result) -> dict[str, Any]:
-    """Status and cost of a run; without clean runs the cost of the sampled run, which others disturbed."""
+    """Status and cost of a run; without clean runs the cost of the sampled run, which other processes disturbed."""
     cost, done = Cost.of(result.timings), result.status == Status.DONE
     rough = result.wall_seconds / outcome.comparison.until if done and not result.host and result.wall_seconds else None
     return {
@@ -84,7 +84,7 @@ def _judged(outcome: Outcome, run: Run, plain: TableLine, item: Judgement) -> Ta
 
 
 def _of_rung(outcome: Outcome, run: Run, plain: TableLine, rung: LadderRun) -> Iterator[TableLine]:
-    """Lines of a rung; where the question is ill-posed its errors are not judged either."""
+    """Lines of a rung; its errors keep the verdicts ill-posed and not-judged of the run, and no other."""
     ended = replace(plain, step=rung.value, verdict="", **_ended(outcome, rung.result))
     judged = [item for item in run.judgements if item.observable in rung.errors]
     for item in judged:

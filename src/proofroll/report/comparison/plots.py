@@ -1,4 +1,4 @@
-"""The curves that the page draws: the truth, what each engine adds to it, and both error bars; rounded and thinned."""
+"""Curves of a comparison's page: the truth, the difference of each engine from it, error bars; rounded and thinned."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from proofroll.studies.comparison.outcome import Outcome, Run
 if TYPE_CHECKING:
     import xarray as xr
 
-# More points than this are not seen in a figure 500 pixels wide.
+# More points cannot be seen in a figure 500 pixels wide.
 MOST_POINTS = 400
-# Digits of a curve, and of its difference from the truth: enough for a figure, and small in the file.
+# Digits of a curve and of its difference from the truth: enough for a figure, and few bytes.
 CURVE_DIGITS, DIFFERENCE_DIGITS = 6, 3
 
-# A reaction at time 0 belongs to the certificate, not to the curve.
+# Roles of the observables that are drawn; a reaction at time 0 belongs to the certificate, not to the curve.
 _DRAWN = (Role.MOTION, Role.REACTION)
 
 
 @dataclass(frozen=True)
 class EngineCurve:
-    """The difference of one engine from the truth.
+    """Difference of one engine from the truth.
 
     Attributes:
         row: number of its row.
         difference: from the truth, None where it is not finite.
-        tolerance: where it was judged.
-        limit: of small steps, where the judgement has one: its distance from the truth, the uncertainty of that, and
+        tolerance: of its judgement, or None.
+        limit: of small steps, if the judgement has one: its distance from the truth, that distance's uncertainty, and
             the observed order or None.
-        at: numbers of the samples, where not all are drawn.
+        at: indices of the samples drawn, unless all are.
     """
 
     row: int
@@ -52,7 +52,7 @@ class EngineCurve:
 
 @dataclass(frozen=True)
 class Mark:
-    """An event of a row (-1: of the truth) on a curve, as a person calls it; its time is None where it has none."""
+    """A named event on a curve; ``row``: of its run, -1: of the truth; ``time``: None if unknown."""
 
     row: int
     time: float | None
@@ -61,7 +61,7 @@ class Mark:
 
 @dataclass(frozen=True)
 class Bound:
-    """A value that a curve must not pass."""
+    """A named value that a curve must not cross."""
 
     name: str
     value: float
@@ -69,7 +69,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class ObservableCurves:
-    """The truth of an observable with its error bar, and what each engine adds to it."""
+    """Truth of an observable with its error bar, and the difference of each engine from it."""
 
     name: str
     symbol: str
@@ -85,7 +85,7 @@ class ObservableCurves:
 
 @dataclass(frozen=True)
 class PointCurves:
-    """The curves at one point of the parameters; ``time`` [s]."""
+    """Curves at one point of the parameters; ``time`` [s]."""
 
     point: str
     time: list[float | None]
@@ -93,7 +93,7 @@ class PointCurves:
 
 
 def point_curves(outcome: Outcome) -> list[PointCurves]:
-    """The curves of a comparison, one entry for each point of the parameters."""
+    """Curves of a comparison, one entry for each point of the parameters."""
     entries = []
     for name, point in outcome.points.items():
         if point.reference is None or name in outcome.laws_alone:
@@ -115,18 +115,18 @@ def point_curves(outcome: Outcome) -> list[PointCurves]:
 
 
 def rounded(values: FloatArray, digits: int) -> list[float | None]:
-    """Numbers with so many significant digits; None where one is not finite."""
+    """Numbers rounded to ``digits`` significant digits; None where one is not finite."""
     return [float(f"{value:.{digits - 1}e}") if math.isfinite(value) else None for value in values.tolist()]
 
 
 def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray[np.intp]:
-    """Indices of the samples that are drawn: of each stretch the first, the last, the lowest and the highest.
+    """Indices of the samples to draw: in each section the first, the last, the lowest and the highest.
 
     These four draw the same pixels as all samples do (M4: Jugel et al. 2014). MinMaxLTTB, which chooses among the
     lowest and the highest by the area they span, loses the largest error of one rough curve in four.
 
     Args:
-        curves: of equal length; one that is not finite somewhere has there neither a lowest nor a highest sample.
+        curves: of equal length; where one is not finite, it adds no lowest or highest sample.
         most: samples of each curve, a multiple of 4.
     """
     from tsdownsample import M4Downsampler
@@ -138,7 +138,7 @@ def kept(curves: list[FloatArray], most: int = MOST_POINTS) -> np.typing.NDArray
 
 
 def _curve(truth: xr.Dataset, name: str) -> bool:
-    """True if a variable is one curve over time; those of several, as all reactions, are judged and not drawn."""
+    """True if a variable is a single curve over time; arrays of several curves are judged but not drawn."""
     return name in truth and truth[name].dims == ("time",)
 
 
@@ -175,7 +175,7 @@ def _observable(
 
 
 def _bars(run: Run, name: str) -> tuple[float | None, list[float | None] | None]:
-    """Tolerance and limit of the judgement of a curve, in the observable's unit."""
+    """Tolerance and limit of the judgement of a curve, in the observable's unit; None without one."""
     judged = next((judgement for judgement in run.judgements if judgement.observable == name), None)
     if judged is None:
         return None, None

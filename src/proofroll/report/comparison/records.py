@@ -1,4 +1,4 @@
-"""Records of a comparison in a report; the HTML page and the terminal show nothing else."""
+"""Records of a comparison in a report: the only content that the HTML page and the terminal show."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Cost:
-    """Wall seconds per simulated second over so many ``runs``; one run has no interval."""
+    """Wall seconds per simulated second over ``runs`` clean runs; a single run has no interval."""
 
     median: float
     low: float | None
@@ -32,7 +32,7 @@ class Cost:
 
     @classmethod
     def of(cls, timings: Sequence[float]) -> Cost | None:
-        """The cost of runs, or None of none."""
+        """Cost of runs with these timings [s/s]; None without timings."""
         if not timings:
             return None
         found = Timing(tuple(timings)).interval
@@ -43,7 +43,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Claims:
-    """Expectations of a row besides its verdict: bounds of its own, orders, limits, and other points' verdicts."""
+    """Expectations of a row besides its verdict: bounds, orders, limits, and verdicts at other points."""
 
     bound: dict[str, str]
     order: dict[str, tuple[float, float]]
@@ -67,7 +67,7 @@ def in_words(bound: Tolerance) -> str:
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """An engine with settings: ``engine`` as the file writes it, and in the words of a person."""
+    """An engine with settings: ``engine`` as the comparison file writes it, other fields for readers."""
 
     engine: str
     name: str
@@ -85,9 +85,10 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True)
 class WorstJudgement(Judgement):
-    """The worst verdict over all points, among equals the one furthest beyond its tolerance, and its point.
+    """Judgement with the worst verdict over all points (of equal ones the one furthest beyond its tolerance).
 
-    Its error need not be the largest of all points, for tolerances may differ: that is ``largest``.
+    ``point`` is where it was judged. ``largest`` is the largest error of all points, which may be another, for
+    tolerances may differ.
     """
 
     point: str
@@ -127,7 +128,7 @@ class ReportedRow(Setting):
 
 @dataclass(frozen=True, kw_only=True)
 class ReportedRun(Setting):
-    """Record of one run; ``row`` is the number of its row, ``own`` the record of its kind of scene."""
+    """Record of one run; ``row``: number of its row; ``own``: record that its kind of element adds."""
 
     row: int
     settings: dict[str, Any]
@@ -156,7 +157,7 @@ class ReportedRun(Setting):
 
 @dataclass(frozen=True)
 class ShownObservable:
-    """An observable of the scene, as a person reads it."""
+    """An observable of the scene, with the words that a reader sees."""
 
     unit: str
     symbol: str
@@ -167,7 +168,7 @@ class ShownObservable:
 
 @dataclass(frozen=True)
 class ShownBand:
-    """Tolerances in words, by observable."""
+    """Tolerances of a band in words, by observable, with their reason."""
 
     because: str
     bounds: dict[str, str]
@@ -175,10 +176,12 @@ class ShownBand:
 
 @dataclass(frozen=True, kw_only=True)
 class ReportedComparison:
-    """Content of a comparison: ``rows`` summarise each engine with settings, ``runs`` say everything of each run.
+    """Content of a comparison: ``rows`` summarise each engine with settings, ``runs`` have all details of each run.
 
-    ``group`` is that of its scene (:func:`proofroll.report.kinds.group_of`), ``shown_by`` the kind of element that
-    shows more of it; ``spread`` is that of the points at which runs are held to laws of mechanics alone.
+    Attributes:
+        group: of its scene (:func:`proofroll.report.kinds.group_of`).
+        shown_by: name of the kind of element that adds to its report.
+        spread: of the points where only laws of mechanics are judged.
     """
 
     name: str
@@ -215,7 +218,7 @@ class ReportedComparison:
 
     @property
     def laws_alone(self) -> bool:
-        """True if runs are held to laws of mechanics alone at all points, since no motion is unique."""
+        """True if at every point only laws of mechanics are judged, for no motion is unique."""
         return bool(self.spread) and {run.point for run in self.runs} == {item.point for item in self.spread}
 
     def runs_of(self, row: int) -> list[ReportedRun]:
@@ -223,10 +226,10 @@ class ReportedComparison:
         return [run for run in self.runs if run.row == row]
 
     def lines(self) -> Iterator[tuple[str, ReportedRow, list[ReportedRun]]]:
-        """Each row with a short name, unlike that of any other, and its runs."""
+        """Rows with a unique short name each and their runs."""
         for place, (name, row) in enumerate(zip(names(self.rows), self.rows, strict=True)):
             yield name, row, self.runs_of(place)
 
     def headlines(self, role: str) -> list[str]:
-        """Names of the observables that summaries show, of a role (:class:`proofroll.core.observable.Role`)."""
+        """Names of the observables of a role (:class:`proofroll.core.observable.Role`) that summaries show."""
         return [name for name, item in self.observables.items() if item.role == role and item.headline]

@@ -1,4 +1,4 @@
-"""Distance of a comparison's rows from the truth, over all cases."""
+"""Errors and costs of a comparison's rows over all cases, for rankings."""
 
 import math
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ from proofroll.report.page.choice_matrix import ChoiceMatrix
 
 
 def scores(content: ReportedComparison, choice: ChoiceMatrix) -> list[Candidate]:
-    """Each row with its own step; without an error that is not known and finite at every point."""
+    """Candidates for each row at its own step; errors are None unless known and finite at every point."""
     candidates: dict[int, Candidate] = {}
     for row in choice.rows:
         for item in row.found.get(content.name, ()):
-            candidates.setdefault(item.row, item)  # of its steps its own comes first
+            candidates.setdefault(item.row, item)  # the first candidate of a row has its own step
     points = {run.point for run in content.runs}
     rows = []
     for number, (name, _, runs) in enumerate(content.lines()):
@@ -31,7 +31,7 @@ def scores(content: ReportedComparison, choice: ChoiceMatrix) -> list[Candidate]
 
 
 def closest(content: ReportedComparison, choice: ChoiceMatrix) -> Candidate | None:
-    """The row nearest to the truth in motion and forces; without those that rest on the truth's own equations."""
+    """Row closest to the truth in motion and forces, without rows that solve the truth's own equations; or None."""
     known = [(item.error(forces=True), item) for item in scores(content, choice) if not content.rows[item.row].shared]
     return min(((size, item) for size, item in known if size is not None), key=lambda pair: pair[0], default=(0, None))[
         1

@@ -1,4 +1,4 @@
-"""Conclusions of a comparison, as sentences written from the data alone."""
+"""Conclusions of a comparison as sentences, drawn from its records alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from proofroll.report.page.choice_matrix import FIRST_TOLERANCE, NEEDS, ChoiceMa
 
 @dataclass(frozen=True)
 class Conclusions:
-    """The answer in one paragraph, and sentences."""
+    """Conclusions of a comparison: one paragraph that answers its question, and further sentences."""
 
     answer: str
     sentences: list[str]
@@ -41,7 +41,7 @@ def conclusions(
 
 
 def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
-    """Sentence: what agrees, what does not, whether that was expected, and what to use at ``FIRST_TOLERANCE``."""
+    """Sentence: counts of verdicts, whether they were expected, and the cheapest engine at ``FIRST_TOLERANCE``."""
     rows, alone = content.rows, content.laws_alone
     unexpected = len(content.contradictions)
     expected = f"Not expected: {counted(unexpected, 'results')}."
@@ -58,8 +58,8 @@ def _answer(content: ReportedComparison, choice: ChoiceMatrix) -> str:
 
 
 def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
-    """Clause: how many rows have each verdict; ``alone``: they are held to laws of mechanics alone."""
-    said = {
+    """Clause that counts the rows by verdict; ``alone``: only laws of mechanics are judged."""
+    words = {
         "agrees": ("agrees", "agree", "with the truth in every observable and every case"),
         "unconfirmed": ("agrees", "agree", "at this step with a limit that is not confirmed"),
         "incomplete": ("agrees", "agree", "without reporting all that is judged"),
@@ -72,10 +72,10 @@ def standings(rows: Sequence[ReportedRow], alone: bool) -> str:
         "failed": ("gives", "give", "no result at some points"),
     }
     if alone:
-        said["agrees"] = ("keeps", "keep", "the laws that are judged in every case")
-        said["differs"] = ("breaks", "break", "a law at some points, with no limit of small steps shown to keep it")
+        words["agrees"] = ("keeps", "keep", "the laws that are judged in every case")
+        words["differs"] = ("breaks", "break", "a law at some points, with no limit of small steps shown to keep it")
     parts = []
-    for verdict, (one, many, rest) in said.items():
+    for verdict, (one, many, rest) in words.items():
         count = sum(row.verdict == verdict for row in rows)
         if count:
             parts.append(f"{count} {one if count == 1 else many} {rest}")
@@ -87,7 +87,7 @@ def _joined(parts: list[str]) -> str:
 
 
 def _closest(content: ReportedComparison, choice: ChoiceMatrix) -> str:
-    """Sentence on the setting that agrees best."""
+    """Sentence on the setting closest to the truth."""
     best = closest(content, choice)
     if best is None:
         return "No setting gave motion and forces in every case, so none can be called the closest to the truth."
@@ -100,7 +100,7 @@ def _closest(content: ReportedComparison, choice: ChoiceMatrix) -> str:
 
 
 def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
-    """Price of the obvious model: the default preset against the best of the same engine."""
+    """Sentence on the price of the obvious model: an engine's default preset against its best one."""
     rows = content.rows
     worst: tuple[float, Candidate, Candidate] | None = None
     lost: list[str] = []
@@ -133,7 +133,7 @@ def _obvious(content: ReportedComparison, scored: list[Candidate]) -> str:
 
 
 def _order(content: ReportedComparison) -> list[str]:
-    """Rows with other events than the truth, or in another order; empty where no order was judged."""
+    """Sentence on rows whose events differ from the truth's in kind or order; empty where no order was judged."""
     judged = [
         (run, judgement)
         for run in content.runs
@@ -150,12 +150,12 @@ def _order(content: ReportedComparison) -> list[str]:
         return ["Every setting has the truth's events in the truth's order, wherever that is well posed."]
     shown = names(content.rows)
     cases = {row: sum(run.row == row for run, _ in judged) for row in wrong}
-    said = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])
-    return [f"Events missing, added or of another kind than the truth's: {said}."]
+    rows = _joined([f"{shown[row]} ({count} of {cases[row]} cases)" for row, count in wrong.items()])
+    return [f"Events missing, added or of another kind than the truth's: {rows}."]
 
 
 def _surprises(content: ReportedComparison) -> str:
-    """Sentence on results that contradict the comparison's expectation."""
+    """Sentence on results that contradict the comparison's expectations, or on their absence."""
     contradictions = content.contradictions
     if contradictions:
         more = f" (and {len(contradictions) - 1} more, listed below)" if len(contradictions) > 1 else ""

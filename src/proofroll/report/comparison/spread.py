@@ -1,4 +1,4 @@
-"""Spread of the settings where no motion is unique: where each of them ends, and the range, without a ranking."""
+"""Spread of the settings where no motion is unique: end of each run and their range, without a ranking."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     from proofroll.studies.comparison.outcome import ComparedPoint
 
-# How runs are judged there.
+# Clause on how such runs are judged.
 ALONE = "held to laws of mechanics alone, for there is no unique truth"
-# Numbers in which all settings are alike to this part of the largest one of their observable are not listed.
+# Relative range below which a number counts as equal in all settings and is not listed.
 ALIKE = 1e-6
 
 
@@ -33,7 +33,7 @@ class SpreadLine:
         values: of each row; None: it has no result.
         low: least of them.
         high: largest of them.
-        part: range in parts of the largest number of the observable.
+        part: range relative to the largest number of the observable.
     """
 
     name: str
@@ -46,7 +46,7 @@ class SpreadLine:
 
 @dataclass(frozen=True)
 class Spread:
-    """Ends of the runs at a point without a unique truth; ``because``: why there is none; ``time`` [s]."""
+    """Ends of the runs, at ``time`` [s], at a point without a unique truth; ``because``: reason why there is none."""
 
     point: str
     because: str
@@ -55,7 +55,7 @@ class Spread:
 
     @property
     def sentence(self) -> str:
-        """The widest line, in words."""
+        """Sentence on the number that spreads most."""
         where = f"At {self.point} there" if self.point else "There"
         head = f"{where} is no unique motion, so no setting is called the closest"
         if not self.lines:
@@ -67,10 +67,10 @@ class Spread:
 
 
 def spread_of(name: str, point: ComparedPoint, runs: Mapping[int, xr.Dataset], rows: int) -> Spread:
-    """Spread at a point without a unique truth, of the runs by the number of their row, for so many ``rows``."""
+    """Spread at a point without a unique truth; ``runs`` by number of their row, ``rows``: count of rows."""
     from proofroll.files.csv_table import column_names  # imports xarray, which no other comparison needs by now
 
-    assert point.reference is not None  # else no law was judged
+    assert point.reference is not None  # points without a truth have no judged laws
     truth, lines = point.reference.dataset, list[SpreadLine]()
     end = float(truth["time"].to_numpy()[-1])
     whole = {row: run for row, run in runs.items() if run["time"].to_numpy()[-1] == end}

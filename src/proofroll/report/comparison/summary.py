@@ -1,4 +1,4 @@
-"""The records of a comparison (:mod:`proofroll.report.comparison.records`), made from what it found."""
+"""Records of a comparison (:mod:`proofroll.report.comparison.records`), made from its outcome."""
 
 import dataclasses
 from typing import Any
@@ -75,7 +75,7 @@ def outcome_content(outcome: Outcome) -> ReportedComparison:
 
 
 def runs_at(outcome: Outcome, point: str) -> list[tuple[int, Run, StoredTrajectory]]:
-    """Number of the row, run and trajectory of every run at a point that has one."""
+    """Row number, run and trajectory of every run at a point, if it has a trajectory."""
     return [
         (number, run, run.trajectory)
         for number, runs in enumerate(by_row(outcome).values())
@@ -93,9 +93,9 @@ def by_row(outcome: Outcome) -> dict[int, list[Run]]:
 
 
 def _row(runs: list[Run]) -> ReportedRow:
-    """Summary over the points of the parameters: the worst of everything."""
+    """Summary of a row over the points of the parameters, by the worst verdict and the largest cost."""
     first = runs[0]
-    # A point at which the question is ill-posed, or has no answer, says nothing about an engine.
+    # A point where the question is ill-posed or not judged does not count against an engine.
     judged = [run for run in runs if run.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}] or runs
     names = list(dict.fromkeys(judgement.observable for run in judged for judgement in run.judgements))
     timings = [run.result.seconds_per_second for run in runs if run.result.seconds_per_second is not None]
@@ -123,7 +123,7 @@ def _row(runs: list[Run]) -> ReportedRow:
 
 
 def _why(runs: list[Run]) -> tuple[str, str]:
-    """Reason of the worst verdict, empty where everything agrees; and the result of its ladder, ``limit``."""
+    """Reason of the worst verdict, empty if everything agrees; and the result of its ladder of steps, ``limit``."""
     worst = max((run.verdict for run in runs), key=SEVERITY.index)
     guilty: list[tuple[Run, Judgement | None]] = []
     for run in runs:
@@ -136,7 +136,7 @@ def _why(runs: list[Run]) -> tuple[str, str]:
         return "", limit
     if worst == Verdict.INCOMPLETE:
         return f"agrees, but does not report {', '.join(run.missing)}", limit
-    if worst == Verdict.REFUSED:  # the verdict says the rest
+    if worst == Verdict.REFUSED:  # the verdict already names a refusal
         return f"{where.strip()}: {run.result.message}" if where else run.result.message, ""
     if judgement is None or worst == Verdict.FAILED:
         return f"{run.result.status}{where}: {run.result.message}", ""
@@ -144,14 +144,14 @@ def _why(runs: list[Run]) -> tuple[str, str]:
 
 
 def _remarks(runs: list[Run]) -> list[str]:
-    """Remarks on the runs, on the observable whose wrong limit is the largest part of its tolerance, and on a floor."""
+    """Remarks on a row: shared equations, the observable with the worst limit, and a floor that decided."""
     remarks = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:
         run, item = max(shown, key=lambda pair: (pair[1].limit_error or 0.0) / pair[1].tolerance)
         where = at_point(run.parameters)
         remarks += [f"{item.observable}{where}: {remark}" for remark in item.remarks]
-    # of any other verdict the reason has it
+    # with other verdicts the reason names the floor
     floors = [(run, item) for run in runs for item in run.judgements if item.floor and item.verdict is Verdict.AGREES]
     if floors:
         run, item = max(floors, key=lambda pair: pair[1].error / pair[1].tolerance)
@@ -160,7 +160,7 @@ def _remarks(runs: list[Run]) -> list[str]:
 
 
 def _diagnosis(runs: list[Run]) -> list[CauseAt]:
-    """Causes that were proven at some point of the parameters, each once, with the points."""
+    """Proven causes, each once, with the points where it was proven."""
     causes: dict[str, CauseAt] = {}
     for run in runs:
         for item in run.diagnosis:
@@ -169,7 +169,7 @@ def _diagnosis(runs: list[Run]) -> list[CauseAt]:
 
 
 def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgement | None]:
-    """The worst verdict, among equals the one furthest beyond its tolerance."""
+    """Run and judgement with the worst verdict, of equal ones the one furthest beyond its tolerance."""
 
     def badness(pair: tuple[Run, Judgement | None]) -> tuple[int, float]:
         item = pair[1]
@@ -181,14 +181,14 @@ def _furthest(judged: list[tuple[Run, Judgement | None]]) -> tuple[Run, Judgemen
 def _worst(runs: list[Run], name: str) -> WorstJudgement:
     judged = [(run, next((item for item in run.judgements if item.observable == name), None)) for run in runs]
     where, worst = _furthest(judged)
-    assert worst is not None  # some run has it, or the name would not be asked for
+    assert worst is not None  # names are those of judged observables
     largest = max(judgement.error for _, judgement in judged if judgement is not None)
     known = {item.name: getattr(worst, item.name) for item in dataclasses.fields(worst)}
     return WorstJudgement(**known, point=point_name(where.parameters), largest=largest)
 
 
 def _setting(engine: str, facts: EngineFacts) -> str:
-    """The preset, whatever else the comparison file chose besides the step (``cone=pyramidal``), and f32."""
+    """Preset, further options in the comparison file (``cone=pyramidal``), and ``f32`` for single precision."""
     usual, preset = {"formulation", "preset", facts.resolution}, facts.settings.get("preset")
     chosen = [f"{key}={value}" for key, value in parse_engine(engine).options.items() if key not in usual]
     shown = [] if preset is None or (chosen and preset == "matched") else [preset]
@@ -196,7 +196,7 @@ def _setting(engine: str, facts: EngineFacts) -> str:
 
 
 def settings_of(run: Run) -> dict[str, Any]:
-    """The fields of :class:`Setting`."""
+    """Values of the fields of :class:`Setting`."""
     facts = run.facts or EngineFacts(run.row.engine.partition("[")[0], version="", code="", settings={})
     return {
         "engine": run.row.engine,

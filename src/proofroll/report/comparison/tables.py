@@ -1,4 +1,4 @@
-"""The report's tables as rows: what is judged and expected, costs, tolerances, and why to believe a row."""
+"""Rows of the report's tables: verdicts, expectations, costs, tolerances, and evidence for each row."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,14 +12,14 @@ from proofroll.report.comparison.records import Claims, Cost, ReportedComparison
 from proofroll.report.comparison.spread import Spread
 from proofroll.report.labels import names, symbol
 
-# Errors of two rows that differ by less than this part are those of one scheme, where they are seen above so many bars
-# of the truth in so many observables at least.
+# Two rows count as one scheme if their errors differ by less than this relative part, in at least so many observables
+# whose error exceeds so many error bars of the truth.
 _SAME, _SEEN, _SEVERAL = 1e-3, 10.0, 2
-_COMPILES = 10.0  # s before the first step: machine code of equations takes one or two, on a busy machine some more
+_COMPILES = 10.0  # s before the first step, beyond which the time is listed; to compile equations takes one or two
 
 
 def observables(content: ReportedComparison) -> dict[str, str]:
-    """The judged observables with their units, in the order of the first row that has them all."""
+    """Judged observables with their units; observables of the row that has most come first."""
     units: dict[str, str] = {}
     for row in sorted(content.rows, key=lambda row: -len(row.observables)):
         for name, judgement in row.observables.items():
@@ -28,7 +28,7 @@ def observables(content: ReportedComparison) -> dict[str, str]:
 
 
 def seconds_before(content: ReportedComparison) -> dict[int, float]:
-    """Row -> longest time before the first step [s]; empty unless an engine takes as long as only compilers do."""
+    """Longest time before the first step of each row [s]; empty unless one of them exceeds 10 s."""
     longest: dict[int, float] = {}
     for run in content.runs:
         longest[run.row] = max(longest.get(run.row, 0.0), run.build_seconds or 0.0)
@@ -37,7 +37,7 @@ def seconds_before(content: ReportedComparison) -> dict[int, float]:
 
 @dataclass(frozen=True)
 class Expectation:
-    """Settings with one expectation; ``further``: claims besides the verdict."""
+    """Settings that share one expectation; ``further``: claims besides the verdict."""
 
     names: list[str]
     tolerance: str
@@ -54,16 +54,16 @@ def expectations(rows: Sequence[ReportedRow]) -> list[Expectation]:
         for observable, verdicts in row.expected_for.items():
             text += f"; {symbol(observable)}: {' or '.join(verdicts)}"
         groups.setdefault((row.tolerance, text, row.because, tuple(_further(row.claims))), []).append(name)
-    return [Expectation(settings, *said) for said, settings in groups.items()]
+    return [Expectation(settings, *shared) for shared, settings in groups.items()]
 
 
 def _further(claims: Claims) -> list[str]:
-    """A row's claims besides its verdict, as sentences without a full stop."""
-    said = [f"{symbol(name)} within {bound}" for name, bound in claims.bound.items()]
-    said += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.order.items()]
-    said += [f"limit of {symbol(name)} within {bound}" for name, bound in claims.limit.items()]
-    said += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claims.except_at]
-    return [*said, f"run only at {_where(claims.only)}"] if claims.only else said
+    """Claims of a row besides its verdict, as sentences without a full stop."""
+    sentences = [f"{symbol(name)} within {bound}" for name, bound in claims.bound.items()]
+    sentences += [f"order of {symbol(name)} {low:g} to {high:g}" for name, (low, high) in claims.order.items()]
+    sentences += [f"limit of {symbol(name)} within {bound}" for name, bound in claims.limit.items()]
+    sentences += [f"{' or '.join(item.expect)} at {_where(item.where)}" for item in claims.except_at]
+    return [*sentences, f"run only at {_where(claims.only)}"] if claims.only else sentences
 
 
 def _where(values: Mapping[str, Sequence[float]]) -> str:
@@ -72,7 +72,7 @@ def _where(values: Mapping[str, Sequence[float]]) -> str:
 
 
 def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedRun]]:
-    """Slowest and fastest case of each timed row, with its name."""
+    """Name of each timed row with its slowest and its fastest case."""
     lines = []
     for name, _, runs in content.lines():
         timed = sorted((run.cost.median, at, run) for at, run in enumerate(runs) if run.cost)
@@ -82,12 +82,12 @@ def costs(content: ReportedComparison) -> list[tuple[str, ReportedRun, ReportedR
 
 
 def cost_interval(cost: Cost | None) -> str:
-    """The interval of a cost: ``0.011 to 0.013``; a dash where it was measured once or never."""
+    """Interval of a cost, as ``0.011 to 0.013``; a dash where it was measured once or never."""
     return "–" if not cost or cost.low is None else f"{number(cost.low)} to {number(cost.high)}"
 
 
 def cost_title(cost: Cost | None) -> str:
-    """Description of a cost, in a sentence."""
+    """Sentence that describes a cost."""
     if not cost:
         return "not timed"
     if cost.confidence is None:
@@ -107,9 +107,10 @@ def reasons(certificate: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
 
 @dataclass(frozen=True)
 class Belief:
-    """Evidence from the certificates of a row: lines that hold, all lines, and the largest difference of round-off.
+    """Evidence from a row's certificates: lines that hold, all lines, and the largest difference without a reason.
 
-    ``soft`` and ``silent`` are quantities that may differ, with a reason, and that are not reported.
+    ``soft``: quantities that may differ, for a reason; ``silent``: quantities that the engine does not report;
+    ``audit``: worst judgement of the audit of reactions.
     """
 
     name: str
@@ -144,24 +145,24 @@ def belief(content: ReportedComparison) -> list[Belief]:
 
 
 def causes(content: ReportedComparison) -> list[tuple[str, str, str]]:
-    """Name of each row with a proven cause of its difference, the cause, and what to do."""
+    """Name of each row with a proven cause of its difference, the cause, and its remedy."""
     proven = ((name, told.cause) for name, row, _ in content.lines() for told in row.diagnosis)
     return [(name, cause.sentence, cause.cause.remedy) for name, cause in proven]
 
 
 def remarks(content: ReportedComparison) -> list[tuple[str, str]]:
-    """Remarks on each row, with its name."""
+    """(row, remark) for each remark."""
     return [(name, text) for name, row, _ in content.lines() for text in row.remarks]
 
 
 def with_results(content: ReportedComparison, spread: Spread) -> list[tuple[int, str]]:
-    """Number and name of each row that a spread has numbers of."""
+    """Number and name of each row that has numbers in a spread."""
     known = {row for line in spread.lines for row, value in enumerate(line.values) if value is not None}
     return [(row, name) for row, name in enumerate(names(content.rows)) if row in known]
 
 
 def one_scheme(content: ReportedComparison) -> list[str]:
-    """Sentences that name the rows of several engines with one declared scheme, and further ones with the same errors.
+    """Sentences that name rows of several engines with one declared scheme, and further rows with equal errors.
 
     Codes with one scheme print the same digits, right or wrong; so do those with one wrong model.
     """
@@ -189,11 +190,11 @@ def one_scheme(content: ReportedComparison) -> list[str]:
             [", ".join(rows) for rows in alike],
         ),
     )
-    return [f"{words}: {'; '.join(told)}." for words, told in said if told]
+    return [f"{words}: {'; '.join(found)}." for words, found in said if found]
 
 
 def _same_digits(one: ReportedRow, other: ReportedRow) -> bool:
-    """True if two rows have the same step, and the same errors in all that both are judged by and is seen of them."""
+    """True if two rows have the same step and equal errors in all shared observables above the truth's error bars."""
     if one.resolution != "dt" or (one.resolution, one.resolution_value) != (other.resolution, other.resolution_value):
         return False
     pairs = [(one.observables[name], other.observables[name]) for name in one.observables.keys() & other.observables]

@@ -1,4 +1,4 @@
-"""The matrix of verdicts: for each setting and observable a cell with verdict, error and a link to its evidence."""
+"""Matrix of verdicts: a cell for each setting and observable, with verdict, error and a link to its evidence."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from proofroll.report.labels import SYMBOLS, symbol, unit, unjudged, verdict_tex
 
 @dataclass(frozen=True)
 class Cell:
-    """A judgement with a link to its evidence; ``point``: where it was judged, if the matrix is of several points."""
+    """A judgement with a link to its evidence; ``point``: place of the judgement in a matrix of several points."""
 
     judgement: Judgement
     href: str
@@ -21,26 +21,26 @@ class Cell:
 
     @property
     def title(self) -> str:
-        """Error with its bar, tolerance, and the limit from the ladder of steps, if there is one."""
+        """Tooltip: error with its bar, tolerance, and the limit from the ladder of steps, if there is one."""
         judgement = self.judgement
-        said = (
+        text = (
             f"{symbol(judgement.observable)} {judgement.verdict}: error {error(judgement.error)} ± "
             f"{number(judgement.truth_error_bar, 1)} {unit(judgement.unit)}, tolerance {number(judgement.tolerance)}"
         )
         if self.point:
-            said += f" at {self.point}"
+            text += f" at {self.point}"
         if judgement.limit_error_bar is None:
-            return said
-        said += f"; {judgement.limit}"
+            return text
+        text += f"; {judgement.limit}"
         if judgement.limit_error == math.inf:  # it has another number of events
-            return said
+            return text
         off = f"{error(judgement.limit_error)} ± {error(judgement.limit_error_bar, 1)}"
-        return f"{said}: off by {off}, order {number(judgement.order)}"
+        return f"{text}: off by {off}, order {number(judgement.order)}"
 
 
 @dataclass(frozen=True)
 class MatrixLine:
-    """A row or a run with its cells by observable, a link to its evidence, and what happened where it failed.
+    """A row or a run: cells by observable, link to its evidence, message of a failure.
 
     ``before`` is its longest time before the first step [s].
     """
@@ -57,7 +57,7 @@ class MatrixLine:
 
 @dataclass(frozen=True)
 class Matrix:
-    """The unit of each column by its observable, and the lines by engine; whether some engine compiles for long."""
+    """Verdict matrix: unit of each column, lines by engine; ``compiles``: a time before the first step exceeds 10 s."""
 
     columns: dict[str, str]
     groups: dict[str, list[MatrixLine]]
@@ -65,12 +65,12 @@ class Matrix:
 
 
 def anchor(comparison: int, row: int, point: int) -> str:
-    """Id of the evidence of one row at one point."""
+    """HTML id of the evidence of one row at one point."""
     return f"c{comparison}-r{row}-p{point}"
 
 
 def overview(content: ReportedComparison, comparison: int) -> Matrix:
-    """The verdict matrix: the worst of every row over all points."""
+    """Verdict matrix of a comparison: the worst verdict of each row over all points."""
     points = list(dict.fromkeys(run.point for run in content.runs))
     lines, before = [], seconds_before(content)
     for index, row in enumerate(content.rows):
@@ -87,21 +87,21 @@ def overview(content: ReportedComparison, comparison: int) -> Matrix:
 def counted(content: ReportedComparison) -> str:
     """Counts of settings by verdict, in one line."""
     verdicts = [row.verdict.value for row in content.rows]
-    said = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
+    counts = ", ".join(f"{sign} {verdicts.count(word)} {word}" for word, sign in SYMBOLS.items() if word in verdicts)
     surprise = "nothing is contradicted" if unjudged(content) else "as expected"
-    return f"{told(len(verdicts), 'settings')}: {said}; {surprise if content.as_expected else 'not as expected'}"
+    return f"{told(len(verdicts), 'settings')}: {counts}; {surprise if content.as_expected else 'not as expected'}"
 
 
 def at_point(content: ReportedComparison, comparison: int, point: int, name: str) -> Matrix:
-    """The verdict matrix of one point of the parameters."""
+    """Verdict matrix of one point of the parameters."""
     lines = []
     for run in content.runs:
         if run.point == name:
             href = anchor(comparison, run.row, point)
             cells = {judgement.observable: Cell(judgement, href) for judgement in run.judgements}
             message = run.message if run.status != "done" else ""
-            said = (run.verdict, href, message, not run.contradictions, run.cost, run.build_seconds)
-            lines.append(MatrixLine(run, cells, *said))
+            shown = (run.verdict, href, message, not run.contradictions, run.cost, run.build_seconds)
+            lines.append(MatrixLine(run, cells, *shown))
     return _matrix(content, lines)
 
 

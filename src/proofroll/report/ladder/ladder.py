@@ -1,4 +1,4 @@
-"""Content of ``proofroll ladder``: as records and in sentences."""
+"""Content of ``proofroll ladder`` as records and as sentences."""
 
 import math
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from proofroll.studies.tradeoff.pareto import front
 
 @dataclass(frozen=True)
 class RungFound:
-    """A rung of the ladder; ``status`` is ``empty`` where no engine has a model of the level."""
+    """A rung of the ladder; its ``status`` is ``empty`` if no engine has a model of the level."""
 
     level: str
     variant: str
@@ -31,7 +31,7 @@ class RungFound:
 
 @dataclass(frozen=True)
 class SideFound:
-    """A model with a term, or without it."""
+    """A run of a model with a term, or without it."""
 
     parameters: dict[str, float]
     asks: list[str]
@@ -40,16 +40,16 @@ class SideFound:
 
 @dataclass(frozen=True)
 class TermFound:
-    """A term of a model, held against the truth of the scene with it.
+    """A term of a model, tested with and without against the truth of the scene with it.
 
     Attributes:
         term, kind, engine, formulation, because: see :class:`Switch`.
-        verdict: word for its worth, as ``needed``.
+        verdict: whether the term is worth its cost, as ``needed``.
         reason: ground of the verdict.
         on, off: with it and without.
         cost: ratio of the run's times with it and without.
-        change: of the quantity when it is left out.
-        error_change: error without it less error with it.
+        change: largest change of the quantity when it is left out.
+        error_change: error without it minus error with it.
     """
 
     term: str
@@ -68,7 +68,7 @@ class TermFound:
 
 @dataclass(frozen=True)
 class KnownTruth:
-    """Route of the truth, and its error bar."""
+    """Route of the truth, and the error bar of the quantity."""
 
     route: str | None
     error_bar: float
@@ -76,7 +76,7 @@ class KnownTruth:
 
 @dataclass(frozen=True)
 class Absence:
-    """Status of an absent engine, with the reason."""
+    """Status of an engine that takes no part, with the reason."""
 
     status: str
     message: str
@@ -84,7 +84,7 @@ class Absence:
 
 @dataclass(frozen=True)
 class LadderContent:
-    """Question and results of a ladder, with conclusions (``findings``); ``unplaced``: engines that tell no levels."""
+    """Question, results and conclusions (``findings``) of a ladder; ``unplaced``: engines that declare no level."""
 
     scene: str
     parameters: dict[str, float]
@@ -103,7 +103,7 @@ class LadderContent:
 
 
 def ladder_content(study: Ladder) -> LadderContent:
-    """The study as records."""
+    """Records of the study."""
     truth = study.truths[str({})]
     content = LadderContent(
         scene=study.scene.name,
@@ -117,12 +117,14 @@ def ladder_content(study: Ladder) -> LadderContent:
         rungs=[_rung(study, rung) for rung in study.ladder],
         terms=[_term(study, switch) for switch in study.switches],
         absent={
-            name: Absence(absence(told).status.value, str(told))
-            for name, told in study.engines.items()
-            if isinstance(told, ProofrollError)
+            name: Absence(absence(engine).status.value, str(engine))
+            for name, engine in study.engines.items()
+            if isinstance(engine, ProofrollError)
         },
         unplaced=[
-            name for name, told in study.engines.items() if isinstance(told, EngineDescription) and not told.levels
+            name
+            for name, engine in study.engines.items()
+            if isinstance(engine, EngineDescription) and not engine.levels
         ],
         machine=machine(),
         findings=[],
@@ -156,9 +158,9 @@ def _ran(study: Ladder, model: LadderModel, point: dict[str, float]) -> Ran:
 
 
 def _term(study: Ladder, switch: Switch) -> TermFound:
-    said = (switch.term, switch.kind, switch.model.engine, switch.model.formulation, switch.because)
+    names = (switch.term, switch.kind, switch.model.engine, switch.model.formulation, switch.because)
     if switch.on is None or switch.off is None:
-        return TermFound(*said, Need.INHERENT, f"cannot be left out: {switch.because}")
+        return TermFound(*names, Need.INHERENT, f"cannot be left out: {switch.because}")
     point = dict(switch.on.parameters)
     on, off = (
         SideFound(dict(model.parameters), list(model.asks), _ran(study, model, point))
@@ -180,11 +182,11 @@ def _term(study: Ladder, switch: Switch) -> TermFound:
         bar=study.bar(point),
         scale=study.truths[str({})].sizes.get(study.quantity, 1.0),
     )
-    return TermFound(*said, verdict, reason, on, off, cost, change, error_change)
+    return TermFound(*names, verdict, reason, on, off, cost, change, error_change)
 
 
 def label(row: RungFound | TermFound) -> str:
-    """The engine, its formulation, and what distinguishes a variant of it."""
+    """Engine, formulation and variant of a row, as text."""
     variant = row.variant if isinstance(row, RungFound) else ""
     return " ".join(filter(None, (row.engine, row.formulation, variant)))
 
@@ -195,29 +197,29 @@ def _conclusions(content: LadderContent) -> Iterator[str]:
     empty = [rung.level for rung in content.rungs if rung.ran.status == "empty"]
     if empty:
         yield f"No engine that was asked has a model of the level {', '.join(empty)}."
-    # A rung that is off by the whole size of the quantity has no answer, however cheap.
+    # A rung whose error is as large as the quantity itself is useless, however cheap.
     useful = [
         (rung, rung.ran.seconds_per_second.value, rung.ran.error)
         for rung in content.rungs
         if rung.ran.error is not None and rung.ran.seconds_per_second and rung.ran.error < (content.scale or math.inf)
     ]
     if useful:
-        said = "; ".join(f"{label(rung)} ({number(rung.ran.error)} {unit})" for rung in front(useful))
-        yield f"Nothing is both cheaper and nearer to the true {name} than, from the cheapest on: {said}."
+        rungs = "; ".join(f"{label(rung)} ({number(rung.ran.error)} {unit})" for rung in front(useful))
+        yield f"Nothing is both cheaper and nearer to the true {name} than, from the cheapest on: {rungs}."
     if content.tolerance is not None:
         yield _cheapest(useful, content.tolerance, f"{content.tolerance:g} {unit}")
     yield from _of_terms(content)
     for rung in content.rungs:
         if rung.ran.status not in {"done", "empty"} and not rung.variant:  # those are among the terms
             yield f"{label(rung)} {rung.ran.status}: {rung.ran.message}."
-    for engine, told in content.absent.items():
-        yield f"{engine} is {told.status}: {told.message}."
+    for engine, absent in content.absent.items():
+        yield f"{engine} is {absent.status}: {absent.message}."
     if content.unplaced:
         yield f"Not on the ladder, for they tell no levels: {', '.join(content.unplaced)}."
 
 
 def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, said: str) -> str:
-    """Cheapest rung of the ladder within the tolerance."""
+    """Sentence on the cheapest rung within a tolerance; ``said`` is the tolerance with its unit."""
     within = [entry for entry in useful if entry[2] <= tolerance]
     if not within:
         return f"No rung is within {said} at its own step."
@@ -226,7 +228,7 @@ def _cheapest(useful: list[tuple[RungFound, float, float]], tolerance: float, sa
 
 
 def _of_terms(content: LadderContent) -> Iterator[str]:
-    """One sentence per term and verdict, over all models."""
+    """Sentences on the terms: one per term and verdict, over all models."""
     name, unit = content.quantity, content.unit
     groups: dict[tuple[str, Need], list[TermFound]] = {}
     for judged_term in content.terms:

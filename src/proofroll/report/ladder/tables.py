@@ -1,4 +1,4 @@
-"""The ladder of models as two tables of the terminal."""
+"""Tables of the ladder of models for the terminal."""
 
 from rich.table import Column, Table
 from rich.text import Text
@@ -14,12 +14,12 @@ _STYLES = {Need.NEEDED: "green", Need.NOT_NEEDED: "yellow", Need.HARMFUL: "red",
 
 
 def ladder_parts(content: LadderContent) -> list[Table | str]:
-    """Both tables, and what to take home."""
+    """Both tables, and the conclusions."""
     return [rung_table(content), "", term_table(content), "", *content.findings]
 
 
 def rung_table(content: LadderContent) -> Table:
-    """One line per rung, from the least model to the most."""
+    """Table of the rungs, from the simplest model to the most complete."""
     title = f"{content.quantity} of {content.scene} over {content.until:g} s, from the least model to the most"
     table = plain_table(
         *unbroken("level", "engine formulation", "step"),
@@ -43,7 +43,7 @@ def rung_table(content: LadderContent) -> Table:
 
 
 def term_table(content: LadderContent) -> Table:
-    """One line per term and model: what it costs, what leaving it out does, and the verdict."""
+    """Table of terms and models: cost of the term, effect of leaving it out, and the verdict."""
     table = plain_table(
         Column("term", max_width=25),
         *unbroken("engine formulation"),

@@ -1,4 +1,4 @@
-"""Advice in words: what to take for each group of scenes and each scene, what else there is, and what serves all."""
+"""Advice in words: the cheapest setting for each group of scenes and each scene, alternatives, and the best for all."""
 
 import json
 import math
@@ -15,10 +15,11 @@ class Advised:
     """Advice for some scenes.
 
     Attributes:
-        of: the group or study; ``all`` of them.
+        of: name of the group or study; ``all``: all studies.
         sentence: for a person.
         choice: setting and step, or formulation; None: nothing holds the tolerance.
-        cost: of the choice, wall seconds per simulated second at the slowest scene; None: without a choice, or of all.
+        cost: of the choice, wall seconds per simulated second at the slowest scene; None: without a choice, or for
+        ``all``.
     """
 
     of: str
@@ -28,7 +29,7 @@ class Advised:
 
 
 def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised]:
-    """Advice for each column of the matrix, and at last over all."""
+    """Advice for each column of the matrix, then for all studies."""
     return [
         *(of_column(matrix, column, tolerance, forces) for column in matrix.columns),
         over_all(matrix, tolerance, forces),
@@ -36,12 +37,12 @@ def advice(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> list[Advised
 
 
 def words(matrix: ChoiceMatrix) -> str:
-    """Sentences for all that can be asked as JSON, and the parts from which a page makes those of some engines.
+    """JSON of the sentences for every tolerance in :data:`ASKED`, and of parts for sentences on some engines.
 
-    Parts are the beginnings of the sentences, and of each column its engines, the cheapest first: engine, cost (null:
-    it does not hold the tolerance), name, and cost as text or why it does not get there.
+    The parts are the heads of the sentences, and for each column its engines, the cheapest first: engine, cost (null:
+    the tolerance is not held), name, and cost as text or the reason why the tolerance is not held.
     """
-    told = []
+    answers = []
     for forces, tolerance in ASKED:
         heads, engines = [], []
         for column in matrix.columns:
@@ -56,12 +57,12 @@ def words(matrix: ChoiceMatrix) -> str:
                 ]
             )
         said = [item.sentence for item in advice(matrix, tolerance, forces)]
-        told.append({"said": said, "heads": heads, "engines": engines})
-    return json.dumps(told, ensure_ascii=False, separators=(",", ":"))
+        answers.append({"said": said, "heads": heads, "engines": engines})
+    return json.dumps(answers, ensure_ascii=False, separators=(",", ":"))
 
 
 def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool) -> Advised:
-    """Cheapest that holds the tolerance, the best of each other engine beside it, and what forces change."""
+    """Advice for a column: the cheapest that holds the tolerance, the best of other engines, the effect of forces."""
     asked = _asked(column, tolerance, forces)
     engines = _engines(matrix, column, tolerance, forces)
     if not engines:
@@ -69,19 +70,19 @@ def of_column(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forc
     first, *others = engines.values()
     if _unjudged(matrix, column, forces):
         return Advised(column.title, f"{asked}: {'forces are' if forces else 'motion is'} not judged there.")
-    said = [_other(name, cell, first[1]) for name, cell in others]
+    clauses = [_other(name, cell, first[1]) for name, cell in others]
     held = math.isfinite(first[1].cost)
     if held:
-        said.insert(0, f"take {_named(*first)} ({first[1].text} s/s)")
+        clauses.insert(0, f"take {_named(*first)} ({first[1].text} s/s)")
     else:
-        said = [NOTHING, _other(*first, first[1]), *said]
+        clauses = [NOTHING, _other(*first, first[1]), *clauses]
     changed = "" if forces else _with_forces(matrix, column, tolerance, first[1])
     choice = (_named(*first), first[1].cost) if held else (None, None)
-    return Advised(column.title, f"{asked} {'; '.join(said)}.{changed}", *choice)
+    return Advised(column.title, f"{asked} {'; '.join(clauses)}.{changed}", *choice)
 
 
 def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
-    """Fewest formulations with which as many studies as possible hold the tolerance, the most useful one first."""
+    """Advice over all studies: fewest formulations that hold the tolerance in most of them, the most useful first."""
     alone = {column.studies[0]: column for column in matrix.columns if len(column.studies) == 1}
     columns = {name: column for name, column in alone.items() if name not in matrix.unjudged[forces]}
     if alone and not columns:
@@ -95,7 +96,7 @@ def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
         for row in matrix.models
     }
     missing = set(columns)
-    said: list[str] = []
+    steps: list[str] = []
     chosen: list[str] = []
     while missing and (best := max(costs, key=lambda name: _use(costs[name], missing), default="")):
         gained = missing & costs[best].keys()
@@ -103,15 +104,15 @@ def over_all(matrix: ChoiceMatrix, tolerance: float, forces: bool) -> Advised:
             break
         missing -= gained
         chosen.append(best)
-        said.append(f"{best} {'holds it in' if not said else 'brings it to'} {len(columns) - len(missing)}")
+        steps.append(f"{best} {'holds it in' if not steps else 'brings it to'} {len(columns) - len(missing)}")
     asked = f"Over all, {counted(len(columns), 'studies')}, to {number(tolerance)}{' with forces' if forces else ''}"
     left = ", ".join(matrix.titles[name] for name in columns if name in missing)
-    sentence = f"{asked}: {'; '.join(said) or NOTHING}{f'; nothing holds it for {left}' if said and left else ''}."
+    sentence = f"{asked}: {'; '.join(steps) or NOTHING}{f'; nothing holds it for {left}' if steps and left else ''}."
     return Advised("all", sentence, ", ".join(chosen) or None)
 
 
 def _use(costs: dict[str, float], missing: set[str]) -> tuple[int, float]:
-    """Number of studies that a formulation adds, and how cheap it is there."""
+    """Ranking of a formulation: number of studies that it adds, then its cheapness there."""
     gained = missing & costs.keys()
     return len(gained), -sum(math.log(costs[name]) for name in gained if costs[name] > 0)
 
@@ -128,7 +129,7 @@ def _unjudged(matrix: ChoiceMatrix, column: ChoiceColumn, forces: bool) -> bool:
 def _engines(
     matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, forces: bool
 ) -> dict[str, tuple[str, ChoiceCell]]:
-    """Best formulation of each engine: the cheapest that holds the tolerance, else the closest; the best one first."""
+    """Best formulation of each engine, the best engine first: cheapest that holds the tolerance, else the closest."""
     best_of: dict[str, tuple[str, ChoiceCell]] = {}
     for row in matrix.models:
         cell = matrix.cell(row, column, tolerance, forces)
@@ -148,14 +149,14 @@ def _named(name: str, cell: ChoiceCell) -> str:
 
 
 def _other(name: str, cell: ChoiceCell, first: ChoiceCell) -> str:
-    """Another engine beside the cheapest: how many times its cost, or why it does not get there."""
+    """Clause on another engine: its cost relative to the cheapest, or the reason why it does not hold the tolerance."""
     if math.isfinite(cell.cost):
         return f"{_named(name, cell)} costs {_times(cell.cost, first.cost)}"
     return f"{name} does not get there ({cell.why})" if cell.why else f"{_named(name, cell)} holds it, not timed"
 
 
 def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, without: ChoiceCell) -> str:
-    """Sentence about forces, which were not asked for."""
+    """Sentence on the effect of forces for an answer about motion alone."""
     if _unjudged(matrix, column, True):
         return " Forces are not judged there."
     name, cell = next(iter(_engines(matrix, column, tolerance, True).values()))
@@ -173,6 +174,6 @@ def _with_forces(matrix: ChoiceMatrix, column: ChoiceColumn, tolerance: float, w
 
 
 def _times(cost: float, of: float) -> str:
-    """A cost beside another one: ``as much``, ``3.4 times that``."""
+    """Cost relative to another one in words: ``as much``, ``3.4 times that``."""
     times = float(f"{cost / of:.2g}") if of else math.inf
     return "as much" if times == 1 else f"{times:g} times that"

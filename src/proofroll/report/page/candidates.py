@@ -1,4 +1,4 @@
-"""Candidates of a choice: each setting with each of its steps in each study, over all places of the study."""
+"""Candidates for a choice: each setting with each of its steps in each study, over all places of the study."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from proofroll.core.verdict import LimitResult, Verdict
 from proofroll.report.labels import step
 from proofroll.report.long_table import TableLine
 
-# What a ladder of steps may say, from what leaves the most hope to what leaves none.
+# Results of a ladder of steps, from the most to the least promising.
 _LIMITS = (LimitResult.WITHIN, LimitResult.NO_LADDER, LimitResult.NOT_SHOWN, LimitResult.ANOTHER)
 
 
@@ -18,13 +18,13 @@ class Candidate:
     Attributes:
         row: number of its row in the study.
         name: engine, formulation, setting and step, for a person.
-        motion, forces: largest error of a coordinate, and of a reaction, in parts of its size; None: not reported.
+        motion, forces: largest error of a coordinate, and of a reaction, relative to its size; None: not reported.
         cost: wall seconds per simulated second at the slowest place; None: not measured.
-        clean: the cost is that of clean runs.
+        clean: True if clean runs measured the cost.
         blame: verdict of a place without a result; None: every place has one.
         motion_limit, forces_limit: result of its ladder of steps for either.
-        href: id of the evidence of the place that is furthest off.
-        message: reason for which a place has no result.
+        href: HTML id of the evidence of the place with the largest error.
+        message: reason why a place has no result.
     """
 
     row: int
@@ -40,21 +40,21 @@ class Candidate:
     message: str
 
     def error(self, forces: bool) -> float | None:
-        """The error that a tolerance bounds; None: something is not reported."""
+        """Error that a tolerance bounds, of motion or of both; None: something is not reported."""
         if not forces:
             return self.motion
         return None if self.motion is None or self.forces is None else max(self.motion, self.forces)
 
     def limit(self, forces: bool) -> LimitResult:
-        """Result of its ladder for all that is asked for."""
+        """Result of its ladder of steps, for motion or the worse of both."""
         both = (self.motion_limit, self.forces_limit) if forces else (self.motion_limit,)
         return max(both, key=_LIMITS.index)
 
 
 def candidates(lines: Sequence[TableLine], href: str, places: Sequence[str]) -> list[Candidate]:
-    """The candidates of one row of a study, its own step first; ``href`` is the id of the study's evidence.
+    """Candidates of one row of a study, its own step first.
 
-    Each of the ``places`` has an evidence of its own, in their order.
+    ``href``: HTML id of the study's evidence; ``places``: places with evidence of their own, in the order of their ids.
     """
     needed = list(dict.fromkeys(line.place for line in lines))
     own = lines[0].step
@@ -75,7 +75,7 @@ def _candidate(
     limits: tuple[LimitResult, LimitResult],
     anchors: dict[str, str],
 ) -> Candidate:
-    """One step of a row; ``anchors`` are ids of the evidence by place, under the empty name that of the study."""
+    """Candidate for one step of a row; ``anchors``: HTML ids of the evidence by place (the study's: empty place)."""
     name, href = _name(first, value), anchors.get("", "")
     judged = {
         place: [line for line in lines if line.verdict not in {Verdict.ILL_POSED, Verdict.NOT_JUDGED}]
@@ -95,33 +95,33 @@ def _candidate(
 
 
 def _blame(judged: dict[str, list[TableLine]]) -> tuple[Verdict | None, str]:
-    """Verdict and message of the first place without a result."""
+    """Verdict and message of the first place without a result; None and empty if every place has one."""
     if not judged:
         return Verdict.NOT_JUDGED, "no engine can be judged here"
     for place, lines in judged.items():
         if not lines:
             return Verdict.FAILED, f"no run with this step at {place}"
         if lines[0].status != "done":
-            said = {str(item): item for item in Verdict}.get(lines[0].verdict, Verdict.FAILED)
-            return said, lines[0].message
+            verdict = {str(item): item for item in Verdict}.get(lines[0].verdict, Verdict.FAILED)
+            return verdict, lines[0].message
     return None, ""
 
 
 def largest(lines: Sequence[TableLine], role: str) -> float | None:
-    """Largest relative error of what is shown of a role."""
+    """Largest relative error of the quantities of a role that summaries show."""
     return max((line.relative for line in _shown(lines, role)), default=None)
 
 
 def _shown(lines: Sequence[TableLine], role: str) -> list[TableLine]:
-    """Lines of the quantities of a role that summaries show, of all if they show none; without those of no size."""
+    """Lines of a role's quantities that have a scale: those that summaries show, or else all."""
     of_role = [line for line in lines if line.role == role and line.scale]
     return [line for line in of_role if line.headline] or of_role
 
 
 def _limit(lines: Sequence[TableLine], role: str) -> LimitResult:
-    """The worst that the ladder of a row says of a role."""
-    said = [item for line in _shown(lines, role) for item in _LIMITS if line.limit == item]
-    return max(said, key=_LIMITS.index, default=LimitResult.NO_LADDER)
+    """Worst result of a row's ladder of steps for a role."""
+    results = [item for line in _shown(lines, role) for item in _LIMITS if line.limit == item]
+    return max(results, key=_LIMITS.index, default=LimitResult.NO_LADDER)
 
 
 def _worst(errors: Sequence[float | None]) -> float | None:

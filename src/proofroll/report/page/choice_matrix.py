@@ -1,4 +1,4 @@
-"""Matrix of engines and groups of scenes: of each the cheapest run that holds a tolerance, or why none does."""
+"""Matrix of engines and groups of scenes: the cheapest run that holds a tolerance, or the reason why none does."""
 
 import json
 import math
@@ -14,12 +14,12 @@ from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import Candidate, candidates
 from proofroll.report.pages import packed
 
-# Tolerances among which a reader chooses: powers of ten, as parts of the path or of the largest force.
+# Tolerances that a reader can choose: negative powers of ten, relative to the path or the largest force.
 DECADES = range(2, 9)
-# The one that a reader sees first, and for which sentences name a setting.
+# The tolerance that a reader sees first, and for which sentences name a setting.
 FIRST = 4
 FIRST_TOLERANCE = 10.0**-FIRST
-# All that a reader can ask for: forces, too, and the tolerance.
+# All questions that a reader can ask: with forces or not, and the tolerance.
 ASKED = [(forces, 10.0**-decade) for forces, decade in product((False, True), DECADES)]
 NEEDS = ("motion to {0} of the path", "motion to {0} of the path and forces to {0} of the largest")
 UNIT = "in seconds of computing per second of motion"
@@ -42,11 +42,11 @@ class ChoiceCell(NamedTuple):
 
     Attributes:
         state: verdict, for colour and glyph; ``none``: nothing was run.
-        text: cost [s/s] where the tolerance is held, else the least error, or how many scenes hold it.
+        text: cost [s/s] if the tolerance is held, else the least error, or the number of scenes that hold it.
         title: the same in sentences.
-        href: id of the evidence; empty: there is none.
-        cost: of the slowest scene; infinite where the tolerance is not held in all, or nothing was measured.
-        name: setting and step in it; of several scenes that they have in common, or empty.
+        href: HTML id of the evidence; empty: there is none.
+        cost: of the slowest scene; infinite unless the tolerance is held in all and costs were measured.
+        name: setting and step; for several scenes the ones that they share, or empty.
         why: short reason why the tolerance is not held; empty: it is.
     """
 
@@ -60,7 +60,7 @@ class ChoiceCell(NamedTuple):
 
 
 class ChoiceStudy(NamedTuple):
-    """A study in the matrix: its title, the id of its evidence, and the places that have one of their own."""
+    """A study in the matrix: title, HTML id of its evidence, and places that have evidence of their own."""
 
     title: str
     href: str
@@ -69,7 +69,7 @@ class ChoiceStudy(NamedTuple):
 
 @dataclass(frozen=True)
 class ChoiceColumn:
-    """A group of scenes, or one study of it; ``whole``: it is the group."""
+    """Column of a group of scenes (``whole``), or of one study in it."""
 
     group: str
     title: str
@@ -80,7 +80,7 @@ class ChoiceColumn:
 
 @dataclass(frozen=True)
 class ChoiceRow:
-    """A formulation with one setting, or with all (``setting`` is empty); ``found``: its candidates by study."""
+    """Formulation with one setting, or with all (``setting`` is empty); ``found``: its candidates by study."""
 
     engine: str
     formulation: str
@@ -96,7 +96,7 @@ class ChoiceRow:
 
 @dataclass(frozen=True)
 class ChoiceMatrix:
-    """The matrix; ``titles`` are those of studies, by name."""
+    """Matrix of engines and scenes; ``titles``: of studies, by name."""
 
     columns: list[ChoiceColumn]
     rows: list[ChoiceRow]
@@ -108,20 +108,20 @@ class ChoiceMatrix:
         return list(dict.fromkeys(row.engine for row in self.rows))
 
     def cell(self, row: ChoiceRow, column: ChoiceColumn, tolerance: float, forces: bool) -> ChoiceCell:
-        """Cell at a tolerance, a part of the size."""
+        """Cell of a row and column at a tolerance relative to the quantities' size."""
         own = [name for name in column.studies if name in row.found]
         judged = [name for name in own if name not in self.unjudged[forces]]
         if own and not judged:
             what = "no forces" if forces else "no motion"
             return ChoiceCell(Verdict.NOT_JUDGED, what, f"{what} judged here", why=f"{what} judged")
-        # What nothing can be said of, as for lack of time, says nothing against the scenes that ran.
-        said = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
-        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in said or judged]
+        # A study without any judgement, say for lack of time, does not count against the studies that ran.
+        known = [name for name in judged if any(item.blame != Verdict.NOT_JUDGED for item in row.found[name])]
+        cells = [(self.titles[name], _cell(row.found[name], tolerance, forces)) for name in known or judged]
         return _joined(cells) if cells else ChoiceCell(NOT_RUN, "", "not run")
 
     @cached_property
     def unjudged(self) -> tuple[set[str], set[str]]:
-        """Studies that ran, but in which no motion is judged, or not forces with it, as where these are not unique."""
+        """Studies that ran without judged motion, and those that lack judged motion or forces."""
         items = [(name, item) for row in self.rows for name, own in row.found.items() for item in own]
         ran = {name for name, item in items if item.blame is None}
         motion = ran - {name for name, item in items if item.motion is not None}
@@ -130,22 +130,22 @@ class ChoiceMatrix:
 
     @property
     def models(self) -> list[ChoiceRow]:
-        """Rows of engines' models with all their settings, without solutions of the scenes' own equations."""
+        """Rows of engines' own models with all their settings, without equations derived for a scene."""
         return [row for row in self.rows if not row.setting and not row.own_equations]
 
     def ranked(self, column: ChoiceColumn, tolerance: float, forces: bool) -> list[tuple[int, ChoiceCell]]:
-        """Formulations that hold a tolerance: place of the row, and its cell; the cheapest first."""
+        """Formulations that hold a tolerance, the cheapest first: number of the row, and its cell."""
         rows = {id(row): place for place, row in enumerate(self.rows)}
         cells = [(rows[id(row)], self.cell(row, column, tolerance, forces)) for row in self.models]
         return sorted((item for item in cells if math.isfinite(item[1].cost)), key=lambda item: item[1].cost)
 
     def best(self, tolerance: float, forces: bool) -> list[int | None]:
-        """Row of each column's cheapest formulation; None where none holds the tolerance."""
+        """Number of the row of each column's cheapest formulation; None where none holds the tolerance."""
         ranks = (self.ranked(column, tolerance, forces) for column in self.columns)
         return [found[0][0] if found else None for found in ranks]
 
     def answer(self, tolerance: float, forces: bool) -> str:
-        """One sentence: the cheapest of each group that holds the tolerance in all its scenes that it ran."""
+        """Sentence with the cheapest formulation of each group that holds the tolerance in all scenes it ran."""
         groups = [column for column in self.columns if column.whole]
         ranks = [self.ranked(column, tolerance, forces) for column in groups]
         held = [self._phrase(column, *found[0]) for column, found in zip(groups, ranks, strict=True) if found]
@@ -161,7 +161,7 @@ class ChoiceMatrix:
         return f"The cheapest to hold {asked}, {UNIT}: {', '.join(held)}{f'; {nothing}' if nothing else ''}."
 
     def with_forces(self, tolerance: float) -> str:
-        """Sentence beside the answer about motion: what changes with forces; empty: they are judged nowhere."""
+        """Sentence that follows an answer about motion: changes if forces count; empty if forces are judged nowhere."""
         groups = [column for column in self.columns if column.whole and column.group in self.judged_groups[True]]
         other: list[str] = []
         same: list[str] = []
@@ -175,22 +175,22 @@ class ChoiceMatrix:
             else:
                 other.append(self._phrase(column, *both[0]))
         rest = [f"{words} {', '.join(names)}" for words, names in ((SAME, same), (NOTHING, without)) if names]
-        said = [", ".join(other), *rest] if other else rest
-        return f"{WITH_FORCES.format(number(tolerance))}: {'; '.join(said)}." if groups else ""
+        clauses = [", ".join(other), *rest] if other else rest
+        return f"{WITH_FORCES.format(number(tolerance))}: {'; '.join(clauses)}." if groups else ""
 
     def _phrase(self, column: ChoiceColumn, place: int, cell: ChoiceCell) -> str:
         return f"{cell.name or self.rows[place].name} for {column.group} ({cell.text})"
 
     @cached_property
     def judged_groups(self) -> tuple[list[str], list[str]]:
-        """Groups in which motion is judged, and in which forces are, too."""
+        """Groups in which motion is judged, and groups in which forces are judged, too."""
         whole = [column for column in self.columns if column.whole]
         motion, both = ([x.group for x in whole if not lacking.issuperset(x.studies)] for lacking in self.unjudged)
         return motion, both
 
     @cached_property
     def data(self) -> str:
-        """All cells at all tolerances as JSON: unlike cells once, and for each row and column their numbers."""
+        """JSON of all cells at all tolerances: distinct cells once, and for each row and column their numbers."""
         pool: dict[tuple[str, str, str, str], int] = {}
         grid = [
             [
@@ -207,17 +207,17 @@ class ChoiceMatrix:
             for need, at in ASKED
         ]
         groups = [column.group if column.whole else "" for column in self.columns]
-        told = {"cells": list(pool), "grid": grid, "ranks": ranks, "groups": groups, "judged": self.judged_groups}
-        return json.dumps(told, separators=(",", ":"))
+        content = {"cells": list(pool), "grid": grid, "ranks": ranks, "groups": groups, "judged": self.judged_groups}
+        return json.dumps(content, separators=(",", ":"))
 
     @property
     def packed(self) -> str:
-        """The same as a page keeps it."""
+        """The JSON of :attr:`data`, compressed for a page."""
         return packed(self.data.encode())
 
 
 def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]) -> ChoiceMatrix:
-    """The matrix of the lines of some studies, in their order; what is cheapest for any scenes comes first."""
+    """Matrix of the lines of some studies, in their order; formulations that are cheapest somewhere come first."""
     order = {name: number for number, name in enumerate(studies)}
     chosen = sorted((line for line in lines if line.study in order), key=lambda x: (order[x.study], x.row, x.engine))
     rows: dict[tuple[str, str, str], ChoiceRow] = {}
@@ -246,18 +246,18 @@ def choice_matrix(lines: Iterable[TableLine], studies: Mapping[str, ChoiceStudy]
 
 
 def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceCell:
-    """The cheapest candidate of one study that holds the tolerance; else the closest one, or why there is none."""
+    """Cell of one study: the cheapest candidate that holds the tolerance, else the closest, else why there is none."""
     whole = [item for item in steps if item.blame is None]
-    told = [(size, item) for item in whole if (size := item.error(forces)) is not None]
-    held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in told if size <= tolerance]
+    known = [(size, item) for item in whole if (size := item.error(forces)) is not None]
+    held = [(item.cost if item.cost is not None else math.inf, size, item) for size, item in known if size <= tolerance]
     if held:
         cost, size, item = min(held, key=lambda entry: entry[:2])
         text = "✓" if math.isinf(cost) else f"{'' if item.clean else '~'}{number(cost)}"
         spent = "not timed" if math.isinf(cost) else f"{text} s of computing per simulated second"
         title = f"{item.name}: within {number(size)}, {spent}"
         return ChoiceCell(Verdict.AGREES, text, title, item.href, cost, item.name)
-    if told:
-        size, item = min(told, key=lambda entry: entry[0])
+    if known:
+        size, item = min(known, key=lambda entry: entry[0])
         limit = item.limit(forces)
         state = Verdict.CONVERGES if limit == LimitResult.WITHIN else Verdict.DIFFERS
         off = _beyond(size, tolerance)
@@ -273,7 +273,7 @@ def _cell(steps: Sequence[Candidate], tolerance: float, forces: bool) -> ChoiceC
 
 
 def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
-    """An error with as many digits as show that it is beyond the tolerance."""
+    """Text of an error with enough digits to show that it exceeds the tolerance."""
     text = error(size, digits)
     return (
         text
@@ -283,7 +283,7 @@ def _beyond(size: float, tolerance: float, digits: int = 1) -> str:
 
 
 def _joined(cells: Sequence[tuple[str, ChoiceCell]]) -> ChoiceCell:
-    """One cell for several studies: the worst; the cost of the slowest where all hold the tolerance."""
+    """One cell for several studies: the worst; its cost is that of the slowest if all hold the tolerance."""
     if len(cells) == 1:
         return cells[0][1]
     title = "; ".join(f"{name}: {cell.title}" for name, cell in cells)

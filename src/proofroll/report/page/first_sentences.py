@@ -1,4 +1,4 @@
-"""Three sentences for the whole report, written from its data: what agrees, what does not, and what to use."""
+"""Three sentences on the whole report, from its data: agreement, silent disagreement, and advice."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ from proofroll.studies.stability.records import StabilityStudy
 def three_sentences(
     comparisons: Sequence[ReportedComparison], entries: Mapping[str, Sequence[PartEntry]], choice: ChoiceMatrix
 ) -> list[str]:
-    """Three sentences: the best agreement, silent disagreement (``entries`` of maps, too), and advice."""
+    """Three sentences: the best agreement, silent disagreement (also of the maps in ``entries``), and advice."""
     maps = [entry.study for entry in entries.get("stability", ()) if entry.study is not None]
     return [_agrees(comparisons, choice), _silent(comparisons, maps), choice.answer(FIRST_TOLERANCE, forces=True)]
 
@@ -26,12 +26,12 @@ def _agrees(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> 
     if not comparisons:
         return "Nothing was compared with the truth in this report."
     known, alone = ([item for item in comparisons if item.laws_alone is either] for either in (False, True))
-    said = "; ".join(filter(None, (_near(known, choice), _lawful(alone))))
-    return f"{said[0].upper()}{said[1:]}."
+    text = "; ".join(filter(None, (_near(known, choice), _lawful(alone))))
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _lawful(comparisons: Sequence[ReportedComparison]) -> str:
-    """Clause on comparisons whose motion is not unique; empty: there are none."""
+    """Clause on comparisons whose motion is not unique; empty without any."""
     if not comparisons:
         return ""
     rows = [row for comparison in comparisons for row in comparison.rows]
@@ -40,14 +40,14 @@ def _lawful(comparisons: Sequence[ReportedComparison]) -> str:
 
 
 def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> str:
-    """Clause on comparisons with a truth; empty: there are none."""
+    """Clause on comparisons with a truth; empty without any."""
     if not comparisons:
         return ""
     rows = [row for comparison in comparisons for row in comparison.rows]
     counts = Counter(row.verdict.value for row in rows)
     agree = "agrees" if counts["agrees"] == 1 else "agree"
     where = "one comparison" if len(comparisons) == 1 else f"{len(comparisons)} comparisons"
-    said = f"Of {counted(len(rows), 'settings')} in {where}, {counts['agrees']} {agree} with the truth everywhere"
+    text = f"Of {counted(len(rows), 'settings')} in {where}, {counts['agrees']} {agree} with the truth everywhere"
     rest = {
         "unconfirmed": "at this step, with a limit that is not confirmed",
         "incomplete": "without reporting all that is judged",
@@ -55,21 +55,21 @@ def _near(comparisons: Sequence[ReportedComparison], choice: ChoiceMatrix) -> st
     }
     parts = [f"{counts[verdict]} {words}" for verdict, words in rest.items() if counts[verdict]]
     if parts:
-        said += f", {' and '.join(parts)}"
+        text += f", {' and '.join(parts)}"
     if counts["refused"]:
-        said += f"; {counts['refused']} {'refuses' if counts['refused'] == 1 else 'refuse'} the scene or a case of it"
+        text += f"; {counts['refused']} {'refuses' if counts['refused'] == 1 else 'refuse'} the scene or a case of it"
     best = closest(comparisons[0], choice)
     if best is None:
-        return f"{said}; none gave motion and forces in every case of the first comparison"
+        return f"{text}; none gave motion and forces in every case of the first comparison"
     first = " in the first" if len(comparisons) > 1 else ""
     return (
-        f"{said}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
+        f"{text}; closest{first} is {best.name}, whose motion stays within {number(best.motion)} of its range and "
         f"whose forces within {number(best.forces)} of the largest"
     )
 
 
 def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityStudy]) -> str:
-    """Sentence on settings that are silently wrong, and on boundaries of stability passed in silence."""
+    """Sentence on settings that are silently wrong, and on boundaries of stability passed silently."""
     wrong = [item for comparison in comparisons for item in _wrong(comparison)]
     silent, boundaries = (sum(getattr(study, key) for study in maps) for key in ("silent", "boundaries"))
     passed = f"{silent} of {boundaries} boundaries of stability and accuracy are passed without a word"
@@ -84,12 +84,12 @@ def _silent(comparisons: Sequence[ReportedComparison], maps: Sequence[StabilityS
     _, name, text = max(wrong)
     differ, breaks, run = ("differ", "break", "run") if len(wrong) > 1 else ("differs", "breaks", "runs")
     off = " or ".join(filter(None, (truth and f"{differ} {truth}", laws and f"{breaks} {laws}")))
-    said = f"{len(wrong)} {off} and {run} to the end without a word, worst {name}: {text}"
-    return f"{said}; {passed}." if maps else f"{said}."
+    text = f"{len(wrong)} {off} and {run} to the end without a word, worst {name}: {text}"
+    return f"{text}; {passed}." if maps else f"{text}."
 
 
 def _wrong(comparison: ReportedComparison) -> list[tuple[float, str, str]]:
-    """Rows that differ though each of their runs ended as done: relative error, name, and text of the error."""
+    """Rows that differ though all their runs ended as done: relative error, name, and text of the error."""
     wrong = []
     for name, row, runs in comparison.lines():
         if row.verdict != "differs" or any(run.status != "done" for run in runs):

@@ -1,4 +1,4 @@
-"""A report while it grows: written after the comparisons, and again after each further study."""
+"""A report that grows: written after the comparisons, and again after each further study."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -26,12 +26,12 @@ class Report:
     """Content of the report's files.
 
     Attributes:
-        compared: its parts about the comparisons.
+        compared: content about the comparisons.
         curves: of each comparison, for the figures.
-        replay: of the comparisons, as their kind of element gives it.
+        replay: of the comparisons, or None.
         parts: the further studies, in the order of the content's lists.
         pictures: markup by name.
-        earlier: the report against which this one is held.
+        earlier: earlier report to compare this one with, or None.
     """
 
     compared: ReportContent
@@ -45,12 +45,12 @@ class Report:
 
     @property
     def content(self) -> ReportContent:
-        """Content of the report, with the further studies that there are so far."""
+        """Content of the report, with the further studies that have an entry so far."""
         said = [(part.key, self._said[id(part)]) for part in self.parts if id(part) in self._said]
         entries = {key: [entry for other, entry in said if other == key] for key in self.compared.entries}
         environment = self.compared.environment
         for _, entry in said:
-            if isinstance(entry.study, dict):  # of a kept study the versions are those of now
+            if isinstance(entry.study, dict):  # a stored study was made with the present versions
                 environment = replace(environment, versions=environment.versions | entry.study.get("versions", {}))
         further = [line for part in self.parts for line in self._lines.get(id(part), ())]
         table = LongTable([*self.compared.table.lines, *further])
@@ -60,10 +60,10 @@ class Report:
         return replace(content, against=against(self.earlier, table.lines, environment.machine, environment.versions))
 
     def expect(self, parts: Sequence[Part], out: Path, *, fresh: bool = False) -> list[Part]:
-        """Lists further studies with what is kept of them in the folder of all results, unless it is made ``fresh``.
+        """Lists further studies with their stored results under ``out``, which are ignored if ``fresh``.
 
         Returns:
-            those that have to be made.
+            Studies that must be made.
         """
         self.parts = sorted(parts, key=lambda part: part.order)
         missing = []
@@ -76,9 +76,9 @@ class Report:
         return missing
 
     def make(self, part: Part, how: Callable[[], None]) -> PartEntry:
-        """Makes a further study; whatever happens to it, its entry says."""
+        """Makes a further study and returns its entry, which tells of a failure, too."""
         said = attempt(part, how)
-        assert said is not None  # it was made, or the entry says why not
+        assert said is not None  # only ``keeps`` returns False
         self._put(part, said)
         return said
 
@@ -89,9 +89,9 @@ class Report:
             ProofrollError: the folder cannot be written.
         """
         content = self.content
-        said = plain(content)
-        table = json.dumps(said.pop("table"), allow_nan=False).replace("], [", "],\n  [")
-        text = json.dumps(said, indent=1, allow_nan=False).removesuffix("\n}")
+        content_json = plain(content)
+        table = json.dumps(content_json.pop("table"), allow_nan=False).replace("], [", "],\n  [")
+        text = json.dumps(content_json, indent=1, allow_nan=False).removesuffix("\n}")
         write_text(out / "report.json", f'{text},\n "table": {table}\n}}\n')
         write_text(out / "report.csv", content.table.csv)
         write_text(out / "report.html", page(content, self.curves, self.pictures, self.replay))
@@ -106,10 +106,13 @@ class Report:
 
 
 def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), left_out: Sequence[str] = ()) -> Report:
-    """A report of comparisons, to which further studies can be added.
+    """Report of comparisons, to which further studies can be added.
 
-    ``command`` makes it again; ``awaited`` are titles of comparisons that are still being run, ``left_out`` names of
-    those that are not in it.
+    Args:
+        outcomes: results of the comparisons.
+        command: command that makes the report again.
+        awaited: titles of comparisons that are still being run.
+        left_out: names of comparisons that the report leaves out.
     """
     replay = _replay(outcomes)
     described = [case.described for case in replay.cases] if replay else []
@@ -119,7 +122,7 @@ def begun(outcomes: list[Outcome], command: str, awaited: Sequence[str] = (), le
 
 
 def _replay(outcomes: list[Outcome]) -> Replay | None:
-    """The replay of the comparisons, one kind of scenes after the other."""
+    """Replay of the comparisons, kind by kind; None if nothing can be drawn."""
     kinds = {id(item): kind_of(item.scene) for item in outcomes}
     drawn_by = dict.fromkeys(kind for kind in kinds.values() if kind is not None)
     return joined(
@@ -128,7 +131,7 @@ def _replay(outcomes: list[Outcome]) -> Replay | None:
 
 
 def _drawn(prefix: str, draw: Callable[[], dict[str, str]]) -> dict[str, str]:
-    """Pictures by prefix and name; where they cannot be drawn, under ``problem`` a sentence that says why."""
+    """Pictures by prefix and name; if they cannot be drawn, a sentence with the reason under ``problem``."""
     try:
         return {f"{prefix}{name}": markup for name, markup in draw().items()}
     except ProofrollError as error:

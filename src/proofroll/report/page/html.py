@@ -1,4 +1,4 @@
-"""The report's page: one HTML file that needs nothing else."""
+"""The report's page: one HTML file without external resources."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def page(
     pictures: Mapping[str, str] = MappingProxyType({}),
     replay: Replay | None = None,
 ) -> str:
-    """The HTML page: content, curves of each comparison, markup of further pictures by name, and the replay if any."""
+    """HTML page from content, curves of each comparison, markup of further pictures by name, and the replay if any."""
     drawn = {
         "precision": content.precision,
         "rows": [_drawn_rows(comparison) for comparison in content.comparisons],
@@ -72,14 +72,14 @@ def page(
 
 
 def _marked(comparison: ReportedComparison, curves: Sequence[PointCurves]) -> Sequence[PointCurves]:
-    """The curves with what the scene's kind of element marks on them."""
+    """Curves with the marks of the scene's kind of element."""
     kind = report_kinds().get(comparison.shown_by)
     return curves if kind is None else kind.mark(comparison, curves)
 
 
 @functools.cache
 def _plotly() -> str:
-    """The program that draws, compressed."""
+    """Source of plotly.js, compressed."""
     import plotly.offline
 
     return packed(plotly.offline.get_plotlyjs().encode())
@@ -87,7 +87,7 @@ def _plotly() -> str:
 
 @functools.cache
 def _datatables() -> str:
-    """The library that sorts, filters and downloads tables (DataTables, as itables brings it), compressed."""
+    """Source of DataTables (as itables ships it), which sorts, filters and downloads tables; compressed."""
     return packed((resources.files("itables") / "html" / "dt_bundle.js").read_bytes())
 
 
@@ -97,7 +97,7 @@ def _drawn_rows(comparison: ReportedComparison) -> list[dict[str, object]]:
 
 
 def templates() -> jinja2.Environment:
-    """The templates of the report, with the names that they use; each is compiled once in a process."""
+    """Templates of the report with the names that they use; each is compiled once in a process."""
     return _templates((*part_kinds(), *report_kinds().values()))
 
 
@@ -152,14 +152,14 @@ def _templates(kinds: tuple[type[Part] | type[ReportKind], ...]) -> jinja2.Envir
 
 
 def _unbroken(text: str) -> markupsafe.Markup:
-    """Sentence without line breaks inside numbers as ``1e-3``, where browsers see a hyphen."""
+    """Sentence as markup without line breaks inside numbers like ``1e-3``, where browsers break at the hyphen."""
     import markupsafe
 
     return markupsafe.Markup(_EXPONENT.sub(r'<span class="whole">\g<0></span>', str(markupsafe.escape(text))))
 
 
 def _again(comparison: ReportedComparison, run: ReportedRun) -> str:
-    """The command that makes one run again."""
+    """Command that repeats one run."""
     words = ["proofroll", "run", comparison.scene, "--engine", run.engine]
     for name, value in run.parameters.items():
         words += ["--set", f"{name}={value:g}" if isinstance(value, float) else f"{name}={value}"]

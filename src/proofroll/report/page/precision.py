@@ -1,4 +1,4 @@
-"""Error against cost of every run of a study: the points of its work–precision pictures."""
+"""Work–precision pictures of a study: error against cost of every run."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -10,7 +10,7 @@ from proofroll.report.labels import step, symbol
 from proofroll.report.long_table import TableLine
 from proofroll.report.page.candidates import largest
 
-# A picture of fewer points says nothing that a table does not.
+# Least number of points of a picture; fewer are no more than a table.
 _FEWEST = 2
 _UNJUDGED = {Verdict.ILL_POSED, Verdict.NOT_JUDGED}
 _SEVERITY = {str(item): number for number, item in enumerate(Verdict)}
@@ -22,9 +22,10 @@ class PrecisionPoint(NamedTuple):
     Attributes:
         step: for a person.
         cost: wall seconds per simulated second at the slowest place.
-        clean: the cost is that of clean runs.
-        verdict: the worst; empty: a step of a ladder, which has none of its own.
-        errors: largest error of each quantity of the picture, in parts of its size; None: not reported, or not finite.
+        clean: True if clean runs measured the cost.
+        verdict: the worst; empty: a step of a ladder, which has no verdict.
+        errors: largest error of each quantity of the picture, relative to its size; None: not reported; 1e300: not
+        finite.
     """
 
     step: str
@@ -47,14 +48,14 @@ class PrecisionCurve:
 
 @dataclass(frozen=True)
 class WorkPrecision:
-    """Curves of a study, and the names of the quantities that their errors are of."""
+    """Curves of a study, and the names of the quantities whose errors they show."""
 
     quantities: list[str]
     curves: list[PrecisionCurve]
 
 
 def work_precision(lines: Iterable[TableLine]) -> WorkPrecision | None:
-    """The pictures of one study from its lines of the long table; None: too few of its runs were timed and judged."""
+    """Pictures of one study from its lines of the long table; None: too few of its runs were timed and judged."""
     judged = [line for line in lines if line.verdict not in _UNJUDGED]
     named = list(dict.fromkeys(line.quantity for line in judged if line.scale))
     groups = [role for role in ("motion", "reaction") if any(line.role == role and line.scale for line in judged)]

@@ -1,4 +1,4 @@
-"""Records of the report."""
+"""Records of a report: truths, evidence of comparisons, and the whole content."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from proofroll.studies.findings import load_findings
 
 @dataclass(frozen=True)
 class ErrorBar:
-    """Error bar of a quantity of the truth."""
+    """Error bar of a quantity of the truth, in its unit."""
 
     value: float
     unit: str
@@ -41,9 +41,9 @@ class ErrorBar:
 
 @dataclass(frozen=True)
 class ReportedTruth:
-    """Routes and error bars of the truth at a point; ``own``: the facts of its kind of scene.
+    """Routes and error bars of the truth at a point; ``own``: facts from the kind of element.
 
-    Without a trajectory there are no routes and no error bars.
+    ``route``, ``second_route`` and ``error_bars`` are None if there is no truth.
     """
 
     point: str
@@ -58,7 +58,7 @@ class ReportedTruth:
 
 @dataclass(frozen=True)
 class ComparisonEvidence:
-    """Evidence of a comparison in a report besides its verdicts."""
+    """Evidence of a comparison besides its verdicts: truths, sheet of the scene, conclusions, growth of cost."""
 
     truths: list[ReportedTruth]
     sheet: SceneSheet
@@ -104,10 +104,11 @@ class ReportContent:
         left_out: names of the comparisons that a report of all studies leaves out.
         engine_findings: known faults and surprises of engines.
         entries: of further studies, by the key of their kind.
-        environment: where and with what it was made.
+        environment: command, machine and versions that made it.
+        findings: three sentences on the whole report.
         table: every quantity of every run.
         against: changes since an earlier report.
-        replay: its cases without their numbers, which follow from the trajectories that they name.
+        replay: its cases without their numbers, which can be computed from the named trajectories.
     """
 
     date: str
@@ -124,19 +125,19 @@ class ReportContent:
 
     @property
     def further(self) -> list[PartEntry]:
-        """The entries of all further studies."""
+        """Entries of all further studies."""
         return [item for kind in part_kinds() for item in self.entries.get(kind.key, ())]
 
     @property
     def summarised(self) -> ReportContent:
-        """The content with the three sentences that follow from the rest of it."""
+        """Content with its three sentences recomputed."""
         return dataclasses.replace(
             self, findings=Sentences(three_sentences(self.comparisons, self.entries, self.choice))
         )
 
     @cached_property
     def choice(self) -> ChoiceMatrix:
-        """Choice matrix of the comparisons and of the trade-offs that were made."""
+        """Choice matrix of the comparisons and of the trade-offs that have results."""
         studies = {
             item.name: ChoiceStudy(item.title, f"c{number}", list(dict.fromkeys(run.point for run in item.runs)))
             for number, item in enumerate(self.comparisons)
@@ -197,7 +198,7 @@ def report_content(outcomes: list[Outcome], command: str) -> ReportContent:
 
 
 def _comparison(outcome: Outcome, lines: Sequence[TableLine]) -> ReportedComparison:
-    """A comparison's content with its truths, what its kind of scene tells of each run, claims, costs and findings."""
+    """Content of a comparison with its evidence: truths, facts from the kind of element, conclusions, costs."""
     content, truths = outcome_content(outcome), _truths(outcome)
     kind = kind_of(outcome.scene)
     facts = kind.run_facts(truths, outcome.runs) if kind is not None else [None] * len(outcome.runs)

@@ -1,4 +1,4 @@
-"""Sheet of a comparison's scene: its drawing, and every parameter with symbol, values, unit, meaning and source."""
+"""Sheet of a comparison's scene: drawing, and every parameter with symbol, values, unit, meaning and source."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -12,13 +12,13 @@ from proofroll.report.labels import symbol, unit
 from proofroll.report.pages import environment, rendered
 from proofroll.report.pen import Picture
 
-# Values of one parameter that are listed one by one.
+# Largest number of values of a parameter that are listed one by one.
 _LISTED = 5
 
 
 @dataclass(frozen=True)
 class ShownParameter:
-    """A parameter as a person reads it; ``varied``: whether it has several values."""
+    """A parameter for readers; ``varied``: True if it has several values."""
 
     name: str
     symbol: str
@@ -31,7 +31,7 @@ class ShownParameter:
 
 @dataclass(frozen=True)
 class SceneSheet:
-    """The scene as it is compared; ``undrawn``: why there is no drawing; ``caption``: of the drawings, as markup."""
+    """Sheet of a scene; ``undrawn``: reason for a missing drawing; ``caption``: of the drawings, as markup."""
 
     title: str
     source: str
@@ -42,24 +42,24 @@ class SceneSheet:
 
 
 def scene_sheet(scene: str, points: Sequence[dict[str, float]]) -> SceneSheet:
-    """The sheet of a scene that is not loaded yet; ``points`` are as for :func:`sheet_of`."""
+    """Sheet of a scene by name or path; ``points`` as for :func:`sheet_of`."""
     return sheet_of(
         read_scene_file(scene), points, [load_scene(scene, **point) for point in points] or [load_scene(scene)]
     )
 
 
 def scene_page(scene: str, start: Sequence[str]) -> str:
-    """The page of a scene with sentences on its start; everything from the scene's file is escaped."""
+    """HTML page of a scene with sentences on its start; text from the scene's file is escaped."""
     return rendered(environment(), "scene_page.html", sheet=scene_sheet(scene, []), start=start)
 
 
 def sheet_of(file: SceneFile, points: Sequence[dict[str, float]], scenes: Sequence[Scene]) -> SceneSheet:
-    """The scene as it is compared.
+    """Sheet of a scene for the cases of a comparison.
 
     Args:
         file: the scene's.
         points: values of the parameters that differ from the scene's own, one entry for each case.
-        scenes: of these cases; without cases the scene with its own parameters.
+        scenes: scenes of these cases; without cases the scene with its own parameters.
     """
     kind = kind_of(scenes[0])
     drawings, undrawn = kind.drawings(scenes) if kind else ([], "There is no drawing for this kind of scene.")
@@ -83,14 +83,14 @@ def sheet_of(file: SceneFile, points: Sequence[dict[str, float]], scenes: Sequen
 
 
 def _letter(text: str) -> str:
-    """A symbol as the file writes it, with Greek letters and without the sign of an index: ``mu_s`` is μs."""
+    """Symbol of the file with Greek letters and without the underscore of an index: ``mu_s`` is μs."""
     name, _, rest = text.partition("_")
     head, bracket, tail = name.partition("(")
     return symbol(head) + bracket + tail + rest
 
 
 def _own(value: float | str, parameters: Mapping[str, Parameter]) -> str:
-    """A default, or the symbol of the parameter whose value it is."""
+    """Text of a default value, or the symbol of the parameter that it refers to."""
     if isinstance(value, str):
         return f"= {_letter(parameters[value].symbol) or value}"
     return _written(value)
@@ -101,7 +101,7 @@ def _written(value: float) -> str:
 
 
 def _listed(values: list[str]) -> str:
-    """All values, or the first and how many more."""
+    """All values, or the first ones and the number of further ones, as text."""
     if len(values) <= _LISTED + 1:
         return ", ".join(values)
     return f"{', '.join(values[:_LISTED])} and {len(values) - _LISTED} more"

@@ -1,4 +1,4 @@
-"""Parts of the page for the replay besides its own program: three.js, and numbers packed small."""
+"""Library of the replay page (three.js), and compression of its numbers."""
 
 import io
 import re
@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from proofroll.report.pages import packed
 
-# trimesh is asked for its files, never imported. The script of its viewer begins with three.js as its makers built it:
-# their notice, then the program, which defines THREE, in one line; what comes after it is not wanted.
+# Only the files of trimesh are read; it is never imported. The script of its viewer begins with three.js as published:
+# notice of its authors, then the program, which defines THREE, in one line. The rest of the script is not used.
 _PACKAGE = "trimesh"
 _VIEWER = "trimesh/resources/templates/viewer.zip"
 _SCRIPT = re.compile(r"(/\*\*[^/]*Three\.js Authors[^/]*\*/)\s*(!function[^\n]*THREE=\{\}[^\n]*)")
@@ -22,11 +22,11 @@ _REVISION = re.compile(r'"use strict";const \w+="(\d+)"')
 
 @cache
 def three() -> dict[str, str] | None:
-    """three.js from the installed trimesh, or None where there is none.
+    """three.js from the installed trimesh; None without it.
 
     Returns:
-        ``packed``: the script, compressed (:func:`packed`); ``version``: which, and where from; ``licence``: its
-        makers' notice and the terms.
+        ``packed``: the script, compressed (:func:`packed`); ``version``: its revision and source; ``licence``: its
+        authors' notice and the terms.
     """
     try:
         package = distribution(_PACKAGE)
@@ -55,11 +55,10 @@ def _bytes(package: Any, name: str) -> bytes:
 def thinned(values: npt.NDArray[Any], step: float) -> bytes:
     """Numbers coded for compression: multiples of ``step``, as differences from the row before.
 
-    Little-endian int32, first the lowest bytes of all differences, then the next: what changes smoothly leaves mostly
-    zeros.
+    Little-endian int32, first the lowest bytes of all differences, then the next ones: smooth curves give mostly zeros.
 
     Args:
-        values: shape (n, width) or (n,); what is beyond 2^30 steps is drawn there.
+        values: shape (n, width) or (n,); clipped to 2^30 steps.
         step: in the unit of the values.
     """
     rows = np.asarray(values, dtype=np.float64).reshape(len(values), -1)

@@ -1,4 +1,4 @@
-"""Records of a replay: cases, the runs in them, and their numbers as the page unpacks them."""
+"""Records of a replay: cases, the runs in them, and their packed numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from proofroll.report.replay.library import thinned
 if TYPE_CHECKING:
     import xarray as xr
 
-# How fast a person can let it run, over real time.
+# Speeds that a person can choose, relative to real time.
 SPEEDS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0)
 
 
@@ -25,14 +25,14 @@ class Ghost:
     """A run that can be shown beside the truth.
 
     Attributes:
-        key: of its case; one run has one.
+        key: identifies its case, so that one run is shown once.
         engine: name of the engine.
         settings: of the engine, complete.
         name, colour: as in the figures of its comparison.
-        distance: of its bodies from the true ones, at most [m].
+        distance: largest distance of its bodies from the true ones [m].
         motion: its trajectory.
-        file: in which that is stored, as the page calls it; empty: in none.
-        message: reason for which it ended early; empty: it did not.
+        file: path of its stored trajectory, as the page shows it; empty: not stored.
+        message: reason why it ended early; empty: it did not.
     """
 
     key: str
@@ -47,11 +47,11 @@ class Ghost:
 
     @property
     def default(self) -> bool:
-        """True if its settings are those of the obvious model (preset ``default``)."""
+        """True if it has the settings of the obvious model (preset ``default``)."""
         return self.settings.get("preset") == "default"
 
     def ending(self, reached: float) -> str:
-        """Reason that it is not there until the end, where its last frame is at ``reached`` [s]."""
+        """Reason why it is not shown to the end; ``reached``: time of its last frame [s]."""
         return f"until {reached:.3g} s: {self.message or 'it leaves the picture'}"
 
 
@@ -62,9 +62,9 @@ class Replayed:
     Attributes:
         scene: with the parameters of the case.
         true: the true motion.
-        file: in which it is stored, as the page calls it; empty: in none.
-        ghosts: motions drawn beside it.
-        group: of cases to which it belongs.
+        file: path of the stored truth, as the page shows it; empty: not stored.
+        ghosts: runs drawn beside it.
+        group: name of the group of cases that it belongs to.
         label: name in its group.
     """
 
@@ -77,16 +77,16 @@ class Replayed:
 
 
 def some(motion: xr.Dataset, names: Collection[str]) -> dict[str, npt.NDArray[Any]]:
-    """Values of some variables, as far as there are any."""
+    """Values of those of the named variables that a motion has."""
     return {name: motion[name].to_numpy() for name in names if name in motion.variables}
 
 
 @dataclass
 class PackedNumbers:
-    """Arrays for the page: their names and shapes, and their numbers one after the other.
+    """Arrays for the page: names and shapes, and all numbers in one sequence of bytes.
 
     Attributes:
-        arrays: name, number of the run (0: the truth) or -1, width, length, step of each.
+        arrays: name, number of the run (0: the truth; -1: shared), width, length, step of each.
         content: the numbers, thinned (:func:`proofroll.report.replay.library.thinned`).
     """
 
@@ -94,13 +94,13 @@ class PackedNumbers:
     content: bytearray = field(default_factory=bytearray)
 
     def put(self, name: str, run: int, values: FloatArray | None, step: float) -> None:
-        """Adds an array whose first axis is time; nothing where there is none.
+        """Adds an array whose first axis is time; None is ignored.
 
         Args:
             name: name on the page.
-            run: whose it is; -1: of all.
+            run: number of its run, 0: the truth, -1: shared by all.
             values: shape (n, ...).
-            step: to which it is rounded, in its unit.
+            step: rounding step, in the array's unit.
         """
         if values is not None:
             rows = values.reshape(len(values), -1)
@@ -108,7 +108,8 @@ class PackedNumbers:
             self.content.extend(thinned(rows, step))
 
 
-# What a kind of scene makes of a truth: its part of the case, how many frames each ghost has, and the numbers.
+# Function of a kind of scene for one truth: returns its part of the case, the number of frames of each ghost, the
+# numbers.
 Drawer = Callable[[Replayed], tuple[dict[str, Any], list[int], PackedNumbers]]
 
 
@@ -116,8 +117,8 @@ class ReplayKind(NamedTuple):
     """Drawing of a kind of scene in the replay.
 
     Attributes:
-        name: under which the page's program knows how to draw it.
-        seen: largest error of a body that still looks right [m].
+        name: name of the kind in the page's program.
+        seen: function of a scene: largest error of a body's place that looks right [m].
         draw: function that draws a truth and its ghosts.
     """
 
@@ -128,7 +129,7 @@ class ReplayKind(NamedTuple):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """One motion of a case: whether it is ``shown`` at first, how many frames it has, and why it ended early."""
+    """One motion of a case; ``shown``: at first; ``frames``: their number; ``message``: reason of an early end."""
 
     name: str
     colour: int
@@ -141,7 +142,7 @@ class ReplayedRun:
 
 @dataclass(frozen=True)
 class ReplayCase:
-    """A truth and its ghosts in words; ``own``: what is drawn of them, ``arrays``: see :class:`PackedNumbers`."""
+    """Description of a truth and its ghosts; ``own``: of its kind of scene; ``arrays``: see :class:`PackedNumbers`."""
 
     group: str
     label: str
@@ -153,7 +154,7 @@ class ReplayCase:
 
     @property
     def described(self) -> ReplayCase:
-        """Without its numbers, which follow from the trajectories that it names."""
+        """Copy without its numbers, which can be computed from the named trajectories."""
         return replace(self, arrays=None)
 
 
@@ -162,9 +163,9 @@ class Replay:
     """Content of a replay.
 
     Attributes:
-        library: that draws it, from :func:`proofroll.report.replay.library.three`.
+        library: three.js from :func:`proofroll.report.replay.library.three`, or None.
         start: number of the case to begin with.
-        cases: in words.
+        cases: descriptions of the cases.
         packed: the numbers of each case.
         speeds: speeds of the replay that a person can choose.
     """

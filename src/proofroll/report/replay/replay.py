@@ -1,4 +1,4 @@
-"""The replay: which cases and which runs it shows, and their numbers packed for the page. Kinds of scenes draw them."""
+"""Replay: choice of the cases and runs to show, and their packed numbers for the page."""
 
 from dataclasses import replace
 
@@ -17,20 +17,20 @@ from proofroll.running.case import Status
 from proofroll.studies.comparison.outcome import ComparedPoint, Outcome, Run
 from proofroll.studies.comparison.planning import point_name
 
-# Frames per second of the motion that no eye misses, the fewest of a replay that is slowed down, and the most that it
-# keeps where that is enough.
+# Frames per second of motion that look continuous, least number of frames of a slowed replay, and largest number unless
+# fast turns need more.
 LEAST_PER_SECOND, LEAST_FRAMES, MOST_FRAMES = 60, 120, 600
-# A body's turn from one frame to the next [rad]: what is smooth, and what must never be passed, for beyond half a
-# turn the shorter way from one orientation to the next is the wrong one.
+# Turn of a body from one frame to the next [rad]: one that looks smooth, and the largest one, for beyond half a turn
+# interpolation goes the shorter, wrong way.
 SMOOTH_TURN, WIDEST_TURN = 1.2, 2.5
 
 
 def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     """Replay of comparisons, all of scenes of one kind.
 
-    There is one case for each truth of the comparisons that knows the motion. Its ghosts are the engines' runs with
-    ``default`` settings, and of each engine the other setting whose bodies are furthest from the true ones, if that is
-    seen. At first, of each engine the ``default`` one is shown that is furthest off.
+    There is one case for each truth with a known motion. Its ghosts are the engines' runs with ``default`` settings,
+    and of each engine the run with other settings furthest from the truth, if its error is visible. Of each engine's
+    runs with ``default`` settings the one furthest from the truth is shown at first.
     """
     shown_in: dict[str, tuple[ComparedPoint, list[tuple[Outcome, str]]]] = {}
     for outcome in outcomes:
@@ -41,13 +41,13 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
     looks = {id(outcome): _looks(outcome) for outcome in outcomes}
     cases, numbers = [], []
     for point, shared in shown_in.values():
-        assert point.reference is not None  # or it would not be among them
+        assert point.reference is not None  # only points with a truth are listed
         true = point.reference.dataset["p_WB"].to_numpy()
         ghosts = [
             ghost for outcome, name in shared for ghost in _ghosts(runs_at(outcome, name), looks[id(outcome)], true)
         ]
         ghosts = _chosen(ghosts, kind.seen(point.scene))
-        # The comparison that has most to show at this point names the case.
+        # The comparison with the most runs at this point names the case.
         title = max(shared, key=lambda pair: len(runs_at(*pair)))[0].comparison.title
         label = point_name(point.case.parameters) or point.scene.title
         replayed = Replayed(point.scene, point.reference.dataset, point.trajectory.shown, ghosts, title, label)
@@ -60,7 +60,7 @@ def replay_content(outcomes: list[Outcome], kind: ReplayKind) -> Replay:
 
 
 def joined(parts: list[Replay]) -> Replay | None:
-    """The replays of several kinds of scenes as one; the first begins. None where there is nothing to draw."""
+    """One replay of several kinds of scenes, starting with the first; None if no part has cases."""
     parts = [part for part in parts if part.cases]
     if not parts:
         return None
@@ -69,7 +69,7 @@ def joined(parts: list[Replay]) -> Replay | None:
 
 
 def frame_times(until: float, fastest: float) -> FloatArray:
-    """Evenly spaced times of frames [s], shape (n,), so close that a body of this spin [rad/s] turns the right way."""
+    """Evenly spaced times of frames [s], shape (n,), close enough for the spin ``fastest`` [rad/s] to look right."""
     turned = until * fastest
     wanted = max(LEAST_PER_SECOND * until, turned / SMOOTH_TURN, LEAST_FRAMES)
     return np.linspace(0.0, until, 1 + int(np.ceil(max(min(wanted, MOST_FRAMES), turned / WIDEST_TURN))))
@@ -100,12 +100,12 @@ def case_content(replayed: Replayed, kind: ReplayKind) -> tuple[ReplayCase, str]
 
 
 def in_sight(off: npt.NDArray[np.bool_]) -> int | None:
-    """Number of frames to draw of a thing that is ``off`` the picture in some: until it leaves for good; None: all."""
+    """Number of frames until a thing leaves the picture for good (``off`` from then on); None: all frames."""
     return 1 + int(np.flatnonzero(~off).max(initial=0)) if off[-1] else None
 
 
 def distance(path: FloatArray, true: FloatArray) -> float:
-    """The largest distance between bodies [m]; a run that ended early has fewer samples."""
+    """Largest distance between bodies [m], over the samples that both motions have."""
     count = min(len(path), len(true))
     return float(np.linalg.norm(path[:count] - true[:count], axis=-1).max())
 
@@ -133,11 +133,12 @@ def _ghosts(
 
 
 def _chosen(ghosts: list[Ghost], seen: float) -> list[Ghost]:
-    """Ghosts by engine in the order of the comparisons, the furthest from the truth first; each run once.
+    """Ghosts to show, by engine in the order of the comparisons, the furthest from the truth first; each run once.
 
-    All that are ``default``, and of the others the furthest, if it is off by more than ``seen`` [m] or there is none.
+    All runs with ``default`` settings, and of each engine the furthest other run, if its distance exceeds ``seen`` [m]
+    or the engine has no default run.
     """
-    once = {ghost.key: ghost for ghost in reversed(ghosts)}  # the first comparison's name stays
+    once = {ghost.key: ghost for ghost in reversed(ghosts)}  # the first comparison names it
     chosen = []
     for engine in dict.fromkeys(ghost.engine for ghost in ghosts):
         own = sorted((ghost for ghost in once.values() if ghost.engine == engine), key=lambda ghost: -ghost.distance)

@@ -1,4 +1,4 @@
-"""A run as a picture: every variable over time, with its unit; whatever the elements of its scene are."""
+"""Pictures of a run: every variable over time, with its unit, for any kind of element."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 ENDINGS = (".html", ".svg", ".png", ".pdf")
 _COLUMNS = 2
-# As in all pages: nothing is asked for from anywhere, whatever a name in the file says.
+# As in all pages: no external resource is loaded, whatever text the file contains.
 _POLICY = (
     "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data: blob:\">"
@@ -22,12 +22,12 @@ _POLICY = (
 
 
 def require_ending(path: Path, option: str = "--out") -> None:
-    """Raises InputError if the ending of a file names no kind of picture."""
+    """Raises InputError unless the ending of a file is that of a kind of picture."""
     require_known(option, path.suffix.lower(), ENDINGS, "end the name of the file in one of", path)
 
 
 def read_run(path: Path) -> xr.Dataset:
-    """The run in a file. Raises InputError if there is no such file, or it holds no run."""
+    """Run stored in a file. Raises InputError if there is no such file, or it holds no run."""
     from proofroll.files.trajectory_file import read
 
     try:
@@ -42,7 +42,7 @@ def read_run(path: Path) -> xr.Dataset:
 
 
 def curves(dataset: xr.Dataset) -> list[str]:
-    """Names of the variables that have one number for each time, and a unit; without those that have no value."""
+    """Names of the variables with one number for each time and a unit, without those that are never finite."""
     return [str(name) for name, item in dataset.data_vars.items() if item.dims == ("time",) and _is_number(item)]
 
 
@@ -53,10 +53,10 @@ def _is_number(item: xr.DataArray) -> bool:
 
 
 def draw_run(dataset: xr.Dataset, path: Path) -> None:
-    """Draws every curve of a run in a panel of its own, over one axis of time; the file's ending says which kind.
+    """Draws every curve of a run in a panel of its own over time, in the format of the file's ending.
 
     Raises:
-        Missing: matplotlib is not installed.
+        Missing: matplotlib or plotly is not installed.
     """
     try:
         (_page if path.suffix.lower() == ".html" else _picture)(dataset, path)

@@ -1,4 +1,4 @@
-"""A person's own run in motion, beside the truth, as a page of its own."""
+"""Replay page of a user's own run beside the truth."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ _WRITES = "proofroll run … --out writes one"
 
 
 def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) -> str:
-    """The page of what a file holds: the truth of the run's scene, solid, and the run, translucent.
+    """HTML page that replays a run: the truth of its scene, solid, and the run, translucent.
 
-    Of a scene of several elements, which no force couples, each is a case of its own.
+    In a scene of several elements, each is a case of its own, for no force couples them.
 
     Args:
         path: of the file, for messages.
-        run: the run that it shows.
+        run: the run to show.
         scene_of_run: name or path of its scene; None: as the file says.
 
     Raises:
-        InputError: it does not say of what it is a run, the scene is another by now, or nothing draws such scenes.
+        InputError: the file names no scene, the scene has changed since, or nothing draws such scenes.
         ProofrollError: the scene has no truth.
     """
     from proofroll.report.page.html import templates
@@ -73,7 +73,7 @@ def replay_page(path: Path, run: xr.Dataset, scene_of_run: str | None = None) ->
 
 
 def _drawer(path: Path, scene: Scene, element: Element, alone: Scene, run: xr.Dataset) -> ReplayKind:
-    """Replay kind that draws an element of the run of a scene; ``alone`` holds no other."""
+    """Replay kind that draws an element of a run; ``alone``: the scene of this element only. Raises InputError."""
     of = f" of {element.name}" if len(scene.elements) > 1 else ""
     kind = kind_of(alone)
     if kind is None or not kind.replay_script:
@@ -96,7 +96,7 @@ def _said(run: xr.Dataset) -> str:
 
 
 def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
-    """The scene of a run, with all that can be asked of its truth."""
+    """Scene of a run with everything asked of its truth. Raises InputError if it is unknown or has changed."""
     try:
         digest, *_ = [str(run.attrs[key]) for key in ("scene_digest", "engine", "status")]
         parameters, _ = [dict(json.loads(run.attrs[key])) for key in ("parameters", "settings")]
@@ -106,8 +106,8 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
         raise InputError("run", path, f"it does not say which scene it is of, in which engine; {_WRITES}")
     if not is_scene(name):
         raise InputError("scene", name, "the scene of this run is not there; say where it lies by --scene PATH")
-    ran, here = str(run.attrs.get("scene")), read_scene_file(name).parameters
-    if lacking := sorted(parameters.keys() - here):
+    ran, known = str(run.attrs.get("scene")), read_scene_file(name).parameters
+    if lacking := sorted(parameters.keys() - known):
         raise InputError("scene", name, f"the run is one of {ran}, and this scene has no {', '.join(lacking)}")
     scene = load_scene(name, **parameters)
     if digest not in {scene.digest, scene.fully_asked.digest}:
@@ -117,7 +117,7 @@ def _scene(path: Path, run: xr.Dataset, name: str) -> Scene:
 
 
 def _ghosts(run: xr.Dataset, true: xr.Dataset) -> list[Ghost]:
-    """The run as a ghost; none if it is the truth itself."""
+    """The run as the only ghost; none if it is the truth itself."""
     engine = str(run.attrs["engine"])
     if engine == "truth":
         return []

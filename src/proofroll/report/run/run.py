@@ -1,4 +1,4 @@
-"""Content of ``proofroll run``."""
+"""Content of ``proofroll run``, and its lines on the terminal."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ from proofroll.files.trajectory_file import read_columns
 from proofroll.report.labels import precision_words, settings_text
 from proofroll.running.case import Case, Result
 
-_EVENTS = 8  # of so many the terminal tells; the JSON document has all
+_EVENTS = 8  # most events on the terminal; the JSON document has all
 
 
 @dataclass(frozen=True)
@@ -22,16 +22,16 @@ class RunContent:
     """Content of a run.
 
     Attributes:
-        parameters: every parameter of the scene with its value, defaults among them.
-        asks: results that were wanted besides the motion.
-        precision: in which the engine computes, single or double.
-        build_seconds: before the first step, with what is compiled [s]; None: nothing was built.
+        parameters: every parameter of the scene with its value, defaults included.
+        asks: results asked for besides the motion.
+        precision: precision in which the engine computes, single or double.
+        build_seconds: time before the first step, compilation included [s]; None: nothing was built.
         until, every: last time and sampling interval [s].
-        final: variable -> value at the last sample; empty if there is none.
-        units: of these.
-        absent: variable without a value -> why.
-        uncertain: variable whose value may be off for a reason that is no engine's -> why.
-        smallest: variable -> least value on the way, of those whose least value tells something, as of a normal force.
+        final: variable -> value at the last sample; empty without samples.
+        units: variable -> unit of ``final``.
+        absent: variable without a value -> reason.
+        uncertain: variable whose value may be wrong, not by the engine's fault -> reason.
+        smallest: variable -> least value of the run, for variables where it matters, like a normal force.
         error_bars: of the truth, by variable.
         trajectory, plot: files that were written.
     """
@@ -63,7 +63,7 @@ class RunContent:
 
 
 def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
-    """Content of the result of a case."""
+    """Content of a case and its result; ``trajectory``: path of its stored trajectory."""
     scene = load_scene(case.scene, asks=case.asks, **case.parameters)
     causes = diagnosed(scene, result.certificate) if result.trajectory is None and result.certificate else []
     content = RunContent(
@@ -105,7 +105,7 @@ def run_content(case: Case, result: Result, trajectory: Path) -> RunContent:
 
 
 def _told(event: Event) -> str:
-    """One event with its bracket, and what it happens to where it has a name."""
+    """Text of an event: kind, name of its place if any, time and half width of its bracket."""
     bar = number(0.5 * (event.time_high - event.time_low), 1)
     name = f" of {event.name}" if event.name else ""
     return f"{event.kind.replace('_', '-')}{name} at {event.time:.9g} ± {bar} s"
@@ -136,9 +136,9 @@ def run_lines(content: RunContent) -> list[Any]:
     for name, value in (content.smallest or {}).items():
         lines.append(Text(f"smallest {name} on the way: {value:.6g} {content.units.get(name, '')}".rstrip()))
     if content.events:
-        said = ", ".join(_told(event) for event in content.events[:_EVENTS])
+        events = ", ".join(_told(event) for event in content.events[:_EVENTS])
         more = len(content.events) - _EVENTS
-        lines.append(Text(f"events: {said}{f' and {more} more' if more > 0 else ''}"))
+        lines.append(Text(f"events: {events}{f' and {more} more' if more > 0 else ''}"))
     before = "" if content.build_seconds is None else f", after {number(content.build_seconds)} s before the first step"
     lines.append(Text(f"{content.wall_seconds:.3g} s of wall time{before}"))
     for what, file in (("trajectory", content.trajectory), ("plot", content.plot)):

@@ -1,4 +1,4 @@
-"""Heat maps as a picture and as a table of a page; each colour has its text."""
+"""Heat maps of stability as a picture and as a table of a page; each colour has a text."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from proofroll.studies.stability.axes import Axis
     from proofroll.studies.stability.records import BoundaryPoint, StabilityStudy
 
-# Letters for what is beyond the boundary of any scene; with "!" where the engine was silent.
+# Letters for kinds of failure beyond a boundary, in any scene; "!" is added where the engine was silent.
 _LETTERS = {
     DIVERGED: "d",
     LOST_PHASE: "p",
@@ -30,15 +30,15 @@ _LETTERS = {
     REFUSED: "r",
     WRONG_MODEL: "m",
 }
-# Steps per natural time at which a colour is darkest and lightest; tolerances are put between by their decades.
+# Steps per natural time with the lightest and the darkest colour; tolerances are coloured by their decades.
 _FEWEST, _MOST = 8.0, 1e5
 _TOLERANCE_DECADES = 13
-# As many letters of the legend stand above a panel.
+# Number of letters of the legend on a line above one panel.
 _LETTERS_PER_PANEL = 118
 
 
 def svg(study: StabilityStudy) -> str:
-    """All heat maps as one SVG text; texts stay texts, which a page can scale, search and read out.
+    """Heat maps as one SVG text; letters stay text, which a page can scale, search and read aloud.
 
     Raises:
         Missing: matplotlib is not installed.
@@ -47,7 +47,7 @@ def svg(study: StabilityStudy) -> str:
 
 
 def letters(study: StabilityStudy) -> dict[str, str]:
-    """Letter of each kind of failure; further kinds take the first letter of their words that is free."""
+    """Letter of each kind of failure; kinds without a fixed one take the first free letter of their name."""
     letter_of = dict(_LETTERS)
     for kind in study.meanings:
         if kind not in letter_of:
@@ -72,7 +72,7 @@ def legend(study: StabilityStudy) -> list[str]:
 
 
 def _drawn(study: StabilityStudy) -> Figure:
-    """A panel for each axis that has points, row by row."""
+    """Figure with a panel for each axis that has points, row by row."""
     import matplotlib as mpl
 
     axes = [axis for axis in study.axes if any(point.axis == axis.name for point in study.points)]
@@ -121,7 +121,7 @@ def _rectangle(x: int, y: int, face: Any, hatch: str | None) -> Any:
 
 
 def cell(study: StabilityStudy, point: BoundaryPoint) -> tuple[str, float | None]:
-    """Text of a cell and its place between the lightest (0, cheap) and the darkest colour; None: no colour."""
+    """Text of a cell and its colour, from 0 (lightest, cheap) to 1 (darkest); None: no colour."""
     largest, failure = point.largest_accurate, point.failure
     beyond = (letters(study).get(failure, failure) + ("!" if point.silent else "")) if failure else ""
     if point.problem:
@@ -138,12 +138,12 @@ def cell(study: StabilityStudy, point: BoundaryPoint) -> tuple[str, float | None
 
 @dataclass(frozen=True)
 class HeatMap:
-    """A map as a table.
+    """A heat map as a table.
 
     Attributes:
-        axes: those that have a point, each with the values that have one.
+        axes: axes with points, each with the values that have points.
         groups: by engine the name of each setting, and for each value of each axis the number of its point, or None.
-        letters: those that occur, and what they stand for.
+        letters: letters that occur, and the failures that they stand for.
     """
 
     axes: list[Axis]
@@ -152,7 +152,7 @@ class HeatMap:
 
 
 def heat_map(study: StabilityStudy) -> HeatMap:
-    """The map by engine and axis."""
+    """Heat map as a table, by engine and axis."""
     mapped = [
         replace(axis, values=list(dict.fromkeys(point.value for point in study.points if point.axis == axis.name)))
         for axis in study.axes
@@ -169,14 +169,14 @@ def heat_map(study: StabilityStudy) -> HeatMap:
 
 
 def told(point: BoundaryPoint) -> str:
-    """Manner in which a failure was reported: before the run, by the engine, or not at all."""
+    """Words for how a failure was reported: before the run, by the engine, or not at all."""
     if point.failure in NOT_RUN:
         return "before the run"
     return "silent" if point.silent else "says so"
 
 
 def in_words(point: BoundaryPoint) -> str:
-    """Full meaning of a cell."""
+    """Full meaning of a cell, in words."""
     words = [f"{name_of(point)} at {point.axis} = {point.value:g}"]
     if point.problem:
         words.append("there is no truth")

@@ -23,7 +23,7 @@ from proofroll.studies.study_store import kept
 
 @dataclass(frozen=True, kw_only=True)
 class StabilityEntry(PartEntry):
-    """A map, the largest errors that no engine reports, what was claimed, and the axes that were left out."""
+    """Entry of a map: the largest errors that no engine reports, judged claims, and axes that were left out."""
 
     silent: list[str]
     claims: list[ClaimJudgement]
@@ -58,7 +58,7 @@ class StabilityPart(Part):
         return f"{study.silent} of {study.boundaries} boundaries are silent{held(entry.claims)}"
 
     def keeps(self, out: Path) -> bool:
-        """The whole map, or else a quick one, of all axes if there is."""
+        """True if a map is stored; the full one is preferred to quick ones, of all axes or of some."""
         for effort, axes in ((Effort(), self.asked.axes), (QUICK, self.asked.axes), (QUICK, self._quick_axes)):
             path = stability_path(out, self.asked.scene, axes, self.engines, effort)
             self.study, _ = kept(path, StabilityStudy)
@@ -68,7 +68,7 @@ class StabilityPart(Part):
         return False
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
-        """A quick map."""
+        """Makes a quick map of the axes on which a failure is expected."""
         self.study, path = make_stability(
             self.asked, self._quick_axes, runner, out, engines=self.engines, effort=QUICK, progress=tell
         )
@@ -76,7 +76,7 @@ class StabilityPart(Part):
 
     @property
     def _quick_axes(self) -> list[Axis]:
-        """Axes on which something should happen."""
+        """Axes of a quick map: those that change the numbers of a step."""
         return [axis for axis in self.asked.axes if not axis.scale_free]
 
     def entry(self) -> StabilityEntry:
@@ -107,29 +107,29 @@ class StabilityPart(Part):
 
 
 def _programs(path: Path) -> str:
-    """The folder of a map's programs, seen from that of all results."""
+    """Folder of a map's programs, relative to the folder of all results."""
     return f"{path.parent.name}/{path.stem}"
 
 
 def _says(claim: Claim, symbols: Mapping[str, str]) -> str:
     """A claim in one sentence."""
-    said = f"{claim.engine} is {claim.boundary}"
+    text = f"{claim.engine} is {claim.boundary}"
     if claim.never:
-        said += " at no step or tolerance"
+        text += " at no step or tolerance"
     elif claim.same:
-        said += " up to the same part of the natural time everywhere"
+        text += " up to the same part of the natural time everywhere"
     elif claim.number is not None:
         low, high = claim.between
-        said += f" up to {symbols.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
+        text += f" up to {symbols.get(claim.number, claim.number)} = {number(low)} … {number(high)}"
     else:
-        said += " up to a boundary"
+        text += " up to a boundary"
     if claim.axes:
-        said += f" along {', '.join(claim.axes)}"
+        text += f" along {', '.join(claim.axes)}"
     if claim.values:
         low, high = claim.values
-        said += f" at {low:g}" if low == high else f" from {low:g} to {high:g}"
+        text += f" at {low:g}" if low == high else f" from {low:g} to {high:g}"
     if claim.failure:
-        said += f"; beyond: {' or '.join(claim.failure)}"
+        text += f"; beyond: {' or '.join(claim.failure)}"
     if claim.silent is not None:
-        said += "; the engine does not say so" if claim.silent else "; the engine says so"
-    return said
+        text += "; the engine does not say so" if claim.silent else "; the engine says so"
+    return text

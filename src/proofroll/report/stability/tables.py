@@ -1,4 +1,4 @@
-"""A stability map on the terminal, within 100 columns."""
+"""Tables of a stability map for the terminal, within 100 columns."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,7 +13,7 @@ from proofroll.report.terminal.screen import numeric, plain_table, unbroken
 from proofroll.running.case import told_hosts
 from proofroll.studies.stability.records import BoundaryPoint, ExplainedBoundary, StabilityStudy, silent_ranking
 
-# A run that is further off, in ranges of the quantity, has left every picture: how far is not told.
+# Relative error, in ranges of the quantity, beyond which the number itself is not given.
 _BEYOND = 1e6
 
 
@@ -22,7 +22,7 @@ def _off(error: float) -> str:
 
 
 def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
-    """A map that is kept in ``path``: its boundaries, the worst silent cases, and what else is to be known."""
+    """Parts of a map stored in ``path``: boundaries, the worst silent cases, conclusions, what is missing."""
     yield from (headline(study), "", boundary_table(study), "")
     silent = list(silent_lines(study))
     if silent:
@@ -36,25 +36,25 @@ def stability_parts(study: StabilityStudy, path: Path) -> Iterator[Table | str]:
 
 
 def headline(study: StabilityStudy) -> str:
-    """Counts of points, boundaries, and silent ones among them."""
+    """Sentences with counts of points, boundaries, and silent ones among them."""
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(study.failures.items(), key=lambda i: -i[1]))
     sizes = f"{counted(len(study.points), 'points')}, {counted(study.boundaries, 'boundaries')}"
-    said = f"{sizes}, {study.silent} of them silent ({counted(study.runs, 'runs')})."
+    text = f"{sizes}, {study.silent} of them silent ({counted(study.runs, 'runs')})."
     if counts:
-        said += f" Beyond: {counts}."
+        text += f" Beyond: {counts}."
     if study.refused:
-        said += f" Refused before the run: {counted(study.refused, 'points')}."
+        text += f" Refused before the run: {counted(study.refused, 'points')}."
     if study.wrong_model:
-        said += f" {study.wrong_model} were not run, for what the engine built is not the scene."
+        text += f" {study.wrong_model} were not run, for what the engine built is not the scene."
     if study.never_accurate:
-        said += f" At {counted(study.never_accurate, 'points')} no step or tolerance that was affordable holds 1 %."
-    return " ".join([said, *told_hosts(study.hosts)])
+        text += f" At {counted(study.never_accurate, 'points')} no step or tolerance that was affordable holds 1 %."
+    return " ".join([text, *told_hosts(study.hosts)])
 
 
 def boundary_table(study: StabilityStudy) -> Table:
-    """One line per engine, formulation, setting and axis: its boundaries from the least to the largest.
+    """Table with a line per engine, formulation, setting and axis: its boundaries from the least to the largest.
 
-    A ``+`` stands where nothing broke on the ladder, ``n!`` for n silent failures beyond the boundaries.
+    ``+``: nothing failed on the ladder; ``n!``: n silent failures beyond the boundaries.
     """
     named = (name for point in study.points for name in point.sides["stable"].numbers)
     symbol = study.step_symbols.get(next(named, ""), "step in natural times")
@@ -81,7 +81,7 @@ def boundary_table(study: StabilityStudy) -> Table:
 
 
 def _beyond(points: Sequence[BoundaryPoint]) -> str:
-    """Most frequent failure beyond the boundaries; of two that are as frequent, a silent one."""
+    """Most frequent failure beyond the boundaries, and its silent cases (``n!``); silent ones win ties."""
     kinds = Counter(point.failure for point in sorted(points, key=lambda each: not each.silent) if point.failure)
     common = next((kind for kind, _ in kinds.most_common(1)), "")
     silent = sum(point.silent for point in points if point.failure == common)
@@ -89,7 +89,7 @@ def _beyond(points: Sequence[BoundaryPoint]) -> str:
 
 
 def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]:
-    """The points by curve and axis."""
+    """Points of the map by curve and axis."""
     groups: dict[tuple[str, str], list[BoundaryPoint]] = {}
     for point in study.points:
         groups.setdefault((point.curve, point.axis), []).append(point)
@@ -97,7 +97,7 @@ def grouped(study: StabilityStudy) -> dict[tuple[str, str], list[BoundaryPoint]]
 
 
 def size(point: BoundaryPoint, side: str) -> float | None:
-    """Size shown for a boundary: the first dimensionless number of its step, or the tolerance itself."""
+    """Size shown for a boundary: the first dimensionless number of its step, or the tolerance itself; None: none."""
     limit = point.sides[side]
     if point.resolution != "dt":
         return limit.largest
@@ -118,14 +118,14 @@ def _range(points: Sequence[BoundaryPoint], side: str) -> str:
 
 
 def _explained(boundary: ExplainedBoundary | None, symbols: Mapping[str, str]) -> str:
-    """The number that stays the same while the axis moves the others."""
+    """Text of the dimensionless number that is constant along an axis' boundary; empty without one."""
     if boundary is None or not boundary.explains:
         return ""
     return f"{symbols[boundary.number]} {number(boundary.low)}…{number(boundary.high)}"
 
 
 def silent_lines(study: StabilityStudy) -> Iterator[str]:
-    """The eight worst silent cases as sentences, one for each engine, formulation, setting and axis."""
+    """The eight worst silent cases as sentences, at most one for each curve and axis."""
     seen: set[tuple[str, str]] = set()
     for point in silent_ranking(study):
         if (point.curve, point.axis) in seen or len(seen) >= 8:

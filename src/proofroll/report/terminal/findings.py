@@ -1,4 +1,4 @@
-"""Findings about engines as tables on the terminal."""
+"""Tables of findings about engines for the terminal."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ _STYLES = {
 
 
 def findings_table(rows: Sequence[Shown]) -> Table:
-    """One line per finding: what it is, whether it shows in what is installed, and what its program says."""
+    """Table with a line per finding: title, whether it shows in the installed version, output of its program."""
     table = plain_table(*_folded("finding"), *unbroken("state"), *_folded("installed", "said"))
     for row in rows:
         version = f"{row.finding.package} {row.version}".strip() if row.version else ""
@@ -26,7 +26,7 @@ def findings_table(rows: Sequence[Shown]) -> Table:
 
 
 def findings_list(findings: Sequence[EngineFinding]) -> Table:
-    """One line per finding: what it is, in which versions it was seen, and where it is discussed."""
+    """Table with a line per finding: title, versions where it was seen, version without it, and public thread."""
     table = plain_table(*_folded("finding", "seen in", "gone in", "issue"))
     for item in findings:
         table.add_row(*(Text(text) for text in (item.title, item.seen, item.gone, item.issue)))

@@ -1,4 +1,4 @@
-"""Filter for a terminal: text of engines and files must not command it."""
+"""Filter for the terminal: text of engines and files must not control it."""
 
 import copy
 import dataclasses
@@ -12,22 +12,22 @@ from rich.segment import Segment
 from rich.table import Column, Table
 from rich.text import Text
 
-# Control characters but line feed, which is layout, and what reverses or ends a line in Unicode.
+# Control characters but line feed, and Unicode characters that reverse or end a line.
 _COMMANDS = re.compile("[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 
 def printable(text: str) -> str:
-    """The text without characters that a terminal obeys instead of showing them."""
+    """Text without characters that control a terminal."""
     return _COMMANDS.sub("", text)
 
 
 def escaped(text: str) -> str:
-    """JSON with control characters written as numbers, so that nothing is lost."""
+    """JSON with control characters as escapes, so that nothing is lost."""
     return _COMMANDS.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
 class Screen(Console):
-    """A console on which nothing but its own styles reaches the terminal as a command."""
+    """A console that sends no control characters to the terminal but those of its own styles."""
 
     def render(self, renderable: RenderableType, options: ConsoleOptions | None = None) -> Iterable[Segment]:
         """See :class:`rich.console.Console`."""
@@ -35,38 +35,39 @@ class Screen(Console):
             yield segment if segment.control else Segment(printable(segment.text), segment.style)
 
     def print(self, *objects: Any, **options: Any) -> None:
-        """Prints as :class:`rich.console.Console` does; columns of a table that is too wide move below the others."""
+        """Prints as :class:`rich.console.Console` does; columns that make a table too wide go below the others."""
         if len(objects) == 1 and isinstance(objects[0], Table):
             for part in fitted(objects[0], self):
                 super().print(part, **options)
-            if objects[0].caption:  # the whole line long, however narrow the table
+            if objects[0].caption:  # over the whole width, however narrow the table
                 super().print(objects[0].caption, style="table.caption")
         else:
             super().print(*objects, **options)
 
 
 def plain_table(*columns: Column, title: str = "") -> Table:
-    """A table without lines."""
+    """Table without ruled lines."""
     return Table(*columns, title=Text(title), title_justify="left", box=None, padding=(0, 1, 0, 0))
 
 
 def unbroken(*names: str) -> list[Column]:
-    """Columns in which no line ends before its end."""
+    """Columns whose lines are not wrapped."""
     return [Column(Text(name), no_wrap=True) for name in names]
 
 
 def numeric(*names: str) -> list[Column]:
-    """Columns of numbers."""
+    """Columns of numbers, right-aligned and not wrapped."""
     return [Column(Text(name), no_wrap=True, justify="right") for name in names]
 
 
-_WIDEST = 10_000  # characters: the width at which nothing wraps
+_WIDEST = 10_000  # characters: a width at which nothing wraps
 
 
 def fitted(table: Table, console: Console) -> list[Table]:
-    """The table as parts that are no wider than the console; no word is cut.
+    """Parts of a table no wider than the console; no word is cut.
 
-    Each part begins with the columns that tell the lines apart, or with the first where they leave no room for others.
+    Each part repeats the leading columns that distinguish the lines, or only the first if these leave no room for
+    others.
     """
     if not table.columns:
         return [table]
@@ -100,17 +101,16 @@ def fitted(table: Table, console: Console) -> list[Table]:
 
 
 def _telling(table: Table) -> int:
-    """Number of leading columns that make all lines distinct; 1 where not even all do."""
+    """Number of leading columns that make all lines distinct; 1 if all columns together do not."""
     lines = list(zip(*([str(cell) for cell in column.cells] for column in table.columns), strict=True))
     counts = range(1, len(table.columns))
     return next((count for count in counts if len({line[:count] for line in lines}) == len(lines)), 1)
 
 
 def _size(column: Column, console: Console, most: int) -> Measurement:
-    """The least width at which no word of a column is cut (where lines do not break: no line), and the natural one.
+    """(least, natural) width of a column: the least cuts no word, or no line if lines are not wrapped.
 
-    A column that has a greatest width takes no more, but for a word that is longer; of lines that do not break the
-    rest is left out.
+    The column's greatest width bounds the natural one; only a longer word exceeds it.
     """
     wide = console.options.update(width=_WIDEST)
     widths = [Measurement.get(console, wide, cell) for cell in (column.header, *column.cells)]

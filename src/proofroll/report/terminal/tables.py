@@ -1,4 +1,4 @@
-"""The verdict table and other tables on the terminal, within 100 columns."""
+"""Verdict table and other tables for the terminal, within 100 columns."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from proofroll.report.page.records import ReportContent
 
 WIDTH = 100
-_WIDEST = 8  # spreads that are listed
+_WIDEST = 8  # largest number of spreads that are listed
 _WORD, _NUMBER = 14, 7  # characters of the longest word and of a number
 STYLES = {
     "agrees": "green",
@@ -44,21 +44,21 @@ STYLES = {
 
 
 def console() -> Screen:
-    """The console for data, on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS.
+    """Console for data on standard output: at most 100 columns of a terminal; in a pipe 100, or COLUMNS.
 
-    A text is shown as it is, whatever rich would make of ``[words]`` or ``:words:`` in it.
+    Text is printed literally: ``[words]`` and ``:words:`` are not markup.
     """
     out = Screen(highlight=False, markup=False, emoji=False)
     if out.is_terminal:
         out.width = min(out.width, WIDTH)
     elif not os.environ.get("COLUMNS", "").isdecimal():  # else rich has read it
         out.width = WIDTH
-    out.width = out.width or 80  # COLUMNS=0 says that nobody knows
+    out.width = out.width or 80  # COLUMNS=0 means unknown
     return out
 
 
 def verdict_table(content: ReportedComparison) -> Table:
-    """One line per engine with settings: the worst over all points of the parameters."""
+    """Table with a line per engine with settings: the worst over all points of the parameters."""
     names, before = columns(content), seconds_before(content)
     worst = [
         max((row.observables[name] for name, _ in names if name in row.observables), key=_beyond, default=None)
@@ -71,7 +71,7 @@ def verdict_table(content: ReportedComparison) -> Table:
     }
     numbers = {name: found for name, found in numbers.items() if any(value is not None for value in found)}
     table = plain_table(
-        # Where the window is narrow those with a least width break between words, and nothing is cut.
+        # In a narrow window columns with a least width wrap between words, and nothing is cut.
         Column("engine formulation setting", min_width=_WORD, overflow="fold"),
         *unbroken("step"),
         Column("verdict", min_width=_WORD),
@@ -94,12 +94,12 @@ def verdict_table(content: ReportedComparison) -> Table:
 
 
 def _beyond(item: WorstJudgement) -> float:
-    """Error in units of its tolerance; 0 if it is not finite, which is shown as such and sorted last."""
+    """Error in units of its tolerance; 0 if it is not finite, so that finite errors rank first."""
     return item.error / item.tolerance if math.isfinite(item.error) else 0.0
 
 
 def columns(content: ReportedComparison) -> list[tuple[str, str]]:
-    """The observables that fit on the terminal: what moves, and the first reaction."""
+    """Observables that fit on the terminal: headline motions, and the first headline reaction."""
     units = observables(content)
     shown = [name for name in content.headlines("motion") if name in units]
     shown += [name for name in content.headlines("reaction") if name in units][:1]
@@ -107,7 +107,7 @@ def columns(content: ReportedComparison) -> list[tuple[str, str]]:
 
 
 def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
-    """A comparison: the table of verdicts, and what came of it in words."""
+    """Parts of a comparison's text: the verdict table, spreads, and closing lines; or why no run was made."""
     if content.unreached and content.budget is None:
         yield from (content.title, content.unreached, "")
         return
@@ -119,7 +119,7 @@ def verdict_parts(content: ReportedComparison) -> Iterator[Table | str]:
 
 
 def spread_parts(spread: Spread) -> Iterator[Table | str]:
-    """Range of where the settings end at a point without a unique truth, the widest numbers first."""
+    """Table of the spread of final values at a point without a unique truth, the widest first."""
     where = f" at {spread.point}" if spread.point else ""
     yield f"{ALONE[0].upper()}{ALONE[1:]}{where}: {spread.because}."
     if spread.lines:
@@ -132,11 +132,11 @@ def spread_parts(spread: Spread) -> Iterator[Table | str]:
 
 
 def closing_lines(content: ReportedComparison) -> list[str]:
-    """Closing lines of a comparison: what to look at first."""
+    """Closing lines of a comparison: counts, reasons, remarks, contradictions, and shared schemes."""
     rows = content.rows
     counts = {verdict: sum(row.verdict == verdict for row in rows) for verdict in SYMBOLS}
-    said = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
-    lines = [f"{counted(len(rows), 'engine settings')}, {counted(len(content.runs), 'runs')} in all: {said}."]
+    totals = ", ".join(f"{count} {verdict}" for verdict, count in counts.items() if count)
+    lines = [f"{counted(len(rows), 'engine settings')}, {counted(len(content.runs), 'runs')} in all: {totals}."]
     for name, row, _ in content.lines():
         if row.reason and not row.reason.startswith(Status.LEFT_OUT):
             lines.append(f"{SYMBOLS[row.verdict]} {name}: {row.reason}")
@@ -159,7 +159,7 @@ def closing_lines(content: ReportedComparison) -> list[str]:
 
 
 def budget_lines(content: ReportedComparison) -> list[str]:
-    """Cases that the processor time did not suffice for, and the way to get them."""
+    """Lines on cases left out for lack of processor time, and the command that runs them."""
     left = content.beyond_budget
     if not left:
         return []
@@ -179,7 +179,7 @@ def part_lines(content: ReportContent) -> list[str]:
 
 
 def change_lines(changes: Against | None) -> list[str]:
-    """Changes since an earlier report, a line for each run; none without an earlier one."""
+    """Changes since an earlier report, a line for each run; empty without an earlier one."""
     if changes is None:
         return []
     head = f"Against {changes.old} of {changes.date[:10]}. {changes.sentence}"
@@ -192,7 +192,7 @@ def change_lines(changes: Against | None) -> list[str]:
 
 
 def first_lines(content: ReportContent) -> list[str]:
-    """Opening sentences, three at most, on what to look at first; the terminal wraps them."""
+    """Opening sentences, at most three, on what to look at first; the terminal wraps them."""
     entries = content.further
     unexpected = [line for comparison in content.comparisons for line in comparison.contradictions]
     unexpected += [line for entry in entries for line in entry.contradictions]
@@ -208,5 +208,5 @@ def first_lines(content: ReportContent) -> list[str]:
 
 
 def _one_line(text: str) -> str:
-    """A text without the breaks of what it quotes."""
+    """Text without line breaks, which quoted messages may have."""
     return " ".join(text.split())

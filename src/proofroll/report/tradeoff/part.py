@@ -1,4 +1,4 @@
-"""Speed against accuracy in one scene as a part of a report."""
+"""Trade-off of speed against accuracy in one scene as a part of a report."""
 
 from __future__ import annotations
 
@@ -28,18 +28,18 @@ from proofroll.studies.tradeoff.requirements import Requirements
 from proofroll.studies.tradeoff.study import make_tradeoff
 from proofroll.studies.tradeoff.tradeoff import stored
 
-# Parts of its scale to which a quantity is wanted where nobody says otherwise: what an eye sees, an engineer needs, a
-# reference is made from, and what tells the orders of methods apart.
+# Tolerances, relative to the quantity's scale, for advice without claims: visible errors, engineering, reference
+# solutions, and orders of methods.
 PARTS = (1e-2, 1e-3, 1e-4, 1e-6)
-# A limit of small steps is another than the truth where it is off by so many of its bars, as for a verdict.
+# A limit of small steps counts as another than the truth if it is off by so many error bars, as for a verdict.
 _SHOWN = 10
 
 
 @dataclass(frozen=True)
 class Advice:
-    """An answer with the part of the scale that was asked for; None: it was asked for in the quantity's unit.
+    """An answer with its relative tolerance; None: the tolerance was given in the quantity's unit.
 
-    What is the same in all of them, the range and the circumstances, is left to the study.
+    Ranges and circumstances, which all answers share, are in the study.
     """
 
     relative: float | None
@@ -48,7 +48,7 @@ class Advice:
 
 @dataclass(frozen=True, kw_only=True)
 class TradeoffEntry(PartEntry):
-    """A study with the quantities that are shown, what to use, and what was claimed."""
+    """Entry of a study: quantities to show, advice, and judged claims."""
 
     shown: list[str]
     advice: list[Advice]
@@ -57,7 +57,7 @@ class TradeoffEntry(PartEntry):
 
 @dataclass
 class TradeoffPart(Part):
-    """Speed against accuracy in one scene."""
+    """Trade-off of speed against accuracy in one scene."""
 
     kind: ClassVar[str] = STUDY
     key: ClassVar[str] = "tradeoffs"
@@ -81,13 +81,13 @@ class TradeoffPart(Part):
         return f"{counted(len(entry.study.points), 'points')}{held(entry.claims)}"
 
     def keeps(self, out: Path) -> bool:
-        """The whole study, or else a brief one."""
+        """True if a study is stored; the full one is preferred to a brief one."""
         paths = (stored(out, self.asked.swept, self.engines, brief=brief) for brief in (False, True))
         self.study = next((study for path in paths if (study := kept(path, TradeoffStudy)[0]) is not None), None)
         return self.study is not None
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:
-        """A brief study, without the runs over ranges of parameters."""
+        """Makes a brief study, without runs over ranges of parameters."""
         self.study, _ = make_tradeoff(
             self.asked.swept, runner, out, engines=self.engines, claims=self.asked, brief=True,
             progress=lambda text: tell(text, 1),
@@ -107,7 +107,7 @@ class TradeoffPart(Part):
         )
 
     def lines(self) -> list[TableLine]:
-        """Lines of each error of each point, without verdicts: the choice of a tolerance judges them."""
+        """Lines of each error of each point, without verdicts: a reader's tolerance judges them."""
         study = self.study
         assert study is not None  # it was made
         scene = self.asked.swept.loaded
@@ -144,7 +144,7 @@ class TradeoffPart(Part):
 
 
 def _limit(budget: CurveBudget) -> str:
-    """Limit of small steps of a curve: not shown, beyond both bars of the truth, or within them."""
+    """Result of a curve's limit of small steps: not shown, beyond both error bars of the truth, or within."""
     if budget.model_form is None:
         return LimitResult.NOT_SHOWN
     known = (budget.model_form_bar or 0.0) + (budget.truth or 0.0) + (budget.floor or 0.0)
@@ -158,6 +158,6 @@ def advice(study: TradeoffStudy, claims: TradeoffClaims) -> list[Advice]:
     return [
         Advice(tolerance.value if tolerance.relative else None, recommend(study, Requirements(name, tolerance)).answer)
         for name in default_quantities(study)
-        if study.quantities[name].scale is not None  # a part of nothing
+        if study.quantities[name].scale is not None  # without a scale no relative tolerance exists
         for tolerance in (own if own and name == study.quantity else parts)
     ]

@@ -1,4 +1,4 @@
-"""A trade-off and a recommendation: on the terminal within 100 columns, and what the page tells of them in words."""
+"""Texts of a trade-off and of a recommendation: for the terminal within 100 columns, and sentences for the page."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
     from proofroll.studies.tradeoff.recommend import Choice, Recommendation
     from proofroll.studies.tradeoff.records import Corner, CurveBudget, MeasuredPoint, TradeoffStudy
 
-_MOST_COLUMNS = 4  # of quantities, where nobody names them
+_MOST_COLUMNS = 4  # largest number of quantities that are shown by default
 
 
 def default_quantities(study: TradeoffStudy) -> list[str]:
-    """Deciding quantity, and the columns that the scene's elements declare; no more than a terminal has room for."""
-    decides = [study.quantity] if study.quantity in study.quantities else []  # of the order of events no curve is kept
+    """Quantities shown by default: the deciding one, and columns that the scene's elements declare; at most four."""
+    decides = [study.quantity] if study.quantity in study.quantities else []  # an order of events has no curve
     beside = (name for name, item in study.quantities.items() if item.column)
     return list(dict.fromkeys([*decides, *beside]))[:_MOST_COLUMNS]
 
 
 def cost_of(point: MeasuredPoint) -> str:
-    """Seconds per second, and how far its interval goes to either side at most.
+    """Text of a cost: seconds per second, and the larger half width of its interval.
 
-    The range of fewer than six values is no interval of 95 %, so its own confidence stands behind it.
+    Fewer than six values have no interval of 95 %, so that their own confidence is added.
     """
     cost = point.seconds_per_second
     if cost is None:
@@ -47,21 +47,21 @@ def cost_of(point: MeasuredPoint) -> str:
 
 
 def effort(study: TradeoffStudy) -> str:
-    """Sentence or two on the accuracy of speeds and the range in which the choices hold."""
-    said = ""
+    """Sentences on the accuracy of speeds, and on the range of parameters in which the choices hold."""
+    text = ""
     if study.brief:
-        said = (
+        text = (
             "Speeds were measured briefly, twice at most and those of long runs once, and the finest steps were "
             "left out: they contradict no claim. "
         )
     where = f"at {listed(study.parameters) or 'the default parameters'} over {study.until:g} s"
     if study.over:
-        return f"{said}Every choice holds {where}, and at the corners of {_ranges(study)}; nothing is known beyond."
-    return f"{said}Every choice holds {where}; it was not checked over ranges of the parameters."
+        return f"{text}Every choice holds {where}, and at the corners of {_ranges(study)}; nothing is known beyond."
+    return f"{text}Every choice holds {where}; it was not checked over ranges of the parameters."
 
 
 def advised(advice: Sequence[Advice]) -> dict[str, tuple[str, list[Advice]]]:
-    """Advice for each quantity, with the named settings in a few words."""
+    """Advice by quantity, with the names of the recommended settings."""
     groups: dict[str, list[Advice]] = {}
     for item in advice:
         groups.setdefault(item.answer.quantity, []).append(item)
@@ -82,12 +82,12 @@ def _ranges(study: TradeoffStudy) -> str:
 
 
 def tradeoff_parts(study: TradeoffStudy, shown: Sequence[str], *, every_point: bool) -> Iterator[Table | str]:
-    """Parts of a trade-off's text: its fronts or all its points, the makeup of errors, and the findings.
+    """Parts of a trade-off's text: its fronts or all its points, the makeup of errors, and the conclusions.
 
     Args:
         study: the measured trade-off.
         shown: quantities with a column; the last tables are about the first of them.
-        every_point: all points are listed, and errors described in sentences too.
+        every_point: True to list all points and describe errors in sentences, too.
     """
     if every_point:
         yield point_table(study, study.points, shown, "Every point")
@@ -111,10 +111,10 @@ def point_table(
     title: str,
     ties: Collection[int] | None = None,
 ) -> Table:
-    """Table of points, one line each: its cost, and its error in each quantity.
+    """Table of points, one line each: cost, and error in each quantity.
 
-    ``ties`` are the numbers of points on a front whose cost is not distinguishable from that of the next; a front shows
-    the errors by which it is one, the largest of a run and of the next finer ones.
+    ``ties``: numbers of the points of a front whose cost is not distinguishable from that of the next; None: no front.
+    A front shows the errors that define it: the largest of a run and of the next finer runs.
     """
     caption = Text("cost: wall seconds per simulated second through this adapter")
     if ties:
@@ -136,7 +136,7 @@ def point_table(
 
 
 def front_tables(study: TradeoffStudy, quantities: Sequence[str]) -> Iterator[Table]:
-    """The Pareto front of the engines, and that of everything where the scene's own equations are better."""
+    """Pareto front of the engines, and the front with the scene's own equations if that is better."""
     engines, everything = (study.front(key, quantities[0]) for key in ("pareto_engines", "pareto"))
     title = f"The Pareto front of the engines for {quantities[0]}: nothing is cheaper and more accurate"
     if engines:
@@ -152,7 +152,7 @@ def _front(study: TradeoffStudy, points: Sequence[MeasuredPoint], quantities: Se
 
 
 def corner_table(study: TradeoffStudy, quantity: str) -> Table:
-    """Table of the points that were run over the range: error here, and the worst at the corners with its place."""
+    """Table of points that were run over ranges of parameters: error at the defaults, and worst at the corners."""
     title = f"Over {_ranges(study)}: error of {quantity} [{study.quantities[quantity].unit}]"
     columns = [*unbroken("engine formulation setting", "step"), *numeric("here", "worst"), Column("where")]
     table = plain_table(*columns, title=title)
@@ -165,7 +165,7 @@ def corner_table(study: TradeoffStudy, quantity: str) -> Table:
 
 
 def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
-    """Largest error over all corners, with its corner; a corner without a result counts as larger than any error."""
+    """Text of the largest error over all corners, and its corner; a missing result counts as the largest."""
     missing = [corner for corner in corners if corner.errors.get(quantity) is None]
     if missing:
         more = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
@@ -175,7 +175,7 @@ def _worst(corners: Sequence[Corner], quantity: str) -> tuple[str, str]:
 
 
 def budget_table(study: TradeoffStudy, quantity: str) -> Table:
-    """Table of every curve: the makeup of its error, and the dominating part at either end."""
+    """Table of every curve: the makeup of its error, and the dominant part at the coarse and at the fine end."""
     unit = study.quantities[quantity].unit
     title = f"What the error of {quantity} consists of [{unit}]: the coarse end, then the fine end"
     table = plain_table(
@@ -200,7 +200,7 @@ def budget_table(study: TradeoffStudy, quantity: str) -> Table:
     return table
 
 
-# Names that fit a column.
+# Short names that fit a column.
 _DOMINANT = {
     "time step": "step",
     "model form": "model",
@@ -216,7 +216,7 @@ def _order(item: CurveBudget) -> str:
     if item.order is None:
         return f"–{declared}"
     if item.order_low is None or item.order_high is None:
-        return f"{item.order:.2f} ±?{declared}"  # from two differences, which say nothing of their scatter
+        return f"{item.order:.2f} ±?{declared}"  # from two differences, whose scatter is unknown
     return f"{item.order:.2f} ±{(item.order_high - item.order_low) / 2:.2f}{declared}"
 
 
@@ -228,7 +228,7 @@ def _steps(item: CurveBudget) -> str:
 
 
 def answer_lines(advice: Recommendation) -> Iterator[str]:
-    """A recommendation, line by line."""
+    """Lines of a recommendation."""
     answer = advice.answer
     asked = f"{answer.quantity} to {number(answer.tolerance)} {answer.unit}"
     if answer.choice is None:
@@ -258,18 +258,18 @@ def answer_lines(advice: Recommendation) -> Iterator[str]:
 
 def _line(choice: Choice, of: str) -> str:
     point = choice.point
-    said = ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
-    said += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
-    return with_caveat(f"{said}; {choice.reason}", family_and_caveat(point)) + "."
+    text = ", ".join(filter(None, (name_of(point), step(point.resolution, point.step))))
+    text += f": error {error(choice.error)} {of}, cost {cost_of(point)} s/s"
+    return with_caveat(f"{text}; {choice.reason}", family_and_caveat(point)) + "."
 
 
 def _checked(advice: Recommendation) -> str:
     checked = advice.checked
     over = [f"{name} {low:g} to {high:g}" for name, (low, high) in checked.parameters.items()]
-    said = f"Checked over {checked.until:g} s at {listed(advice.parameters) or 'the default parameters'}"
+    text = f"Checked over {checked.until:g} s at {listed(advice.parameters) or 'the default parameters'}"
     if over:
-        said += f", and at {checked.corners} corners of {', '.join(over)}"
-    return said + "; nothing is known beyond."
+        text += f", and at {checked.corners} corners of {', '.join(over)}"
+    return text + "; nothing is known beyond."
 
 
 def _measured(measured: Measured) -> str:

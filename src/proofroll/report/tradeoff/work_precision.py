@@ -1,4 +1,4 @@
-"""The work–precision diagram: error against cost, with the Pareto front and the truth as the limit."""
+"""Work–precision diagram: error against cost, with the Pareto front and the truth's error bar."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
     from proofroll.studies.tradeoff.records import MeasuredPoint, TradeoffStudy
 
-# One colour per engine, one dash and marker per formulation: a curve is told apart without colour too.
+# One colour per engine, one dash and marker per formulation: curves are distinct without colour, too.
 _COLOURS = ("#3b6fb6", "#c9622f", "#3f8f5b", "#8b5fa8", "#b08a1e", "#5b6770", "#b8476b", "#2a8f9c")
 _DASHES = ("-", "--", "-.", ":")
 _MARKERS = "osD^vPX*"
-# Errors below this are round-off of every double; a logarithm needs a number.
+# Smaller errors are round-off of any double; a logarithm needs a positive number.
 SMALLEST = 1e-17
 # Height of a line of the legend [in].
 _LINE = 0.145
 
 
 def svg(study: TradeoffStudy, quantities: Sequence[str]) -> str:
-    """The diagram as SVG text, one panel per quantity. Raises Missing if matplotlib is not installed."""
+    """Diagram as SVG text, one panel per quantity. Raises Missing if matplotlib is not installed."""
     return svg_text({"font.size": 9}, lambda: _drawn(study, quantities))
 
 
@@ -86,7 +86,7 @@ def _panel(panel: Any, study: TradeoffStudy, quantity: str) -> None:
 
 
 def _front(panel: Any, study: TradeoffStudy, quantity: str) -> None:
-    """Draws Pareto fronts as steps."""
+    """Draws Pareto fronts as steps, of the engines and of everything."""
     floor = max(study.quantities[quantity].truth_error_bar or 0.0, SMALLEST)
     right = max((p.seconds_per_second for p in study.points if p.seconds_per_second), default=1.0)
     for key, colour, words in (

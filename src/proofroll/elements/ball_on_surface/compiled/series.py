@@ -76,7 +76,7 @@ class Series:
 def still_moving(before: FloatArray, t: float, now: FloatArray) -> None:
     """Raises Diverged if the centre came to rest within a step, where the direction of rolling resistance reverses.
 
-    The equations are smooth beyond rest on a straight path, so that a series may step across it. A reversal is told
+    The equations are smooth beyond rest on a straight path, so that a series may step across it. A reversal differs
     from a mere turn of the velocity by its angle: within a step a velocity turns by less than a right angle, for its
     turning bounds the step.
 

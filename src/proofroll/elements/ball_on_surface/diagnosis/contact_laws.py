@@ -33,7 +33,7 @@ def other_law(
     """Hypothesis that the contact has another law than the scene's, without any fitted number.
 
     ``law``: of a ball; ``applies``: True for balls whose scene can show the difference.
-"""
+    """
 
     @hypothesis(name, "the other law gives the accelerations and forces at every sample, with no number fitted")
     def test(evidence: Evidence) -> Iterator[Cause]:

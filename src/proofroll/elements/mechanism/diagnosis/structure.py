@@ -176,7 +176,7 @@ def lost_coupling(evidence: Evidence) -> Iterator[Cause]:
 
 
 def _ancestry(mechanism: Mechanism) -> FloatArray:
-    """Mask of pairs of velocities of different joints of which one carries the other, (nv, nv)."""
+    """Mask of pairs of velocities whose joints are ancestor and descendant in the tree, (nv, nv)."""
     above = {joint.child: joint for joint in mechanism.joints}
     slices = dict(zip((joint.name for joint in mechanism.joints), mechanism.v_slices, strict=True))
     found = np.zeros((mechanism.nv, mechanism.nv))
