@@ -115,8 +115,8 @@ def certify(body: RollingBall, built: BallBuilt, sample: BallSample) -> list[Lin
 def _expected(body: RollingBall, built: BallBuilt) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Acceleration, force and angular acceleration expected at time 0, in the world, shape (3,) each.
 
-    For a ball at rest, rolling resistance has no direction yet. An engine may apply that of the coming motion, or none
-    until the ball moves; the closer one to its acceleration is expected in all three.
+    At rest, rolling resistance has no direction yet: an engine may apply the direction of the coming motion, or no
+    resistance until the ball moves. Expected are the values of the alternative that is closer to its acceleration.
     """
     assumed, reported = body, built.acceleration
     if stands(body, body.v0) and reported is not None:

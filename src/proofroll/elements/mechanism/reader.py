@@ -1,8 +1,9 @@
 """Reads a mechanism from the tables of a scene file.
 
-``[[repeat]]`` writes tables that differ by a number only once: ``index = "i"``, ``from = 0``, ``count = "$n"``, and the
-tables themselves, ``[[repeat.bodies]]``, ``[[repeat.joints]]`` …; their texts may hold ``{i}`` or ``{i-1}`` and their
-expressions ``i``. A joint with ``dependent = true`` has its q0 and v0 found from the loops; its own q0 is the guess.
+``[[repeat]]`` stands for several tables that differ by a number: ``index = "i"``, ``from = 0``, ``count = "$n"``, and
+the tables themselves, ``[[repeat.bodies]]``, ``[[repeat.joints]]`` …; their texts may hold ``{i}`` or ``{i-1}`` and
+their expressions ``i``. A joint with ``dependent = true`` has its q0 and v0 found from the loops; its own q0 is a
+guess.
 """
 
 from collections.abc import Iterator, Mapping

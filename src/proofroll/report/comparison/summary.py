@@ -144,7 +144,7 @@ def _why(runs: list[Run]) -> tuple[str, str]:
 
 
 def _remarks(runs: list[Run]) -> list[str]:
-    """Remarks on a row: shared equations, the observable with the worst limit, and a floor that decided."""
+    """Remarks on a row: shared equations; those of the observable with the worst limit; a floor of precision."""
     remarks = list(dict.fromkeys(run.shared for run in runs if run.shared))
     shown = [(run, item) for run in runs for item in run.judgements if item.remarks]
     if shown:

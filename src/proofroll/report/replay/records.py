@@ -129,7 +129,7 @@ class ReplayKind(NamedTuple):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """One motion of a case; ``shown``: at first; ``frames``: their number; ``message``: reason of an early end."""
+    """One motion of a case; ``shown``: at first; ``frames``: their number; ``message``: reason for an early end."""
 
     name: str
     colour: int

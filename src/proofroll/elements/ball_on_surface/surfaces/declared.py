@@ -250,7 +250,7 @@ def _triad(x2: float, y2: float, z2: float, x: float, y: float, z: float) -> tup
 
 
 def _stacked(parts: Sequence[Any], shape: tuple[int, ...]) -> FloatArray:
-    r"""One array of shape (\*shape, parts) from numbers or arrays."""
+    """Numbers, or arrays of this shape, as one array with an additional last axis."""
     if not shape:
         return np.array(parts)
     return np.stack([np.broadcast_to(np.asarray(part, dtype=np.float64), shape) for part in parts], axis=-1)

@@ -186,8 +186,8 @@ def _about_origin(
 def of_each_joint(evidence: Evidence) -> Iterator[Cause]:
     """Hypothesis: one joint, or every joint, has additional damping or armature.
 
-    Coarse steps cause the same: the size of the change is the armature, or damping times natural time, relative to the
-    inertia that the joint moves at the start.
+    Coarse steps have the same effect. So the cause states how large the change is: the armature, or damping times
+    natural time, relative to the inertia that the joint moves at the start.
     """
     mechanism = evidence.element.mechanism
     equations = JointCoordinates(mechanism)
