@@ -1,4 +1,4 @@
-"""An engine whose versions differ, as installed packages do: in order, in what they refuse, in their defaults."""
+"""An engine whose behaviour depends on its installed version: order, refusals, defaults."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ DISTRIBUTION = "aged"
 
 
 def age() -> tuple[int, ...]:
-    """The version that is installed where this runs."""
+    """Installed version of the engine."""
     return release(metadata.version(DISTRIBUTION))
 
 
 @dataclass(frozen=True)
 class AgedSettings(TinySettings):
-    """A step, and one of two models."""
+    """Settings: a step, and one of two models."""
 
     formulation: Literal["midpoint", "walls"] = "midpoint"  # type: ignore[assignment]  # more than Tiny has
 
     @property
     def order(self) -> int:
-        """Two since version 2."""
+        """Order of the method: 2 since version 2, before 1."""
         return 2 if age() >= (2,) else 1
 
 
 class Aged(Tiny):
-    """The midpoint rule from version 2 on, Euler's before, which also had no walls."""
+    """Rolling ball by the midpoint rule from version 2 on; before, by Euler's method and without walls."""
 
     name: ClassVar[str] = "aged"
     oldest: ClassVar[str] = "1.0"
@@ -59,7 +59,7 @@ class Aged(Tiny):
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """No walls before version 2."""
+        """See :class:`proofroll.core.engine.Engine`; refuses walls before version 2."""
         if settings.formulation == "walls" and age() < (2,):
             raise Refused("walls came with version 2")
         return super().build(scene, settings)

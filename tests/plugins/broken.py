@@ -1,7 +1,7 @@
-"""One engine with a choice of defects, each the projection method on a scene that is not quite the one asked for.
+"""An engine with a choice of defects: the projection method on a slightly different scene, or with wrong samples.
 
-``open_*`` defects show in what the engine says it built; ``hidden_*`` defects do not: there the engine repeats the
-scene's own numbers, starts as it should, and moves wrongly.
+``open_*`` defects show in the certificate. ``hidden_*`` defects do not: the engine reports the scene's own numbers,
+starts rightly, and moves wrongly.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def _same(scene: Scene) -> Scene:
     return scene
 
 
-# What is built instead of the scene.
+# Defect -> function that changes the scene before it is built.
 BUILT: Mapping[str, Callable[[Scene], Scene]] = {
     "inertia": _ball(inertia_ratio=2.0),
     "gravity": _gravity,
@@ -62,15 +62,15 @@ BUILT: Mapping[str, Callable[[Scene], Scene]] = {
     "limit": _slippery,  # it slips too early
     "friction": _same,  # the reported friction has the wrong sign
     "rate": _same,  # the reported velocity is 0.01 % more than the rate of the position
-    "period": _same,  # the position is off by a beat that is over at every hundredth of a second
-    "clock": _same,  # time goes 0.1 % too slowly
+    "period": _same,  # the position has an added oscillation that is zero at every hundredth of a second
+    "clock": _same,  # the engine's time runs 0.1 % slow
     "none": _same,
 }
 
 
 @dataclass(frozen=True)
 class BrokenSettings:
-    """The formulation is the defect."""
+    """Settings; the formulation names the defect."""
 
     formulation: str = "open_none"
     preset: str = "matched"

@@ -1,4 +1,4 @@
-"""A page in headless Chromium with its network cut: what it asks for, what it complains of, what a reader meets."""
+"""A page in headless Chromium without network: its requests, its messages, and its content as a reader sees it."""
 
 from __future__ import annotations
 
@@ -13,20 +13,20 @@ from typing import Any
 import pytest
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-SCRIPT = Path(__file__).with_suffix(".js")  # ``reading``: what one can ask a page
-# A script for ``visiting``: figures and replay are drawn when they come into view, and with it nothing ever does.
+SCRIPT = Path(__file__).with_suffix(".js")  # defines ``reading``: functions that read a page
+# A script for ``visiting`` with which no figure or replay is drawn, as nothing ever comes into view.
 UNDRAWN = "window.IntersectionObserver = class { observe() {} unobserve() {} disconnect() {} };"
 WIDE = {"width": 1280, "height": 900}
 
 
 @dataclass
 class Visit:
-    """A page that is open.
+    """An open page.
 
     Attributes:
         page: playwright's page.
-        requested: every address that was asked for; the page's own is the first.
-        messages: every line on the console, every uncaught error, and every dialog.
+        requested: addresses that were requested; the page's own is the first.
+        messages: lines on the console, uncaught errors, and dialogs.
     """
 
     page: Any
@@ -39,14 +39,14 @@ class Visit:
         self.wait("!document.querySelector('[data-fold], details:not([open])')")
 
     def wait(self, condition: str, again: Callable[[], object] | None = None) -> None:
-        """Until an expression is true.
+        """Waits until an expression is true, for two minutes at most.
 
         Args:
-            condition: the expression.
-            again: what a reader does each second until then, where the page may be too busy to notice it once.
+            condition: expression in JavaScript.
+            again: action repeated each second, where a busy page may miss a single one.
 
         Raises:
-            AssertionError: it does not become so.
+            AssertionError: the expression stays false.
         """
         # Playwright's own way needs ``eval`` in the page, which the page's policy forbids.
         end, tries = time.monotonic() + 120, 0
@@ -63,22 +63,22 @@ class Visit:
         """Scrolls to figures and waits for their pictures.
 
         Args:
-            which: selects them; those that are folded away are left out.
-            patience: how long to wait for each [s].
+            which: selector of figures; folded ones are left out.
+            patience: longest wait for each [s].
 
         Returns:
-            the captions of those that stay empty.
+            Captions of figures that stay empty.
         """
         return self.page.evaluate("([which, patience]) => reading.undrawn(which, patience)", [which, 1000 * patience])
 
 
 @dataclass
 class Drawn:
-    """A page in which everything was unfolded and every figure was drawn, once for all tests.
+    """A page with everything unfolded and every figure drawn, shared by tests.
 
     Attributes:
         seen: the page.
-        at_first: how many pictures its last figure had before.
+        at_first: number of pictures in its last figure before that.
         empty: captions of figures that stayed empty.
     """
 
@@ -89,11 +89,11 @@ class Drawn:
 
 @dataclass
 class Browser:
-    """A browser and its empty tabs: another page in the process of an earlier one opens in half of the time.
+    """A browser with idle tabs, which are reused because a page opens there in half of the time.
 
     Attributes:
         program: playwright's browser.
-        tabs: those that no page is open in, by what they were made with.
+        tabs: options of a tab, as text -> idle tabs with these options.
     """
 
     program: Any
@@ -101,7 +101,7 @@ class Browser:
 
     @contextmanager
     def tab(self, before: str, color_scheme: str, **options: Any) -> Iterator[Any]:
-        """One that is empty and looks as a new one does; what failed in it takes it along."""
+        """Lends an empty tab in the state of a new one; after an error the tab is closed, not reused."""
         idle = self.tabs.setdefault(repr((before, sorted(options.items()))), [])
         if idle:
             page = idle.pop()
@@ -125,7 +125,7 @@ class Browser:
 
 @contextmanager
 def launched() -> Iterator[Browser]:
-    """Headless Chromium of the system; the test is skipped where there is none."""
+    """Starts the system's headless Chromium; skips the test if there is none."""
     program = next(filter(None, map(shutil.which, BROWSERS)), None)
     if program is None:
         pytest.skip(f"none of {', '.join(BROWSERS)} is installed: apt-get install chromium")
@@ -148,16 +148,16 @@ def visiting(
     color_scheme: str = "light",
     **options: Any,
 ) -> Iterator[Visit]:
-    """Opens a file; whatever else it asks for is noted and refused.
+    """Opens a file; other requests of the page are recorded and refused.
 
     Args:
         browser: from :func:`launched`.
-        file: the page.
-        fragment: with ``#``, where to go in it.
-        before: a script that runs before those of the page.
+        file: path of the page.
+        fragment: anchor in the page, with ``#``.
+        before: script that runs before those of the page.
         viewport: size of the screen [CSS px].
-        color_scheme: that a reader prefers, ``light`` or ``dark``.
-        options: of playwright's ``new_context``, e.g. ``is_mobile=True``.
+        color_scheme: scheme that the reader prefers, ``light`` or ``dark``.
+        options: arguments of playwright's ``new_context``, e.g. ``is_mobile=True``.
     """
     address = file.resolve().as_uri()
 

@@ -1,6 +1,6 @@
-"""Forks processes of Dask: the words of each command line come as a line of standard input, its number goes back.
+"""Forks processes of Dask, so that tests pay for importing Dask once.
 
-To import Dask costs each of them more than all that tests want of it.
+Each line of standard input is a command line in JSON; its process id is printed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A line at the end about tests that take long and are no drills; none fails, for no test hangs on a clock."""
+"""Line at the end of a test run about slow tests without the mark ``drill``; no test fails for its duration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 
 # Processor time [s] above which a test is a drill (CONTRIBUTING.md).
 LIMIT = 1.5
-# Of so many the line tells.
+# Largest number of tests named in the line.
 _MOST = 10
 _BEGAN = pytest.StashKey[float]()
 _TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 1
@@ -19,7 +19,7 @@ _TOOK = "processor_seconds"
 
 
 def _of_children(process: str) -> float:
-    """Processor time of the processes that a process has begun and not waited for, and of theirs [s]; Linux alone."""
+    """Processor time of a process's living descendants [s]; 0 except on Linux."""
     spent, children = 0.0, ""
     with suppress(OSError):  # a thread or a process that ends meanwhile: who waits for it counts it
         for thread in os.listdir(f"/proc/{process}/task"):
@@ -37,9 +37,9 @@ def _read(file: str) -> str:
 
 
 def _spent() -> float:
-    """Processor time of this process and of all that it has begun [s].
+    """Processor time of this process and all its descendants, living and ended [s].
 
-    A worker serves many tests and is waited for in one of them, which would count for all.
+    Living ones count because a worker serves many tests: counted at its end, its time would fall on one test.
     """
     return sum(os.times()[:4]) + _of_children("self")
 
@@ -52,15 +52,15 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_teardown(item: pytest.Item) -> Iterator[None]:
-    """Notes what it took."""
+    """Records the processor time that a test took."""
     result = yield
     now = item.session.stash[_BEGAN] = _spent()
-    item.user_properties.append((_TOOK, now - item.stash.get(_BEGAN, now)))  # who is skipped never began
+    item.user_properties.append((_TOOK, now - item.stash.get(_BEGAN, now)))  # a skipped test has no start
     return result
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Names them, the longest first."""
+    """Prints the slow tests without the mark ``drill``, the slowest first."""
     reports = [report for found in terminalreporter.stats.values() for report in found if hasattr(report, "when")]
     took = {
         report.nodeid: dict(report.user_properties).get(_TOOK, 0.0)

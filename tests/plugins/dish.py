@@ -1,4 +1,4 @@
-"""A surface that somebody else declares by its profile curve alone."""
+"""Surface of revolution of another package, declared by its profile curve alone."""
 
 # ruff: noqa: D102 -- what the method means is said in Revolved
 
@@ -15,9 +15,9 @@ class Dish(Revolved):
     """Inside of a paraboloid.
 
     Attributes:
-        name: by which contacts name it.
+        name: name to which contacts refer.
         focus: height of the focus above the bottom [m].
-        kind: which surface it is.
+        kind: kind of the surface.
     """
 
     name: str

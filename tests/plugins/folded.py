@@ -1,4 +1,4 @@
-"""A page of a report with its folds put back, as one reads it who opens all of them."""
+"""HTML of a report's page with the content of all its folds inserted."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ _PLACE = re.compile(r'<div data-fold="(\d+)"></div>')
 
 
 def texts(html: str) -> list[str]:
-    """Texts of the folds of a page."""
+    """Contents of a page's folds, in order of their numbers."""
     found = re.search(r'<script type="text/plain" id="folds">([^<]*)</script>', html)
     return json.loads(gzip.decompress(base64.b64decode(found[1]))) if found else []
 
 
 def whole(html: str) -> str:
-    """The page with everything in its place."""
+    """HTML of a page with each fold replaced by its content."""
     kept = texts(html)
     while _PLACE.search(html):
         html = _PLACE.sub(lambda place: kept[int(place[1])], html)

@@ -1,6 +1,6 @@
-"""Run in a worker process, by ``runpy.run_path``: it goes to the folder of the test that borrows it."""
+"""Script for a worker process (by ``runpy.run_path``): changes to the folder of the test that borrows the worker."""
 
 import os
 
 os.chdir(globals()["folder"])
-globals().clear()  # what is left here would be the answer
+globals().clear()  # remaining globals would be the worker's answer

@@ -1,8 +1,8 @@
-"""Worker processes of tests are forked from one that has imported what all of them import, half of their start.
+"""Worker processes of tests, forked from one with common modules already imported, which halves their start.
 
-Linux alone; elsewhere, in other interpreters and in tests marked ``own_workers`` a worker starts as a person's does.
-What a worker does is the same from its first line on: its pipes, folder, environment, session and parent are those of
-a process that was started, and it has loaded no engine, scene or announcement.
+On Linux only; elsewhere, in other interpreters and in tests marked ``own_workers`` a worker starts as usual. A forked
+worker behaves the same from its first line on: its pipes, folder, environment, session and parent are those of a
+started process, and it has loaded no engine, scene or announcement.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from proofroll.files.trajectory_file import import_xarray
 from proofroll.running import process, worker
 
 _MODULE = "proofroll.running.worker"
-# What runs, truths and certificates need of proofroll and of libraries; no engine, scene or kind of element.
+# Modules that runs, truths and certificates need; no engine, scene or kind of element.
 _IMPORTED = (
     "proofroll.core.first_steps",
     "proofroll.core.multi_element",
@@ -41,7 +41,7 @@ _IMPORTED = (
     "scipy.interpolate",
     "scipy.spatial.transform",
 )
-# Python reads these when it starts: where one differs, a fork would not be what was asked for.
+# Python reads these variables when it starts: if one differs, a new process is started instead of a fork.
 _READ_AT_START = ("PYTHONHASHSEED", "PYTHONWARNINGS", "PYTHONSAFEPATH", "PYTHONHOME", "PYTHONDONTWRITEBYTECODE")
 _SET_CHILD_SUBREAPER = 36  # <linux/prctl.h>
 
@@ -63,16 +63,16 @@ class Forked:
             return self.returncode
 
     def poll(self) -> int | None:
-        """Its exit code, if it has ended."""
+        """Exit code of the process; None: it still runs."""
         return self._reap(os.WNOHANG)
 
     def wait(self) -> int | None:
-        """Its exit code, when it has ended."""
+        """Waits for the end of the process; returns its exit code."""
         return self._reap(0)
 
 
 class Forks:
-    """The process from which workers are forked, begun when the first is wanted."""
+    """The process from which workers are forked; started with the first worker."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -81,7 +81,7 @@ class Forks:
 
     @contextlib.contextmanager
     def lent(self) -> Iterator[None]:
-        """Meanwhile workers of this interpreter are forked."""
+        """Context in which workers of this interpreter are forked."""
         if sys.platform != "linux":
             yield
             return
@@ -126,7 +126,7 @@ class Forks:
             )
 
     def close(self) -> None:
-        """Ends it."""
+        """Ends the process from which workers are forked."""
         if self._template is not None:
             self._line.close()
             self._template.wait()
@@ -134,12 +134,12 @@ class Forks:
 
 
 def _adopt(yes: int) -> None:
-    """Makes processes whose parent has ended children of this one (1), or not (0)."""
+    """Makes this process adopt descendants whose parent has ended (1), or not (0)."""
     ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, yes, 0, 0, 0)
 
 
 def _serve(line: socket.socket) -> None:
-    """Forks a worker for each request; its parent ends at once, so that who asked adopts it."""
+    """Forks a worker for each request, by an intermediate process that ends, so that the requester adopts it."""
     for module in _IMPORTED:
         importlib.import_module(module)
     import_xarray()
@@ -161,10 +161,10 @@ def _serve(line: socket.socket) -> None:
 
 
 def _as_if_started(line: socket.socket, request: dict[str, Any], stdin: int, log: int) -> None:
-    """Steps of the system and of Python before the first line of a worker."""
+    """Does the steps of the system and of Python that precede the first line of a started worker."""
     os.setsid()
     while os.getppid() != request["parent"]:
-        os.kill(request["parent"], 0)  # raises where who asked has ended, so that this ends as well
+        os.kill(request["parent"], 0)  # raises, which ends this process, if the requester has ended
         time.sleep(0.001)
     line.sendall(b"%d" % os.getpid())
     line.close()

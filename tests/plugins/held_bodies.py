@@ -1,4 +1,4 @@
-"""A body that a loop holds, and the same body on a joint: two ways to say one mechanism."""
+"""One mechanism in two forms: a body held by a loop, and the same body on a joint."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ LOOPS = tuple(SPEEDS)
 
 
 def held(kind):
-    """(a free body that a loop of this kind holds on a turning arm, the body on a joint of this kind), alike."""
+    """Two equal mechanisms: a body on a turning arm, held by a loop of this kind, and by a joint of this kind."""
     swing = Joint("swing", "revolute", "world", "arm", axis=(0, 1, 0), v0=(1.5,))
     second = (1, 0, 0) if kind == "universal" else None
     joint = Joint("held", kind, "arm", "body", PLACE, second_axis=second, v0=SPEEDS[kind])

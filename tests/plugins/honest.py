@@ -1,4 +1,4 @@
-"""Honest engines of several orders: textbook methods on the scene's own equations, with their own errors alone."""
+"""Honest engines of several orders: textbook methods on the scene's own equations, with no errors but their own."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.sampling import MechanismBuilt, MechanismSample
 from proofroll.engines.projection import Projection
 
-# Stages of methods: weights of the stages before, and of all.
+# Order -> Runge-Kutta tableau: weights of earlier stages for each stage, and weights of all stages.
 TABLEAUS: Mapping[int, tuple[list[list[float]], list[float]]] = {
     1: ([[]], [1.0]),
     2: ([[], [0.5]], [0.0, 1.0]),
@@ -31,7 +31,7 @@ TABLEAUS: Mapping[int, tuple[list[list[float]], list[float]]] = {
 
 @dataclass(frozen=True)
 class HonestSettings:
-    """The method is the formulation."""
+    """Settings; the formulation names the method."""
 
     formulation: str = "order_4"
     preset: str = "matched"
@@ -50,12 +50,12 @@ class HonestSettings:
 
     @property
     def orders(self) -> tuple[int, ...]:
-        """Orders of the steps in turn."""
+        """Orders of the methods that alternate from step to step."""
         return (1, 4) if self.formulation == "mixed" else (int(self.formulation[-1]),)
 
 
 def _stepped(x: FloatArray, rates: Any, settings: HonestSettings, t: float, until: float) -> FloatArray:
-    """The state at a later time, by methods of fixed step in turn or by DOP853."""
+    """State at the time ``until``, by alternating methods of fixed step or by DOP853."""
     if settings.formulation == "adaptive":
         found = solve_ivp(lambda _, y: rates(y), (t, until), x, "DOP853", rtol=settings.rtol, atol=settings.rtol)
         return np.asarray(found.y[:, -1])
@@ -93,7 +93,7 @@ class Rolling(Tiny):
 
 
 class Jointed:
-    """A tree of joints with one coordinate each, in these coordinates; says nothing of reactions."""
+    """A tree of joints with one coordinate each, in joint coordinates; reports no reactions."""
 
     name: ClassVar[str] = "jointed"
     provides: ClassVar[Mapping[str, frozenset[str]]] = dict.fromkeys(
@@ -146,7 +146,7 @@ class Jointed:
 class Switching(Jointed):
     """A mechanism with efforts at their limits, a stop, or contacts that slide; no event is located.
 
-    An impact on a stop acts at the end of a step, of ``dt`` with an adaptive method, too.
+    An impact on a stop acts at the end of an interval of ``dt``, also with an adaptive method.
     """
 
     name: ClassVar[str] = "switching"

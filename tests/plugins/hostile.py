@@ -1,4 +1,4 @@
-"""Engines that do to their process what an engine must never do; installed by tests under throwaway names."""
+"""Engines that harm their process: they crash, hang, print or patch; tests install them under temporary names."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from proofroll.elements.ball_on_surface.sampling import BallBuilt, BallSample
 
 @dataclass(frozen=True)
 class HostileSettings:
-    """The least that an engine's settings may be."""
+    """Minimal settings of an engine."""
 
     formulation: str = "only"
     preset: str = "matched"
@@ -43,7 +43,7 @@ class HostileSettings:
 
 
 class Oracle:
-    """Well behaved: answers with the closed form, and says so to standard output and standard error."""
+    """Well-behaved engine that answers with the closed form."""
 
     name: ClassVar[str] = "oracle"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {
@@ -82,7 +82,7 @@ class Oracle:
 
 
 class Steady(Oracle):
-    """Closed form; the environment makes the motion faster by a part of it, but for its first twentieth of a second."""
+    """Closed form that runs faster after 0.05 s, by the relative amount in the variable PROOFROLL_TEST_OFF."""
 
     name = "steady"
 
@@ -93,7 +93,7 @@ class Steady(Oracle):
 
 
 class Garbage(Oracle):
-    """Prints what looks like answers, on every stream, and closes standard output."""
+    """Prints text that looks like answers to standard output, invalid UTF-8, and warnings to standard error."""
 
     name = "garbage"
 
@@ -128,7 +128,7 @@ class Segfaults(Oracle):
 
 
 class Hangs(Oracle):
-    """Never comes back, and does not listen to a polite signal."""
+    """Hangs, and ignores SIGTERM."""
 
     name = "hangs"
 
@@ -139,7 +139,7 @@ class Hangs(Oracle):
 
 
 class HangsAloud(Hangs):
-    """Hangs, and tells its process's id to the named pipe of the environment, which that process then keeps open."""
+    """Hangs after writing its process id to the named pipe in the variable HANGS_ALOUD, which it keeps open."""
 
     name = "hangs_aloud"
 
@@ -151,7 +151,7 @@ class HangsAloud(Hangs):
 
 
 class Raises(Oracle):
-    """Raises something over two lines."""
+    """Raises an error with a message of two lines."""
 
     name = "raises"
 
@@ -171,7 +171,7 @@ class SaysExit(Oracle):
 
 
 class NotANumber(Oracle):
-    """Its velocity is NaN from 0.1 s on."""
+    """Reports a velocity of NaN from 0.1 s on."""
 
     name = "not_a_number"
 
@@ -183,7 +183,7 @@ class NotANumber(Oracle):
 
 
 class GivesUp(Oracle):
-    """Says that it diverged."""
+    """Raises Diverged after 0.06 s."""
 
     name = "gives_up"
 
@@ -206,7 +206,7 @@ class Refuses(Oracle):
 
 
 class BlamesMemory(Oracle):
-    """Calls a lack of memory its own divergence."""
+    """Reports a MemoryError as its own divergence."""
 
     name = "blames_memory"
 
@@ -219,7 +219,7 @@ class BlamesMemory(Oracle):
 
 
 class BlamesFile(Oracle):
-    """Calls a file that cannot be read a refusal."""
+    """Reports an unreadable file as a refusal."""
 
     name = "blames_file"
 
@@ -233,7 +233,7 @@ class BlamesFile(Oracle):
 
 
 class Interrupted(Oracle):
-    """Somebody sends it Ctrl-C, which it takes for its own failure."""
+    """Reports an interrupt (Ctrl-C) as its own divergence."""
 
     name = "interrupted"
 
@@ -247,7 +247,7 @@ class Interrupted(Oracle):
 
 
 class Commands(Oracle):
-    """Its message is a command to the terminal."""
+    """Raises an error whose message has control sequences for the terminal."""
 
     name = "commands"
 
@@ -257,7 +257,7 @@ class Commands(Oracle):
 
 
 class JudgesItself(Oracle):
-    """Puts a certificate that always holds in the place of the one that judges it."""
+    """Patches the certificate so that it always holds."""
 
     name = "judges_itself"
 
@@ -267,7 +267,7 @@ class JudgesItself(Oracle):
 
 
 class MovesTheBar(Oracle):
-    """Widens what counts as round-off."""
+    """Patches the certificate's tolerance for round-off to 1."""
 
     name = "moves_the_bar"
 
@@ -277,7 +277,7 @@ class MovesTheBar(Oracle):
 
 
 class SignsForTheBall(Oracle):
-    """Puts lines of its own in the place of an element's, whose module is loaded with it."""
+    """Patches the ball's certificate to have no lines."""
 
     name = "signs_for_the_ball"
 
@@ -286,8 +286,8 @@ class SignsForTheBall(Oracle):
         super().__init__(scene)
 
 
-# Entry points of all of them, and of some that do no harm, so that tests of either share worker processes; "absent"
-# needs a module that nobody has.
+# Entry points of these engines and of some harmless ones, so that tests of both share worker processes. The module of
+# "absent" does not exist.
 ENTRY_POINTS = {
     kind.name: f"hostile:{kind.__name__}"
     for kind in [*vars().values()]

@@ -1,4 +1,4 @@
-"""Further studies of a report with invented numbers."""
+"""Parts of a report with invented numbers: a trade-off, a stability map, a map of regimes, figures."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def measured_point(**more: Any) -> MeasuredPoint:
 
 
 def timed(seconds: float) -> dict[str, Any]:
-    """A cost that was measured six times."""
+    """Fields of a cost that was measured six times [s per simulated second]."""
     interval = (0.9 * seconds, 1.1 * seconds)
     return {"seconds_per_second": seconds, "interval": interval, "rounds": 6 * [seconds], "measurements": 6}
 

@@ -1,4 +1,4 @@
-"""An engine on the ladder of models: reduced equations, with terms that are needed, useless, harmful and refused."""
+"""An engine with models of the ladder: reduced equations, with needed, useless, harmful and refused terms."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from proofroll.core.errors import Refused
 from proofroll.core.scene import Scene
 from proofroll.elements.ball_on_surface.model import ROLLS, BallCapability
 
-# How long no wind blows [s].
+# Time at which the wind starts [s].
 _CALM = 0.01
 
 
 @dataclass(frozen=True)
 class LadderedSettings(TinySettings):
-    """A step, and what can be switched."""
+    """Settings: a step, and switches of the model's terms."""
 
     formulation: Literal["midpoint", "heavier"] = "midpoint"  # type: ignore[assignment]  # more than Tiny has
     second_stage: bool = True
@@ -29,7 +29,7 @@ class LadderedSettings(TinySettings):
 
 
 class Laddered(Tiny):
-    """The midpoint rule, with terms to add that it does not need."""
+    """Rolling ball by the midpoint rule, with switchable terms."""
 
     name: ClassVar[str] = "laddered"
     provides: ClassVar[Mapping[str, frozenset[str]]] = {"midpoint": ROLLS, "heavier": ROLLS}
@@ -49,7 +49,7 @@ class Laddered(Tiny):
 
     @classmethod
     def build(cls, scene: Scene, settings: Any) -> Self:
-        """Not in a storm."""
+        """See :class:`proofroll.core.engine.Engine`; refuses a storm."""
         if settings.wind == "storm":
             raise Refused("no ball rolls in a storm")
         return super().build(scene, settings)
@@ -64,7 +64,7 @@ class Laddered(Tiny):
             stage = self.x + self.dt / 2 * self.rates(self.x) if self.chosen.second_stage else self.x
             for _ in range(5 if self.chosen.idle else 1):
                 rates = self.rates(stage)
-            # Blows upwards by 1 m/s²; had it blown from the start, the first steps would show it
+            # An upward acceleration of 1 m/s²; from the start, it would show in the first steps
             if self.chosen.wind == "gale" and self.t + step * self.dt > _CALM:
                 rates[3] += 1.0
             self.x = self.x + self.dt * rates

@@ -1,6 +1,6 @@
-"""Lies around an honest engine: what its samples, certificate, model or events say that is not so.
+"""Lies around an honest engine: false samples, certificates, models or events.
 
-The engine is the projection method, whose samples are kept: a lie costs what its judges cost.
+The engine is the projection method, with cached samples: a test of a lie costs little more than its judges.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ ALL = (*BALLS, *MECHANISMS, "sled")
 
 @cache
 def scene_of(name: str) -> Scene:
-    """A scene by the kind of its motion."""
+    """Scene of a kind of motion, a key of ``UNTIL``."""
     return _SCENES[name][0]()
 
 
 class _Kept:
-    """A model whose samples and events are kept by time."""
+    """An honest run with a cache of samples and events by time."""
 
     def __init__(self, scene: Scene, settings: Any) -> None:
         self.scene, self.settings = scene, settings
@@ -73,7 +73,7 @@ class _Kept:
         return list(self.engine.events()) if hasattr(self.engine, "events") else []
 
     def at(self, t: float) -> tuple[Any, list[Event]]:
-        """Sample and events so far."""
+        """Sample at a time [s], and events until then."""
         if t not in self.kept:
             if t < self.t:
                 self.engine = Projection.build(self.scene, self.settings)
@@ -87,14 +87,14 @@ _KEPT: dict[tuple[str, str, Any], _Kept] = {}
 
 @dataclass(frozen=True)
 class Moment:
-    """Material of a lie: samples, models and time.
+    """Arguments from which a lie makes its sample.
 
     Attributes:
-        t: time that is asked for [s].
-        right: the honest sample.
-        at: the honest sample at another time.
-        of: the honest sample of another model.
-        scene, until: the scene, and how long it is looked at [s].
+        t: time of the sample [s].
+        right: honest sample at ``t``.
+        at: time [s] -> honest sample.
+        of: change of the scene -> honest sample of the changed scene at ``t``.
+        scene, until: scene, and end of the run [s].
     """
 
     t: float
@@ -117,18 +117,18 @@ class Moment:
 
 @dataclass(frozen=True)
 class Lie:
-    """Lie of an engine about its motion.
+    """A lie of an engine about its motion, and the verdict that it needs.
 
     Attributes:
-        name: in a few words.
-        scenes: kinds of motion that it is about.
-        said: words; the verdict must have one of them; empty: it is far below the tolerance and passes.
-        sample: what of a sample is replaced, by name; or another sample.
-        causes: words; each named cause must have one of them; empty: none may be named.
-        begins: when samples begin to lie [s]; by default after all that the certificate looks at.
-        model: what is built instead of the scene.
-        built: report of the model, from the built one and the honest one.
-        events: reported events, from the honest ones and the end of the run.
+        name: the lie in a few words.
+        scenes: kinds of motion to which it applies.
+        said: texts; the verdict must contain one of them; empty: the lie is far below the tolerance and passes.
+        sample: function to a false sample, or to the false fields of it by name.
+        causes: texts; each named cause must contain one of them; empty: no cause may be named.
+        begins: time of the first false sample [s]; by default after all samples that the certificate reads.
+        model: change of the scene before it is built.
+        built: (certificate data of the changed model, honest ones) -> reported ones.
+        events: (honest events, end of the run [s]) -> reported events.
     """
 
     name: str
@@ -171,7 +171,7 @@ class Liar:
         self.moves = self.true if self.lie.model is None else _Kept(self.lie.model(scene), settings)
 
     def _kept(self, model: Callable[[Scene], Scene] | None) -> _Kept:
-        """The scene, or another model of it; what moves honestly is shared by all lies."""
+        """Honest run of the scene, or of a changed one, shared by all lies."""
         scene = scene_of(self.about)
         key = self.about, repr(self.settings), model
         if key not in _KEPT:

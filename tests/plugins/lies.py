@@ -1,4 +1,4 @@
-"""The table of lies: changes of an honest engine's reports, and the words that the verdict must have."""
+"""Table of lies: changes of an honest engine's reports, with texts that verdict and causes must contain."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from proofroll.elements.mechanism.element import MechanismElement
 
 
 def gravity(magnitude: float) -> Callable[[Scene], Scene]:
-    """The scene with gravity changed by a factor."""
+    """Change of a scene: gravity times a factor."""
 
     def model(scene: Scene) -> Scene:
         (element,) = scene.elements
@@ -31,7 +31,7 @@ def gravity(magnitude: float) -> Callable[[Scene], Scene]:
 
 
 def heavier(part: str, factor: float) -> Callable[[Scene], Scene]:
-    """The scene with mass, or another number, of the ball or of the first body changed by a factor."""
+    """Change of a scene: a number (``mass``, ``inertia``) of the ball or of the first body times a factor."""
 
     def model(scene: Scene) -> Scene:
         (element,) = scene.elements
@@ -47,11 +47,11 @@ def heavier(part: str, factor: float) -> Callable[[Scene], Scene]:
 
 
 def echo(_: Any, true: Any) -> Any:
-    """The scene's own numbers, repeated."""
+    """Certificate data of the honest model instead of those of the changed one; see ``Lie.built``."""
     return true
 
 
-# Words of which one is said of what differs.
+# Texts of verdicts, of which one must appear; further below, those of causes.
 _PLACES, _FIRST, _MODEL = (
     ("positions is", "z is", "gamma is"),
     ("first steps",),
@@ -292,18 +292,18 @@ def _small() -> Iterator[Lie]:
 
 
 def table() -> list[Lie]:
-    """All lies."""
+    """All lies of the table."""
     states = _times, _places, _frames, _velocities, _spins, _orientations
     forces = _forces_of_balls, _reactions_of_joints, _efforts, _forces_of_contacts
     return [lie for part in (*states, *forces, _slips, _models, _small) for lie in part()]
 
 
 def _off_grid(change: Callable[[Moment], Any]) -> Callable[[Moment], Any]:
-    """The change between samples, and no lie at them."""
+    """Lie: the change applies between the regular samples only."""
     return lambda m: {} if abs(m.t / EVERY - round(m.t / EVERY)) < 1e-6 else change(m)
 
 
-# Frames that somebody else may have: slanted against the world's, and with its axes in another order.
+# Rotations to wrong world frames: slanted, and with cyclically permuted axes.
 _SLANTED, _CYCLED = Rotation.from_rotvec([0.1, 0.2, 0.2]), Rotation.from_matrix(np.roll(np.eye(3), 1, axis=0))
 
 
@@ -312,7 +312,7 @@ def _quaternions(turns: Rotation) -> Any:
 
 
 def _in_axes(turn: Rotation) -> Callable[[Moment], Any]:
-    """All vectors and orientations as an engine says them whose world is turned."""
+    """Lie: all vectors and orientations in a rotated world frame."""
 
     def sample(m: Moment) -> dict[str, Any]:
         given = {item.name: getattr(m.right, item.name) for item in dataclasses.fields(m.right)}
@@ -336,7 +336,7 @@ def _beat(m: Moment) -> dict[str, Any]:
 
 
 def _from_first_sample(model: Callable[[Scene], Scene]) -> Callable[[Moment], Any]:
-    """The honest sample of another model."""
+    """Lie: samples of a changed model, while the certificate saw the right one."""
     return lambda m: m.of(model)
 
 
@@ -360,7 +360,7 @@ def _in_body_axes(m: Moment) -> Any:
 
 
 def halve_in_place(scene: Scene) -> Scene:
-    """Gravity of the very scene that was given, by force."""
+    """Halves gravity in the given scene object itself, though it is frozen."""
     (element,) = scene.elements
     if isinstance(element, MechanismElement):
         object.__setattr__(element.mechanism, "gravity", 0.5 * np.asarray(element.mechanism.gravity))

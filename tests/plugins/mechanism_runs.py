@@ -1,4 +1,4 @@
-"""Engines on mechanisms, held against route 1 of the truth."""
+"""Runs of engines on mechanisms, and their errors against route 1 of the truth."""
 
 import dataclasses
 import functools
@@ -12,7 +12,7 @@ from proofroll.elements.mechanism.joint_coordinates import JointCoordinates
 from proofroll.elements.mechanism.rotations import from_quaternion
 from proofroll.files.scene_file import load_scene
 
-# Every formulation for mechanisms: its engine, and the preset that is held against tight bounds.
+# Formulation for mechanisms -> its engine, and the preset for which tests have tight bounds.
 FORMULATIONS = {
     "joints": ("mujoco", "tuned"),
     "redundant": ("exudyn", "tuned"),
@@ -44,7 +44,7 @@ def settings(formulation, **options):
 
 
 def build(formulation, mechanism, **options):
-    """The mechanism in the engine."""
+    """Run of a mechanism in a formulation with its tight preset."""
     engine, chosen = settings(formulation, **options)
     return engine.build(mechanism, chosen)
 

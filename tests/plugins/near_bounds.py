@@ -1,4 +1,4 @@
-"""List of bounds by ``approx``, ``assert_allclose`` and ``<`` that are within a factor of ten of what is seen.
+"""List of bounds by ``approx``, ``assert_allclose`` and ``<`` within a factor of ten of the observed difference.
 
 ``python -m pytest -p near_bounds tests/unit/truth`` prints them at the end, the nearest first: on another processor a
 bound near round-off may be crossed (see "Drill" in CONTRIBUTING.md). Bounds by ``<`` need
@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 _NEAR = 0.1
-# Bounds wider than this part of the value are of a method, not of round-off.
+# Relative bounds above this concern errors of a method, not round-off.
 _ROUND_OFF = 1e-6
 _NUMBER = r"(?<![\w.])(?:np\.float64\()?([-+]?\d+\.?\d*(?:e[-+]?\d+)?)\)?"
 _ORDERED = re.compile(rf"{_NUMBER} (?:<=?|(>=?)) {_NUMBER}")
@@ -25,12 +25,12 @@ seen: dict[str, tuple[float, float]] = {}  # by place: difference over bound, an
 
 
 def note(found: Any, expected: Any, bound: Any) -> None:
-    """Takes a comparison to the list, at the line of the test that makes it."""
+    """Records a comparison under the line of the test that makes it."""
     found, expected, bound = (np.asarray(item, dtype=float) for item in (found, expected, bound))
     with np.errstate(all="ignore"):
         ratio = np.nan_to_num(np.abs(found - expected) / bound, nan=0.0, posinf=0.0)
         size = float(np.max(np.maximum(np.abs(expected), bound), initial=0.0))
-    inside = np.where(ratio <= 1.0, ratio, 0.0)  # what differs on purpose is no bound
+    inside = np.where(ratio <= 1.0, ratio, 0.0)  # values beyond the bound differ on purpose
     part = float(np.max(bound, initial=0.0)) / size if size else 1.0
     frame: Any = sys._getframe(1)
     while frame and ("/tests/" not in frame.f_code.co_filename or frame.f_code.co_filename == __file__):
@@ -41,7 +41,7 @@ def note(found: Any, expected: Any, bound: Any) -> None:
 
 
 def near() -> list[tuple[str, float, float]]:
-    """Places whose bound is near, the nearest first: place, difference over bound, bound over value."""
+    """Near bounds, the nearest first: place, difference over bound, bound over value."""
     found = [(place, *numbers) for place, numbers in seen.items() if numbers[0] > _NEAR]
     return sorted(found, key=lambda item: -item[1])
 
@@ -61,7 +61,7 @@ _equal, _allclose = _Approx.__eq__, np.testing.assert_allclose
 
 
 def pytest_assertion_pass(item: pytest.Item, lineno: int, expl: str) -> None:
-    """Takes ``seen < bound`` with numbers to the list, as parts of 1."""
+    """Records an assertion ``value < bound`` between two numbers; the bound counts as relative to 1."""
     found = _ORDERED.search(expl.partition("\n")[0])
     if found:
         one, other = abs(float(found[1])), abs(float(found[3]))
@@ -73,14 +73,14 @@ def pytest_assertion_pass(item: pytest.Item, lineno: int, expl: str) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_sessionstart() -> Iterator[None]:
-    """Watches both comparisons from here on."""
+    """Patches ``approx`` and ``assert_allclose`` so that they record their comparisons."""
     _Approx.__eq__ = _noted_equal
     np.testing.assert_allclose = _noted_allclose
     return (yield)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Prints the list."""
+    """Prints the list of near bounds."""
     terminalreporter.section("bounds within a factor of ten of what is seen")
     for place, ratio, part in near():
         terminalreporter.line(f"{place}: {ratio:.2f} of its bound, which is {part:.1g} of the value")

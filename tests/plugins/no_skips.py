@@ -1,7 +1,7 @@
-"""Failure of skipped tests where ``PROOFROLL_NO_SKIPS`` is set, as ``.ci/run`` does.
+"""Failure instead of skip for tests if ``PROOFROLL_NO_SKIPS`` is set, as ``.ci/run`` does.
 
-A person may lack an engine, heyoka or a browser; where all of them are installed, a skip would hide that one is not.
-A check of conformance that has nothing to look at raises ``unittest.SkipTest`` and stays one.
+A developer may lack an engine, heyoka or a browser. In CI all are installed, and a skip would hide that one is missing.
+A conformance check that does not apply raises ``unittest.SkipTest``, which stays a skip.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 VARIABLE = "PROOFROLL_NO_SKIPS"
-# What no installation mends.
+# Reasons of skips that no installation changes.
 _EXCUSED = ("root may write anywhere", "this system lets nobody mount a small disk")
 
 

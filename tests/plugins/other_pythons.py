@@ -1,4 +1,4 @@
-"""Other interpreters for tests, made without a network: environments that see the packages of this one."""
+"""Virtual environments for tests, made without a network; they can import the packages of this one."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ PLUGINS = Path(__file__).parent
 
 
 def bare(folder: Path) -> Path:
-    """The Python of an environment that has no packages."""
+    """Creates an environment without packages; returns its Python."""
     venv.create(folder, symlinks=True)
     return folder / "bin" / "python"
 
 
 def site_of(python: Path) -> Path:
-    """Folder of the packages of an environment."""
+    """Folder ``site-packages`` of an environment."""
     (found,) = python.parents[1].glob("lib/python*/site-packages")
     return found
 
 
 def seeing(folder: Path, aged: str = "") -> Path:
-    """The Python of an environment that sees our packages, and the engine ``aged`` in a version of its own."""
+    """Creates an environment with our packages, and with the engine ``aged`` in a version; returns its Python."""
     python = bare(folder)
     site = site_of(python)
     (site / "ours.pth").write_text(f"{PLUGINS}\n{seen_line()}\n")
@@ -32,7 +32,7 @@ def seeing(folder: Path, aged: str = "") -> Path:
 
 
 def seen_line() -> str:
-    """A line of a .pth file by which another environment sees our packages."""
+    """Line of a .pth file with which an environment imports our packages."""
     return f"import site; site.addsitedir({sysconfig.get_path('purelib')!r})"
 
 
@@ -45,7 +45,7 @@ def announce(site: Path, version: str) -> None:
 
 
 def script(path: Path, text: str) -> Path:
-    """A program of the shell."""
+    """Writes an executable shell script; returns its path."""
     path.write_text(f"#!/bin/sh\n{text}\n")
     path.chmod(0o755)
     return path

@@ -1,4 +1,4 @@
-"""Content as somebody malicious would write it: markup, handlers and templates in every string and in every name."""
+"""Malicious content for a report: markup, handlers and templates in every string and in every name."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from typing import Any
 from proofroll.core.verdict import Verdict
 from proofroll.running.case import Status
 
-# What the code of the report itself says or compares with; nobody else can write these.
+# Strings that only our own code writes, and compares with.
 OUR_WORDS = frozenset({*Verdict, *Status, "well-posed", "agree", "disagree", "model form", "time step"})
 
 
 @dataclass
 class Poison:
-    """Poisons each string in its own way, equal strings alike, and remembers how.
+    """Poisons strings, each with its own number, so that a script that runs reveals its string.
 
     Attributes:
-        doses: what was given to which string.
-        said: the strings that describe something; the others are names of entries only.
+        doses: string -> number of its poison.
+        said: strings that are values; other strings of ``doses`` are names of entries only.
     """
 
     doses: dict[str, str] = field(default_factory=dict)
     said: set[str] = field(default_factory=set)
 
     def dose(self, text: str) -> str:
-        """A string with its poison: whatever runs tells which string it was, and so do elements made of it."""
+        """The string with its poison; scripts that run, and elements that are made, have its number."""
         number = self.doses.setdefault(text, str(len(self.doses)))
         did = f"(window.poisoned ??= []).push({number})"
         return (
@@ -35,14 +35,13 @@ class Poison:
         )
 
     def content(self, value: Any, *, names: bool = True) -> Any:
-        """Data with poison in every string that is not a word of our own, and under poisoned names besides.
+        """Copy of data with poison in every string except our own words; entries are repeated under poisoned names.
 
-        Where the page knows the names of an entry, those it does not know change nothing; where it lists whatever
-        names there are, it lists the poisoned ones too.
+        A page that looks up known names ignores the repeated entries; one that lists all names shows them.
 
         Args:
             value: records, or what :mod:`json` can write.
-            names: also the names of entries.
+            names: True to repeat entries under poisoned names.
         """
         if isinstance(value, dict):
             found = {name: self.content(item, names=names) for name, item in value.items()}

@@ -1,4 +1,4 @@
-"""Readers of robot files that do their worst."""
+"""Faulty readers of robot files: they refuse, crash, hang or give invalid answers."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Raising:
-    """Refuses with an error of its own."""
+    """Reader that raises an error with markup and line breaks in its text."""
 
     kinds: ClassVar[tuple[str, ...]] = ("urdf",)
     options: ClassVar[Mapping[str, str]] = {}
@@ -19,35 +19,35 @@ class Raising:
     says: ClassVar[str] = ""
 
     def version(self) -> str:
-        """A version."""
+        """See :class:`proofroll.robots.protocol.RobotReader`."""
         return "9.9"
 
     def read(self, _: Any) -> Any:
-        """Raises, with markup and line breaks in its words."""
+        """Raises RuntimeError."""
         raise RuntimeError("cannot <b>read</b>\n[bold]this[/bold]")
 
 
 class Crashing(Raising):
-    """Ends its process."""
+    """Reader that ends its process."""
 
     def read(self, _: Any) -> Any:
-        """Aborts."""
+        """Aborts the process."""
         os.abort()
 
 
 class Hanging(Raising):
-    """Never answers."""
+    """Reader that never answers."""
 
     def read(self, _: Any) -> Any:
-        """Sleeps."""
+        """Sleeps for 1000 s."""
         time.sleep(1000)
 
 
 class Odd(Raising):
-    """Answers with two joints of one name."""
+    """Reader that reports two joints of the same name."""
 
     def read(self, request: Any) -> Any:
-        """A reading whose second joint is called as the first."""
+        """Reading with two joints of the same name."""
         from proofroll.robots.protocol import Reading
 
         count = request.states.count
@@ -56,10 +56,10 @@ class Odd(Raising):
 
 
 class Misshapen(Raising):
-    """Answers with arrays of another number of states."""
+    """Reader whose arrays have a wrong number of states."""
 
     def read(self, request: Any) -> Any:
-        """A reading with poses of twice as many states as were asked."""
+        """Reading with poses for twice the requested number of states."""
         from proofroll.robots.protocol import Reading
 
         count = request.states.count
@@ -71,8 +71,8 @@ class Misshapen(Raising):
 
 
 class Broken(Raising):
-    """Has a mistake of its own."""
+    """Reader with a programming mistake."""
 
     def read(self, _: Any) -> Any:
-        """Asks for what is not there."""
+        """Reads an attribute that does not exist."""
         return self.nothing_of_that_name

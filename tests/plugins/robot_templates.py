@@ -1,4 +1,4 @@
-"""Small URDF and MJCF files: an arm of three links whose every number is unlike the others, with parts put in."""
+"""Small URDF and MJCF files of an arm, without equal numbers or symmetries, with optional parts inserted."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def urdf(
     """A URDF: base, shoulder, slide, tip, and a tool fixed to the tip.
 
     Args:
-        tip: inertial of the tip; None: an ordinary one.
+        tip: <inertial> of the tip; None: an ordinary one.
         tool: content of the tool's link.
-        first: put into the first joint.
-        second: put into the second joint.
-        third: put into the third joint.
-        kinds: of the joints.
-        extra: put into the robot.
+        first: content added to the first joint.
+        second: content added to the second joint.
+        third: content added to the third joint.
+        kinds: types of the joints.
+        extra: content added to <robot>.
     """
     limit = '<limit lower="-1.5" upper="1.2" effort="10" velocity="3"/>'
     return f"""<robot name="arm">
@@ -74,14 +74,14 @@ def mjcf(
     """An MJCF: an arm of two bodies with shapes.
 
     Args:
-        compiler: attributes of that element.
-        option: attributes of that element.
+        compiler: attributes of <compiler>.
+        option: attributes of <option>.
         joint: attributes of the first joint.
         second: joints of the second body.
         shape: attributes of the second body's shape.
-        base: put into the first body.
-        extra: put into the world.
-        actuator: content of that element.
+        base: content added to the first body.
+        extra: content added to <worldbody>.
+        actuator: content of <actuator>.
     """
     return f"""<mujoco model="arm"><compiler {compiler}/><option {option}/>
 <worldbody><body name="upper" pos="0.1 0.2 0.3" euler="10 20 30">{base}

@@ -1,1 +1,1 @@
-"""Figures of an article drawn from our own runs, and the numbers that its text states held against them."""
+"""Figures of an article drawn from our own runs, and checks of the numbers that its text states."""

@@ -1,4 +1,4 @@
-"""Figures of an article from our own runs, with what it states checked."""
+"""Command `figures`: draws the figures of an article from our own runs and checks its statements."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class Form(StrEnum):
-    """Forms of a file."""
+    """Formats of a figure's file."""
 
     SVG = "svg"
     PNG = "png"
@@ -61,7 +61,7 @@ def figures(
 
 
 def _maps(name: str, jobs: int | None) -> list[xr.Dataset]:
-    """The regime maps of a study, with a progress bar of their own."""
+    """Regime maps of a study, computed with a progress bar."""
     import os
 
     from proofroll.ball_studies.regimes import load_regimes, regime_maps

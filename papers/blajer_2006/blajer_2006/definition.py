@@ -1,4 +1,4 @@
-"""File of figures: runs, figures of them, and an article's statements about them."""
+"""Content of a file of figures: runs, figures of them, and an article's statements about them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ CRITERIA = ("stated", "at_most", "below", "above", "order", "events")
 
 @dataclass(frozen=True)
 class PlannedRun:
-    """A run that figures and statements refer to.
+    """A run, to which figures and statements refer by name.
 
     Attributes:
-        label: for a legend; mathematics between dollar signs.
-        parameters: of the scene.
+        label: text in a legend; mathematics between dollar signs.
+        parameters: parameters of the scene.
     """
 
     label: str
@@ -29,8 +29,8 @@ class HorizontalLine:
     """A horizontal line.
 
     Attributes:
-        value: where, in the panel's unit.
-        label: beside it.
+        value: height of the line, in the panel's unit.
+        label: text beside it.
     """
 
     value: float
@@ -42,16 +42,16 @@ class Panel:
     """One pair of axes.
 
     Attributes:
-        y: quantities that are drawn.
+        y: quantities of the ordinate.
         runs: names of the runs that are drawn.
-        x: quantity against which; time by default.
-        title: for a person.
-        label: of the ordinate instead of all symbols; mathematics between dollar signs.
+        x: quantity of the abscissa; time by default.
+        title: title of the panel.
+        label: label of the ordinate, by default all its symbols; mathematics between dollar signs.
         equal: one scale for both axes.
         zero: the ordinate begins at zero.
         share: panels with the same text share the range of y.
         levels: horizontal lines.
-        events: mark what happened in the first run.
+        events: mark the events of the first run.
         truth: also draw the truth's samples.
     """
 
@@ -73,12 +73,12 @@ class Figure:
     """One figure: panels of runs, or regime maps.
 
     Attributes:
-        name: of its file, without ending.
-        caption: for a person.
-        panels: in reading order.
-        columns: of panels.
-        height: of a row of panels [inch].
-        until: what is drawn [s]; everything by default.
+        name: name of its file, without ending.
+        caption: caption of the figure.
+        panels: panels in reading order.
+        columns: number of columns of panels.
+        height: height of a row of panels [inch].
+        until: end of the drawn time [s]; by default the end of the runs.
         regimes: name of the study of regimes whose maps it shows, instead of panels.
     """
 
@@ -96,19 +96,19 @@ class Statement:
     """Statement of an article, or of this project, about runs: one quantity, one measure of it, and one criterion.
 
     Attributes:
-        says: for a person.
+        says: the statement as a sentence.
         source: place of the statement.
-        ours: it is this project's, and not the article's.
-        runs: each must fulfil it by itself; with ``order`` they are held against each other.
-        of: quantity; not for ``events``.
-        measure: of the quantity (:data:`blajer_2006.measures.MEASURES`); ``every`` means all its samples.
-        stated: a number with the digits that the source gives; what is found must round to it.
+        ours: true for a statement of this project, not of the article.
+        runs: runs that must fulfil it, each by itself; with ``order`` they are compared with each other.
+        of: quantity; none for ``events``.
+        measure: measure of the quantity (:data:`blajer_2006.measures.MEASURES`); ``every`` means all its samples.
+        stated: a number with the digits that the source gives; the measured value must round to it.
         at_most, below, above: bounds, in the unit of the measure.
-        because: why this bound, where the source gives no number.
-        order: of the measures from the first run to the last.
+        because: reason for this bound, where the source gives no number.
+        order: order of the measured values from the first run to the last.
         events: kinds of the events of the run, in order.
-        event: number of the event whose time [s] is ``stated``, from 0, instead of a measure.
-        until: only what is before counts [s].
+        event: number of an event, from 0; its time [s] is ``stated`` instead of a measure.
+        until: end of the time that counts [s].
     """
 
     says: str
@@ -129,29 +129,29 @@ class Statement:
 
     @property
     def criteria(self) -> list[str]:
-        """Names of the criteria that are given; exactly one, once the file has been checked."""
+        """Names of the given criteria; exactly one in a file that has been checked."""
         return [name for name in CRITERIA if getattr(self, name) not in (None, "", [])]
 
 
 @dataclass(frozen=True)
 class Figures:
-    """A file.
+    """A file of figures.
 
     Attributes:
-        name: of the file, without ending.
-        title, source: for a person; the article.
-        scene: of every run.
-        engine: that draws the figures unless the user names another, ``name[key=value,…]``.
+        name: name of the file, without ending.
+        title, source: title of the study, and its article.
+        scene: scene of every run.
+        engine: engine whose runs are drawn unless the user names another, ``name[key=value,…]``.
         until, every: last time and sampling interval of every run [s].
         start_angles: Euler angles φ, θ, ψ of the body's axes at time 0 [rad].
         symbols: quantity -> symbol of the article, as TeX mathematics.
-        runs: by name.
-        figures: in the order of the article.
-        statements: what is checked.
-        time_limit: wall seconds a run may take [s].
+        runs: runs by name.
+        figures: figures in the order of the article.
+        statements: statements that are checked.
+        time_limit: limit for each run [s].
     """
 
-    question: ClassVar[str] = ""  # a report's entry has one; the title says what is asked here
+    question: ClassVar[str] = ""  # part of a report's entry; here the title says enough
     name: str
     title: str
     source: str
@@ -168,7 +168,7 @@ class Figures:
 
     @property
     def wants_orientation(self) -> bool:
-        """True if anything asks for the Euler angles."""
+        """True if a figure or a statement needs the Euler angles."""
         drawn = {name for figure in self.figures for panel in figure.panels for name in (panel.x, *panel.y)}
         return bool((drawn | {item.of for item in self.statements}) & set(ANGLES))
 

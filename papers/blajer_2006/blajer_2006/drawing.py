@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawn
 
-# Samples of the truth over the curves of one row: enough to see that they lie on them, few enough to see the curves.
+# Number of marks of the truth over the panels of a row: enough to compare, few enough to see the curves.
 _TRUTH_MARKS = 66
-# A curve that varies by less than this part of its size is constant, and its axis does not magnify its round-off.
+# A curve that varies by less than this part of its size counts as constant, and its axis spans ± the second part.
 _CONSTANT, _ROOM = 1e-3, 0.05
 
 
@@ -30,26 +30,26 @@ def picture(wanted: Figure, study: FigureRuns, form: str) -> bytes:
     """A figure with panels as the content of a file: ``svg``, ``png`` or ``pdf``.
 
     Raises:
-        InputError: some text of the figure is no mathematics that can be drawn.
+        InputError: a text of the figure has mathematics that matplotlib cannot draw.
         Missing: matplotlib is not installed.
     """
     with styled(style.SETTINGS):
         made = drawn(wanted, study)
-    said = {"Title": wanted.name, "Subject" if form == "pdf" else "Description": wanted.caption}
+    metadata = {"Title": wanted.name, "Subject" if form == "pdf" else "Description": wanted.caption}
     try:
-        return drawn_file(form, style.SETTINGS, lambda: made, style.PIXELS_PER_INCH, said)
+        return drawn_file(form, style.SETTINGS, lambda: made, style.PIXELS_PER_INCH, metadata)
     except ValueError as error:  # mathematics is read only when it is drawn
         reason = " ".join(str(error).split())[:200]
         raise InputError(f"figure {wanted.name}", "text", f"its text cannot be drawn: {reason}") from None
 
 
 def inline(wanted: Figure, study: FigureRuns, prefix: str) -> str:
-    """A figure with panels as an element of a page whose ids begin with ``prefix``."""
+    """SVG element of a figure with panels for a page; its ids begin with ``prefix``."""
     return element(picture(wanted, study, "svg").decode(), prefix)
 
 
 def drawn(wanted: Figure, study: FigureRuns) -> Drawn:
-    """The figure as a matplotlib figure; in the style that is set (:func:`styled`)."""
+    """The matplotlib figure of a figure with panels, in the current style (see :func:`styled`)."""
     from matplotlib.figure import Figure as New
 
     rows, columns = -(-len(wanted.panels) // wanted.columns), wanted.columns
@@ -78,7 +78,7 @@ def drawn(wanted: Figure, study: FigureRuns) -> Drawn:
 
 
 def _pad(panel: Panel, named: bool) -> float:
-    """Points between the axes and the title: room for the names of events, or for a key of several runs."""
+    """Distance of the title from the axes [points], with room for the names of events or for a legend."""
     if named:
         return 22
     return 16 if len(panel.runs) > 1 and not panel.events else 4
@@ -163,7 +163,7 @@ def _symbol(name: str, study: FigureRuns) -> str:
 
 
 def _events(axes: Axes, made: FigureRun, wanted: Figure, *, named: bool) -> None:
-    """Shades where the ball slips and marks each change; ``named``: with kind and time above the axes."""
+    """Shades times of slip and marks each event; ``named``: with its kind and time above the axes."""
     if made.dataset is None:
         return
     end = min(wanted.until or np.inf, float(made.dataset[TIME][-1]))
@@ -181,7 +181,7 @@ def _events(axes: Axes, made: FigureRun, wanted: Figure, *, named: bool) -> None
 
 
 def _legend(figure: Drawn, wanted: Figure, study: FigureRuns) -> None:
-    """Says once what lines and marks are."""
+    """Adds a legend for lines and marks below the figure."""
     from matplotlib.lines import Line2D
 
     marked = any(panel.truth for panel in wanted.panels) and study.truths is not study.runs

@@ -1,4 +1,4 @@
-"""Holds what a file states against the runs: found, stated, and whether it holds to the digits stated."""
+"""Judgement of a file's statements: measured and stated values, and whether these agree to the stated digits."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ _BOUNDS: dict[str, tuple[str, Callable[[float, float], bool]]] = {
     "below": ("<", operator.lt),
     "above": (">", operator.gt),
 }
-# A decimal fraction is not a double: half a unit of the last digit is that, and its round-off.
+# Half a unit of the last digit, and a margin for the round-off of a double.
 _HALF = Decimal("0.5") * (1 + Decimal("1e-9"))
 
 
 def judged(study: FigureRuns) -> list[dict[str, Any]]:
     """One entry for each statement and run, or for each statement about the order of runs.
 
-    Each has ``says``, ``source``, ``ours``, ``defined`` (what its measure means), ``because``, ``runs``, ``of``,
-    ``measure``, ``unit``, ``stated`` (text), ``found`` by the engine, ``truth`` (what the truth gives)
-    and ``holds``; None where the engine cannot say, and ``why``.
+    Each has ``says``, ``source``, ``ours``, ``defined`` (definition of its measure), ``because``, ``runs``, ``of``,
+    ``measure``, ``unit``, ``stated`` (text), ``found`` (value of the engine), ``truth`` (value of the truth) and
+    ``holds``; ``found`` and ``holds`` are None if the engine has no such value, and ``why`` is the reason.
     """
     return [
         _entry(study, item, runs)
@@ -45,7 +45,7 @@ def judged(study: FigureRuns) -> list[dict[str, Any]]:
 
 
 def rounds_to(value: float, stated: str) -> bool:
-    """True if a number is the stated one to the digits that are written: off by half a unit of the last at most."""
+    """True if a number rounds to the stated one: it differs by at most half a unit of the last stated digit."""
     number = Decimal(stated)
     exponent = number.as_tuple().exponent
     assert isinstance(exponent, int)  # finite, as the file was checked for
@@ -90,7 +90,7 @@ def _stated(item: Statement) -> str:
 
 
 def _found(item: Statement, made: list[FigureRun]) -> Measured:
-    """Measured values of the runs; None where one of them has none."""
+    """Measured value of a run, or values of several runs for ``order``; None: a run has none."""
     values = [_value(item, run) for run in made]
     if item.order:
         numbers = [value for value in values if isinstance(value, float)]
@@ -112,7 +112,7 @@ def _value(item: Statement, made: FigureRun) -> Measured:
 
 
 def _happened(item: Statement, dataset: xr.Dataset) -> Measured:
-    """The kinds of the events, or the time [s] of one; nan where it did not happen."""
+    """Kinds of the events, or the time of one [s], NaN if it did not happen; None: the run has no events."""
     if "event_kind" not in dataset:
         return None
     events = [event for event in events_of(dataset) if item.until is None or event.time <= item.until]
@@ -135,7 +135,7 @@ def _holds(item: Statement, found: Measured) -> bool:
 
 
 def _reasons(study: FigureRuns, item: Statement, runs: list[str]) -> Iterator[str]:
-    """Reasons that no value was found."""
+    """Reasons for a missing value: runs that failed, or a quantity that the engine does not give."""
     for name in runs:
         result = study.runs[name].result
         if not study.runs[name].done:

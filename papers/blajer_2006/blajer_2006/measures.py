@@ -1,4 +1,4 @@
-"""Single numbers that sum up a curve, so that a sentence of an article can be held against a run."""
+"""Measures: single numbers that characterise a curve, to compare sentences of an article with a run."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from scipy.optimize import minimize_scalar
 
 from proofroll.core.arrays import FloatArray
 
-# A swing smaller than this part of the whole range is no oscillation of the path but noise of an engine.
+# Least swing that counts as an oscillation, as a part of the range; smaller ones are noise of an engine.
 _PROMINENCE = 0.1
-_FREQUENCY_BAND = (0.8, 1.25)  # around the guess from the extremes, which is off by a few per cent
+_FREQUENCY_BAND = (0.8, 1.25)  # around the estimate from the extremes, which has an error of a few per cent
 
 
 def _turns(values: FloatArray) -> np.typing.NDArray[np.intp]:
-    """Samples at which the curve turns round, in the order of time."""
+    """Indices of local maxima and minima, in the order of time."""
     from scipy.signal import find_peaks  # half a second, which every report would pay
 
     prominence = _PROMINENCE * float(np.ptp(values))
@@ -25,18 +25,18 @@ def _turns(values: FloatArray) -> np.typing.NDArray[np.intp]:
 
 
 def extremes(values: FloatArray) -> FloatArray:
-    """The curve's inner maxima and minima in the order of time, shape (k,), between samples by a parabola."""
+    """Values of the curve's inner maxima and minima in the order of time, shape (k,), interpolated by parabolas."""
     at = _turns(values)
-    before, here, after = values[at - 1], values[at], values[at + 1]
-    bend = before - 2 * here + after
-    return np.asarray(here - np.divide((after - before) ** 2, 8 * bend, out=np.zeros_like(here), where=bend != 0))
+    before, peak, after = values[at - 1], values[at], values[at + 1]
+    bend = before - 2 * peak + after
+    return np.asarray(peak - np.divide((after - before) ** 2, 8 * bend, out=np.zeros_like(peak), where=bend != 0))
 
 
 def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
-    """The best sinusoid about a constant level: its angular frequency [rad/s] and its misfit [-].
+    """Angular frequency [rad/s] and misfit [1] of the best sinusoid about a constant level.
 
-    The misfit is the root mean square of what it leaves, over its amplitude. Level, sine and cosine are linear and
-    are eliminated; the frequency is searched near the one that the extremes tell.
+    The misfit is the root mean square of the residual over the amplitude. Level, sine and cosine are linear and are
+    eliminated; the frequency is searched near the one estimated from the extremes.
     """
     turns = _turns(values)
     if turns.size < 2:
@@ -61,7 +61,7 @@ def sinusoid(times: FloatArray, values: FloatArray) -> tuple[float, float]:
 
 
 def _halves(of: Callable[[FloatArray], float], values: FloatArray) -> tuple[float, float]:
-    """Values of a function for the first half of the curve, and for the second."""
+    """A function's value for the first half of the curve, and for the second."""
     return float(of(values[: values.size // 2])), float(of(values[values.size // 2 :]))
 
 
@@ -71,10 +71,10 @@ def _first_extreme(values: FloatArray) -> float:
 
 
 def _centred(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Amplitude and mean level of each swing, shape (k - 2,).
+    """Amplitudes and mean levels of swings, shape (k - 2,) each, k the number of extremes.
 
-    Each inner extreme is held against the mean of its two neighbours: a drift of the level, which lengthens every
-    swing one way and shortens every swing back, then moves neither, nor does a growing amplitude tilt the level.
+    Each inner extreme is compared with the mean of its two neighbours. So a linear drift of the level does not change
+    the amplitudes, and a linear growth of the amplitude does not change the levels.
     """
     turning_points = extremes(values)
     outer, inner = (turning_points[:-2] + turning_points[2:]) / 2, turning_points[1:-1]
@@ -106,9 +106,9 @@ class Measure:
     """A measure of a curve.
 
     Attributes:
-        value: from times [s] and values, each of shape (time,).
-        unit: its own; None: the curve's.
-        definition: what a person has to know to find the same number.
+        value: function of times [s] and values, each of shape (time,).
+        unit: unit of the measure; None: that of the curve.
+        definition: definition for a reader; empty: the name says enough.
     """
 
     value: Callable[[FloatArray, FloatArray], float]
@@ -117,7 +117,7 @@ class Measure:
 
 
 def _of_values(value: Callable[[FloatArray], float], unit: str | None = None, definition: str = "") -> Measure:
-    """A measure that does not hang on the times."""
+    """Measure that depends on the values only, not on their times."""
     return Measure(lambda _, values: float(value(values)), unit, definition)
 
 
@@ -154,7 +154,7 @@ MEASURES: Mapping[str, Measure] = {
 
 
 def measured(measure: str, times: FloatArray, values: FloatArray) -> float:
-    """The number; nan where the curve has too few oscillations for it or is not finite."""
+    """Value of a measure for a curve; NaN if the curve has too few oscillations or is not finite."""
     if not values.size or not np.all(np.isfinite(values)):
         return float("nan")
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class FiguresPart(Part):
-    """Figures of an article from our own runs, and what it states."""
+    """Section of a report: figures of an article from our own runs, and its statements."""
 
     kind: ClassVar[str] = STUDY
     key: ClassVar[str] = "figures"
@@ -38,7 +38,7 @@ class FiguresPart(Part):
 
     @classmethod
     def load(cls, path: Path, engines: Sequence[str]) -> FiguresPart:  # noqa: ARG003 -- a file names its own engine
-        """See the protocol."""
+        """See :class:`proofroll.report.parts.Part`."""
         return cls(load_figures(str(path)))
 
     @staticmethod
@@ -47,7 +47,7 @@ class FiguresPart(Part):
         return statement_tables.count(entry.study["statements"])
 
     def make(self, runner: Runner, out: Path, tell: Tell) -> None:  # noqa: ARG002 -- the protocol's
-        """Makes the runs and the maps."""
+        """Makes the runs and regime maps."""
         from blajer_2006.study import run_figures
         from proofroll.ball_studies.regimes import load_regimes, regime_maps
 
@@ -58,17 +58,17 @@ class FiguresPart(Part):
             )
 
     def entry(self) -> PartEntry:
-        """Captions, runs and statements."""
+        """Entry of the report with captions, runs and statements."""
         from blajer_2006.writing import figures_content
 
         assert self.study is not None  # it was made
         content = figures_content(self.study, self.maps)
         wrong = [item for item in content["statements"] if item["holds"] is False]
-        said = [f"{item['says']} ({', '.join(item['runs'])}): {item['found']}, not {item['stated']}" for item in wrong]
-        return PartEntry(**self.head, study=content, contradictions=said, lost=content["lost"])
+        false = [f"{item['says']} ({', '.join(item['runs'])}): {item['found']}, not {item['stated']}" for item in wrong]
+        return PartEntry(**self.head, study=content, contradictions=false, lost=content["lost"])
 
     def pictures(self, prefix: str) -> dict[str, str]:
-        """One for each figure."""
+        """SVG elements by name of their figure; ids begin with ``prefix``."""
         from blajer_2006.drawing import inline
         from proofroll.ball_studies.report.regime_map import inline as inline_map
 

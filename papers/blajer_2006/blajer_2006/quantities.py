@@ -1,4 +1,4 @@
-"""Curves over time that a figure may draw or a statement may be about, by name."""
+"""Quantities of figures and statements by name: curves over time from a trajectory."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Rotation, nutation and precession, in the order in which scipy gives them last, second and first.
 ANGLES = ("psi", "theta", "phi")
 TIME = "time"
-# Variables of a trajectory whatever the surface is.
+# Variables of a trajectory on any surface.
 _STORED = {
     "omega1": "rad/s", "omega2": "rad/s", "omega3": "rad/s", "slip2": "m/s", "slip3": "m/s", "N": "N", "F2": "N",
     "F3": "N", "needed_friction": "1", "gap": "m", "energy": "J",
@@ -29,11 +29,11 @@ _STORED = {
 
 @dataclass(frozen=True)
 class Derived:
-    """A curve that follows from a trajectory.
+    """A curve that is computed from a trajectory.
 
     Attributes:
-        unit: of its values.
-        values: from the scene's ball and the trajectory, shape (time,); raises KeyError where the engine cannot say.
+        unit: unit of its values.
+        values: (the scene's ball, trajectory) -> values, shape (time,); raises KeyError if the engine lacks a variable.
     """
 
     unit: str
@@ -74,13 +74,13 @@ def known(body: RollingBall) -> dict[str, str]:
 
 
 def quantity(name: str, body: RollingBall, dataset: xr.Dataset, start: Sequence[float]) -> FloatArray | None:
-    """The curve of that name over the trajectory's samples, shape (time,); None: the engine cannot say.
+    """Values of a quantity at the trajectory's samples, shape (time,); None: the trajectory does not have it.
 
     Args:
         name: one of :func:`known`.
         body: the scene's ball.
         dataset: the trajectory.
-        start: Euler angles φ, θ, ψ of the body's axes at time 0 [rad], for no quaternion tells them.
+        start: Euler angles φ, θ, ψ of the body's axes at time 0 [rad], where every run's quaternion is the identity.
     """
     if name in ANGLES:
         return euler_angles(dataset["q_WB"].to_numpy(), start)[ANGLES.index(name)] if "q_WB" in dataset else None

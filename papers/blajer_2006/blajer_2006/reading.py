@@ -1,4 +1,4 @@
-"""Reads the files that define figures: ``study = "figures"``."""
+"""Reading of files that define figures (``study = "figures"``)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def load_figures(name: str) -> Figures:
     """Reads a file by its path, its name, or the scene that it is about.
 
     Raises:
-        InputError: there is none, it is broken, or it is about something else.
+        InputError: there is no such file, it is invalid, or it is of another study.
     """
     path, content = study_file(name, STUDY)
     figures = validated(Figures, {**content, "name": path.stem}, path.name)
@@ -32,7 +32,7 @@ def load_figures(name: str) -> Figures:
 
 
 def _check(where: str, found: Figures) -> None:
-    """Checks beyond the types."""
+    """Raises InputError if times, names or parameters in a file are invalid."""
     time_grid(found.until, found.every)
     for name, planned in found.runs.items():
         try:

@@ -1,4 +1,4 @@
-"""The statements of an article as rows of a page and of the terminal."""
+"""Statements of an article as rows of tables on a page and on the terminal."""
 
 from __future__ import annotations
 
@@ -55,19 +55,19 @@ def statement_table(content: dict[str, Any]) -> Table:
     table = plain_table(
         Column("statement"), *unbroken("run"), *numeric("stated"), found_column, *unbroken(""), title=content["title"]
     )
-    said = ""
+    before = ""
     for item in content["statements"]:
         sign, look = _SIGNS[item["holds"]]
-        # The order of runs is told by the found numbers; their names are in the JSON.
+        # Several runs are compared by order: the numbers show it, and the names of runs are in the JSON.
         runs = item["runs"][0] if len(item["runs"]) == 1 else f"{len(item['runs'])} runs"
         table.add_row(
-            Text("" if item["says"] == said else item["says"]),
+            Text("" if item["says"] == before else item["says"]),
             Text(runs),
             Text(item["stated"]),
             Text(_said(item["found"], unit(item["unit"]))),
             Text(sign, style=look),
         )
-        said = item["says"]
+        before = item["says"]
     return table
 
 

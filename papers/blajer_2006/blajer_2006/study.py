@@ -1,4 +1,4 @@
-"""Makes the runs that figures are drawn from: one engine, and the truth beside it."""
+"""Runs from which figures are drawn: those of one engine, and the same runs of the truth."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ TRUTH = "truth"
 
 @dataclass(frozen=True)
 class FigureRun:
-    """One run in one engine.
+    """One run of an engine or of the truth.
 
     Attributes:
         body: the scene's ball with the run's parameters.
-        result: how it ended.
-        dataset: its trajectory up to where it ended; None if there is none.
+        result: result of the run.
+        dataset: trajectory up to the run's end; None if there is none.
         start: Euler angles φ, θ, ψ of the body's axes at time 0 [rad].
     """
 
@@ -45,11 +45,11 @@ class FigureRun:
 
     @property
     def done(self) -> bool:
-        """True if it reached its end."""
+        """True if the run reached its intended end."""
         return self.result.status is Status.DONE and self.dataset is not None
 
     def curve(self, name: str, until: float | None = None) -> FloatArray | None:
-        """A quantity up to a time [s], shape (time,); None: this engine cannot say, or there is no trajectory."""
+        """A quantity up to a time [s], shape (time,); None: it is not in the trajectory, or there is none."""
         if self.dataset is None:
             return None
         values = quantity(name, self.body, self.dataset, self.start)
@@ -65,9 +65,9 @@ class FigureRuns:
     Attributes:
         figures: the file.
         facts: the engine with complete settings.
-        runs: of the engine, by name.
-        truths: of the truth, by name.
-        units: of every quantity.
+        runs: runs of the engine, by name.
+        truths: runs of the truth, by name.
+        units: unit of every quantity.
     """
 
     figures: Figures
@@ -101,7 +101,7 @@ def run_figures(
     engine: str | None = None,
     progress: Callable[[Case, Result], None] | None = None,
 ) -> FigureRuns:
-    """Runs every case of a file in one engine and in the truth; what is stored is reused.
+    """Runs every case of a file in one engine and in the truth; stored results are reused.
 
     Raises:
         InputError, Missing: the engine does not exist or is not installed.
@@ -113,7 +113,7 @@ def run_figures(
             raise facts_of
     assert isinstance(facts, EngineFacts)  # for the type checker, as the next line
     assert isinstance(truth, EngineFacts)
-    # Asked for only of an engine that has it: without it all but the angles can still be drawn.
+    # Orientation is requested only of an engine that has it: without it all but the angles can still be drawn.
     formulation = str(facts.settings.get("formulation"))
     provided = () if spec.name == TRUTH else describe(spec.name, runner.workers).provides[formulation]
     asks = (ORIENTATION,) if BallCapability.ORIENTATION in provided and figures.wants_orientation else ()
@@ -133,8 +133,8 @@ def run_figures(
 
 
 def _turned(parameters: dict[str, float]) -> tuple[str, ...]:
-    """Questions to the truth that make thousands of samples cheap."""
-    # Against resistance DOP853 would end a step at each of them; the routes with the orientation are read in between.
+    """Requests to the truth (``asks`` of the scene) with which thousands of samples are cheap."""
+    # With rolling resistance DOP853 would end a step at each sample; routes with orientation interpolate inside steps.
     return (ORIENTATION,) if parameters.get("rolling_resistance") else ()
 
 
@@ -151,7 +151,7 @@ def _made(figures: Figures, case: Case, result: Result, runner: Runner) -> Figur
 
 
 def study_content(study: FigureRuns) -> dict[str, Any]:
-    """Sources of the figures, as plain data."""
+    """Data of the figures' sources for JSON: article, scene, engine, versions, runs."""
     figures = study.figures
     versions: dict[str, str] = {}
     for made in (*study.runs.values(), *study.truths.values()):

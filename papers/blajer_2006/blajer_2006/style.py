@@ -1,11 +1,11 @@
-"""Style of figures: fonts, lines that differ in colour, in grey and in dashes, and labels with units."""
+"""Style of figures: fonts, labels with units, and lines that differ in colour, in grey and in dashes."""
 
 from __future__ import annotations
 
 from typing import Any
 
-# Colours after Okabe and Ito (2008), told apart by every common kind of colour vision: here from dark to light
-# (L* = 33, 54 and 70), so that they also differ in grey; the dashes tell the lines apart where even that is lost.
+# Colours after Okabe and Ito (2008), distinct for every common kind of colour vision: here from dark to light
+# (L* = 33, 54 and 70), so that they also differ in grey; dashes distinguish the lines where even that is lost.
 LINES: tuple[dict[str, Any], ...] = (
     {"color": "#00518a", "linestyle": "-"},
     {"color": "#d55e00", "linestyle": (0, (5, 1.5))},
@@ -23,8 +23,8 @@ EVENT: dict[str, Any] = {"color": "0.35", "linewidth": 0.6}
 WIDTH = 7.09
 PIXELS_PER_INCH = 300
 
-SETTINGS: Any = {  # matplotlib types the names of its settings, which a dictionary does not keep
-    "font.family": "STIXGeneral",  # comes with matplotlib, and is the face of its mathematics
+SETTINGS: Any = {  # Any: matplotlib has a Literal type for names of settings, which a dictionary literal loses
+    "font.family": "STIXGeneral",  # comes with matplotlib, and matches the font of its mathematics
     "mathtext.fontset": "stix",
     "font.size": 9,
     "axes.labelsize": 9,
@@ -55,6 +55,6 @@ SETTINGS: Any = {  # matplotlib types the names of its settings, which a diction
 
 
 def axis_label(symbol: str, unit: str) -> str:
-    """``$z$ [m]``; a pure number has a dash for its unit."""
+    """Label of an axis, ``$z$ [m]``; a dimensionless quantity has a dash for its unit."""
     powers = unit.replace("^2", "²").replace("^3", "³")
     return f"{symbol} [{'–' if unit == '1' else powers}]"

@@ -1,4 +1,4 @@
-"""Writes the files of a study of figures, and says what came of the statements."""
+"""Files of a study of figures, and lines on the verdicts of its statements."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MAP_HEIGHT = 3.6  # inch
 
 
 def figures_content(study: FigureRuns, maps: Maps) -> dict[str, Any]:
-    """Texts beside the figures, as plain data: runs, captions, statements; ``maps`` by study."""
+    """Content of ``figures.json``: sources, captions, statements; ``maps``: regime maps by name of their study."""
     entries = []
     for figure in study.figures.figures:
         entry: dict[str, Any] = {"name": figure.name, "caption": figure.caption}
@@ -45,11 +45,11 @@ def write_figures(study: FigureRuns, maps: Maps, out: Path, forms: Sequence[str]
     Args:
         study: the runs.
         maps: regime maps by the name of their study.
-        out: folder.
-        forms: of ``svg``, ``png`` and ``pdf``.
+        out: folder of the files.
+        forms: formats, each ``svg``, ``png`` or ``pdf``.
 
     Returns:
-        the content of the JSON file, with the names of the others.
+        Content of the JSON file, with the names of the other files.
 
     Raises:
         Missing: matplotlib is not installed.

@@ -1,1 +1,1 @@
-"""Robot files: whether engines hold the model that the file describes, and if not, who is wrong about what."""
+"""Checks of robot files: differences between an engine's model and the one that the file describes, and causes."""

@@ -1,4 +1,4 @@
-"""Two files of one robot: where they describe different ones, and which file has what."""
+"""Comparison of two files of one robot: differences of their models, and values that differ."""
 
 import contextlib
 import dataclasses
@@ -29,7 +29,7 @@ from proofroll.robots.two_formulations import passive, poses
 from proofroll.running.asking import lent_workers
 from proofroll.running.worker_pool import Workers
 
-# Values that differ by more, for their size, are told: files round differently when they are read.
+# Relative difference of two values above which it is reported: files are written with different rounding.
 _ROUNDING = 1e-9
 
 
@@ -44,20 +44,20 @@ def against(
     seed: int = 0,
     time_limit: float = TIME_LIMIT,
 ) -> AgainstCheck:
-    """Holds what a second file describes against the first, at states of the first.
+    """Compares the model of a second file with that of the first, at random states of the first.
 
     Args:
-        path: of a URDF or MJCF, which is taken as true.
-        other: of another.
+        path: path of a URDF or MJCF, which counts as true.
+        other: path of the other file.
         names: joint of the first -> joint of the second, where they have different names.
         base: support of the root of a URDF, ``fixed`` or ``free``.
-        root: folder that each file and what it names lie in; by default the file's own.
+        root: folder that holds each file and all files named in it; by default the file's own.
         states: number of random states to compare.
-        seed: of the states.
-        time_limit: for compiling a file [s].
+        seed: seed of the states.
+        time_limit: limit for compiling a file [s].
 
     Raises:
-        InputError: a file is wrong, or a name is none of its joints'.
+        InputError: a file is wrong, or has no joint of a given name.
     """
     with lent_workers(None) as workers:
         (file, robot, by), (second, other_robot, by_other) = (
@@ -67,11 +67,11 @@ def against(
         renamed = _renamed(other_robot, matched)
         truth = RobotTruth.of(robot, random_states(robot, states, seed))
         bar = bar_of(truth)
-        there, here = (each.name if path.name != other.name else str(each) for each in (other, path))
-        rows = [judged(file, truth, bar, EngineSpec(there, {}), _answer(renamed, truth), workers)]
-        if rows[0].unexplained:  # what only the second file has is found from its side
+        other_label, label = (each.name if path.name != other.name else str(each) for each in (other, path))
+        rows = [judged(file, truth, bar, EngineSpec(other_label, {}), _answer(renamed, truth), workers)]
+        if rows[0].unexplained:  # with the second file as truth, causes in that file can be found
             turned = RobotTruth.of(renamed, random_states(renamed, states, seed))
-            row = judged(second, turned, bar_of(turned), EngineSpec(here, {}), _answer(robot, turned), workers)
+            row = judged(second, turned, bar_of(turned), EngineSpec(label, {}), _answer(robot, turned), workers)
             rows = [row] if row.status == "explained" else rows
     ours, theirs = ({joint.name for joint in each.moving} for each in (robot, other_robot))
     return AgainstCheck(
@@ -95,7 +95,7 @@ def against(
 def _meant(
     path: Path, base: str, root: Path | None, time_limit: float, workers: Workers
 ) -> tuple[RobotFile, Robot, str]:
-    """A file, its robot, and by whose reading."""
+    """A file, its robot, and a clause that says whose reading gave the robot."""
     file = opened(path, base, root, time_limit, workers)
     with tempfile.TemporaryDirectory() as folder:
         robot, compiler = meaning(file, reading.write(file, Path(folder)), time_limit, workers)
@@ -117,12 +117,18 @@ def _answer(robot: Robot, truth: RobotTruth) -> reading.ReaderAnswer:
 
 
 def _as_file(row: ImporterRow) -> ImporterRow:
-    """The row without what is to be done about an engine."""
+    """The row without remedies and known engines, which are about engines and not about files."""
     return dataclasses.replace(row, causes=[dataclasses.replace(cause, remedy="", known="") for cause in row.causes])
 
 
 def _matched(robot: Robot, other: Robot, names: Mapping[str, str]) -> dict[str, str]:
-    """Moving joint of the first -> of the second: as given, of the same name, or the only free joint of each."""
+    """Moving joint of the first robot -> its partner in the second.
+
+    Partners are given by ``names``, have the same name, or are the only free joint of each robot left over.
+
+    Raises:
+        InputError: a given name is unknown, two joints have one partner, or kinds differ.
+    """
     ours, theirs = ({joint.name: joint for joint in each.moving} for each in (robot, other))
     for one, two in names.items():
         require_known("--map", one, ours, "no joint of the first file moves under this name; those are", f"{one}={two}")
@@ -147,7 +153,7 @@ def _matched(robot: Robot, other: Robot, names: Mapping[str, str]) -> dict[str, 
 
 
 def _renamed(other: Robot, matched: Mapping[str, str]) -> Robot:
-    """The second robot with the first's names; a joint without a partner has none of the first's names."""
+    """The second robot with the first's joint names; a joint without a partner gets a name that the first lacks."""
     back = {theirs: ours for ours, theirs in matched.items()}
     new = {joint.name: back.get(joint.name, f"{joint.name} of the second file") for joint in other.joints}
     joints = tuple(dataclasses.replace(joint, name=new[joint.name]) for joint in other.joints)
@@ -156,13 +162,12 @@ def _renamed(other: Robot, matched: Mapping[str, str]) -> Robot:
 
 
 def reading_of(robot: Robot, truth: RobotTruth) -> Reading:
-    """Reading of an engine that holds a robot, evaluated by the second formulation."""
+    """Reading of a fictitious engine that holds exactly this robot, evaluated by the second formulation."""
     states = truth.states.completed(robot)
     d, placed = body_recursion(robot, states), poses(robot, states)
     asked = states.stacked(states.acceleration, robot)
-    given = truth.torques
-    still = {joint.name: np.zeros((states.count, joint.dofs)) for joint in robot.moving}
-    torque = np.concatenate([(still | given)[joint.name] for joint in robot.moving], axis=1)
+    zero = {joint.name: np.zeros((states.count, joint.dofs)) for joint in robot.moving}
+    torque = np.concatenate([(zero | truth.torques)[joint.name] for joint in robot.moving], axis=1)
     forward: Array | None = None
     with contextlib.suppress(np.linalg.LinAlgError):
         forward = np.asarray(np.linalg.solve(d.M, (torque - d.h - passive(robot, states))[..., None])[..., 0], float)
@@ -194,7 +199,7 @@ _LAWS = ("kind", "damping", "friction", "armature", "stiffness", "rest", "lower"
 
 
 def _unlike(robot: Robot, other: Robot) -> Iterator[UnlikeValue]:
-    """Values of joints that the two files give differently."""
+    """Values of joints that differ between the two files."""
     theirs = {joint.name: joint for joint in other.moving}
     groups = robot.groups, other.groups
     follows = [{mimic.joint: _written(mimic) for mimic in each.mimics} for each in (robot, other)]

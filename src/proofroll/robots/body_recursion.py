@@ -11,7 +11,7 @@ from proofroll.robots.two_formulations import Dynamics, armature, skew, turned_a
 
 
 def body_recursion(robot: Robot, states: RobotStates) -> Dynamics:
-    """Formulation B."""
+    """Terms of the equation of motion by recursive Newton-Euler in body axes (formulation B)."""
     count, n = states.count, robot.dofs
     v = states.stacked(states.velocity, robot)[:, None]
     still = np.zeros((count, 1, n))
@@ -23,7 +23,7 @@ def body_recursion(robot: Robot, states: RobotStates) -> Dynamics:
 
 
 def newton_euler(robot: Robot, states: RobotStates, v: Array, a: Array, gravity: Array) -> Array:
-    """Torques for velocities and accelerations of shape (states, any, n), without armature; the same shape."""
+    """Joint torques [N m or N] for velocities and accelerations, each of shape (states, any, n); without armature."""
     start = np.zeros((*v.shape[:2], 6))
     falling = start.copy()
     falling[..., 3:] = -gravity

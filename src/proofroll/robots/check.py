@@ -1,4 +1,4 @@
-"""The check of one robot file: what each engine holds, where it differs, and why."""
+"""Check of one robot file: each engine's model of it, the differences, and their causes."""
 
 import dataclasses
 import os
@@ -50,16 +50,16 @@ def check(
     """Comparison of every engine's reading of a file with the file's meaning.
 
     Args:
-        path: of a URDF or MJCF.
-        engines: ``name`` or ``name[option=true,…]``; by default all whose readers are installed.
+        path: path of a URDF or MJCF.
+        engines: ``name`` or ``name[option=true,…]``; by default all with an installed reader.
         base: support of the root of a URDF, ``fixed`` or ``free``.
-        root: folder that the file and what it names lie in; by default the file's own.
+        root: folder that holds the file and all files named in it; by default the file's own.
         states: number of random states to compare.
-        seed: of the states.
-        time_limit: for each engine [s].
-        accept: causes of differences that are no news, besides those in ``ROBOT.accept.toml`` beside the file.
-        progress: called with the name of an engine that has been asked.
-        workers: processes in which engines read; by default some that end with this.
+        seed: seed of the states.
+        time_limit: limit for each engine [s].
+        accept: ids of accepted causes of differences; those in ``ROBOT.accept.toml`` beside the file are added.
+        progress: called with the name of each engine that is done.
+        workers: processes in which engines read; by default new ones that end with this call.
 
     Raises:
         InputError: the file, an engine or an option is wrong.
@@ -107,17 +107,17 @@ def check(
 
 @dataclass(frozen=True)
 class _Checked:
-    """A file that engines are asked about.
+    """Data for the row of each engine.
 
     Attributes:
-        path, file: of the user, and what it says.
-        written: the copy that engines read.
+        path, file: path of the user's file, and its content.
+        written: path of the copy that engines read.
         base: support of the root of a URDF.
         truth: the file's meaning at random states.
-        bar: error bar of the truth, relative.
-        compiler: the program that defines the format, if it gave the meaning.
-        folder: for files of engines.
-        time_limit: for each answer [s].
+        bar: relative error bar of the truth.
+        compiler: the engine that defines the format, if its compiler gave the meaning.
+        folder: folder for the files of engines.
+        time_limit: limit for each answer [s].
         workers: processes in which engines read.
     """
 
@@ -134,14 +134,14 @@ class _Checked:
 
     @property
     def source(self) -> str:
-        """Origin of the meaning, as a clause."""
+        """Source of the meaning, as a clause."""
         return f"the model that {' '.join(self.compiler)} compiles" if self.compiler else "our own reading of the file"
 
     def row(self, spec: EngineSpec, options: dict[str, bool]) -> ImporterRow:
-        """The row of an engine, whatever becomes of the engine.
+        """Row of an engine, also of one that refuses, crashes or runs out of time.
 
         Raises:
-            Missing: it is not installed.
+            Missing: the engine is not installed.
         """
 
         def ask(given: Path) -> reading.ReaderAnswer:
@@ -158,7 +158,7 @@ class _Checked:
         except Exception as error:  # one engine's odd answer must not end the rows of the others
             said = f"its answer could not be judged; please report this: {type(error).__name__}: {error}"
             return ImporterRow(engine=str(spec), status="crashed", version=answer.version, message=said)
-        # It defines the format, and its meaning here is that of another version of it.
+        # The engine that defines the format, in another version than the one that gave the meaning.
         compiler = self.compiler
         if compiler and plain_name(spec.name) == compiler.engine and answer.version != compiler.version:
             says = f"{importer.says}; held against {self.source}".removeprefix("; ")
@@ -166,7 +166,7 @@ class _Checked:
         return dataclasses.replace(importer, as_written=self._as_written(spec, options, importer))
 
     def _as_written(self, spec: EngineSpec, options: dict[str, bool], importer: ImporterRow) -> str | None:
-        """Difference of what an engine reads from the user's own file, not from the copy."""
+        """Clause on the engine's reading of the user's own file instead of the copy; None: not tried or not offered."""
         if not self.file.contained or importer.version is None:
             return None
         try:
@@ -192,7 +192,7 @@ class _Checked:
 
 
 def _accepted(path: Path, given: Sequence[str]) -> set[str]:
-    """Ids of causes that a user accepts, given or in the file beside the robot's: ``causes = ["..."]``."""
+    """Ids of accepted causes: those given, and ``causes = ["..."]`` in the ``.accept.toml`` beside the robot's file."""
     beside = path.with_suffix(".accept.toml")
     written = read_toml(beside).get("causes", []) if beside.is_file() else []
     if not isinstance(written, list):
@@ -209,7 +209,7 @@ def _fixed_hint(file: RobotFile) -> str:
 
 
 def bar_of(truth: RobotTruth) -> float:
-    """The largest relative difference of the two formulations."""
+    """Error bar of a truth: the largest relative difference of its two formulations."""
     one, other = truth.dynamics, body_recursion(truth.robot, truth.states)
     pairs = ((one.M, other.M), (one.g, other.g), (one.h, other.h))
     return max(float(np.abs(a - b).max() / (np.abs(b).max() or 1.0)) for a, b in pairs)

@@ -1,4 +1,4 @@
-"""Robot files: whether engines hold the model that a file describes; what else can be checked is in the harness."""
+"""Commands `check` and `robots`; checks of scenes and studies are in the harness."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -92,7 +92,7 @@ def _partners(given: Sequence[str]) -> dict[str, str]:
 
 
 def _require_none_for_robots(context: typer.Context) -> None:
-    """Refuses the first option of a robot's check that was given, for it would be overlooked."""
+    """Raises InputError for the first given option that is for robot files only: it would be ignored."""
     for parameter in context.command.params:
         if parameter.name in {"file", "plot", "as_json", "help"}:
             continue

@@ -1,4 +1,4 @@
-"""Meaning of a file in a format that an engine defines: asked of that engine, in a process of its own."""
+"""Meaning of a file in a format that an engine defines (MJCF), asked of that engine in a separate process."""
 
 import contextlib
 import tempfile
@@ -19,14 +19,17 @@ from proofroll.running.process import Worker
 
 
 class Compiler(NamedTuple):
-    """An engine that defines a format, and compiled a file of it, with its version."""
+    """Name and version of the engine that defines a format and compiled a file."""
 
     engine: str
     version: str
 
 
 def compile_robot(path: str, original: str | None) -> dict[str, Any]:
-    """The worker's side: what a file means in a format that an engine defines; ``original`` is what it is a copy of."""
+    """Worker's side of :func:`compiled`: the file's robot as plain data.
+
+    ``original`` is the path of the file whose copy this is; None: not to be opened.
+    """
 
     def answer(reader: Any) -> dict[str, Any]:
         try:
@@ -44,12 +47,15 @@ def compile_robot(path: str, original: str | None) -> dict[str, Any]:
 
 
 def expand_robot(path: str) -> dict[str, Any]:
-    """The worker's side: the text of a file in a format that an engine defines, its macros written out."""
+    """Worker's side of :func:`expanded`: the file's text with macros written out."""
     return _defined(Path(path), lambda reader: {"text": reader.expanded(Path(path))})
 
 
 def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
-    """Answer of the engine that defines MJCF and its name, or a reason without an answer."""
+    """Answer of the engine that defines MJCF, with its name as ``by``; or the reason of failure.
+
+    The reason is ``uncovered`` (the check does not cover something in the file) or ``message``.
+    """
     for name in reader_names():
         try:
             reader = load_reader(name)
@@ -68,40 +74,46 @@ def _defined(path: Path, answer: Callable[[Any], dict[str, Any]]) -> dict[str, A
 
 
 def compiled(worker: Worker, file: RobotFile, written: Path, time_limit: float) -> tuple[Robot, Compiler]:
-    """The robot that an MJCF means, and by whom it was compiled.
+    """Robot of an MJCF, and the engine that compiled it.
 
     Raises:
         InputError: the engine that defines the format cannot compile it, or is not installed.
         WorkerDied: it crashed or took too long.
     """
     original = str(file.path.resolve()) if file.contained else None
-    told = worker.request(call(compile_robot, path=str(written), original=original), time_limit)
-    if "uncovered" in told:
-        raise InputError("file", file.path, told["uncovered"])
-    if "robot" not in told:
-        raise InputError("file", file.path, f"it has no meaning: {told['message']}")
-    robot = robot_from(told["robot"])
+    answer = worker.request(call(compile_robot, path=str(written), original=original), time_limit)
+    if "uncovered" in answer:
+        raise InputError("file", file.path, answer["uncovered"])
+    if "robot" not in answer:
+        raise InputError("file", file.path, f"it has no meaning: {answer['message']}")
+    robot = robot_from(answer["robot"])
     joints = ((item.name, item) for item in robot.joints)
     for name, part in (*robot.bodies.items(), *joints, *((item.joint, item) for item in robot.mimics)):
         for key, value in vars(part).items():
             endless = not isinstance(value, str) and not np.isfinite(np.nan if value is None else value).all()
-            if endless and key not in {"lower", "upper"}:  # which most joints have not
+            if endless and key not in {"lower", "upper"}:  # most joints have no limits
                 raise InputError(f"{file.path}: {key} of {name}", "nan", "numbers must be finite")
-    return robot, Compiler(*told["by"])
+    return robot, Compiler(*answer["by"])
 
 
 def expanded(worker: Worker, path: Path, parts: Mapping[str, Element], time_limit: float) -> tuple[Element, Compiler]:
-    """An MJCF with its macros written out, and by whom; ``parts`` are the file and those that it attaches, by name.
+    """Root of an MJCF with macros written out, and the engine that did so.
+
+    Args:
+        worker: process of the engine.
+        path: path of the user's file, for messages.
+        parts: name -> content of the file (first) and of the files that it attaches.
+        time_limit: limit for the answer [s].
 
     Raises:
-        InputError: the engine that defines the format cannot do that, or is not installed.
-        WorkerDied: it crashed or took too long.
+        InputError: the engine that defines the format cannot expand the file, or is not installed.
+        WorkerDied: the engine crashed or took too long.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for part, content in parts.items():
             (folder / part).write_bytes(ElementTree.tostring(content, encoding="utf-8"))
-        told = worker.request(call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
-    if "text" not in told:
-        raise InputError("file", path, f"its macros cannot be written out: {told['message']}")
-    return ElementTree.fromstring(told["text"]), Compiler(*told["by"])
+        answer = worker.request(call(expand_robot, path=str(folder / next(iter(parts)))), time_limit)
+    if "text" not in answer:
+        raise InputError("file", path, f"its macros cannot be written out: {answer['message']}")
+    return ElementTree.fromstring(answer["text"]), Compiler(*answer["by"])

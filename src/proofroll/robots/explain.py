@@ -1,4 +1,4 @@
-"""Causes that close the difference of an engine, each with the difference before and after."""
+"""Search for the causes of an engine's differences, each proven by the difference without and with it."""
 
 import dataclasses
 import math
@@ -11,11 +11,11 @@ from proofroll.robots.model import Robot
 from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
 
-# A cause that leaves more than this part of a difference explains nothing, not even together with others.
+# A cause counts only if it reduces the difference to less than this part.
 _HELPS = 0.999
-# Where no cause closes a layer alone, so many of the best are followed: the largest step is not always a right one.
+# Where no single cause closes a layer, the search follows this many of the best: the largest step may be wrong.
 _BRANCHES = 3
-# At so many states hypotheses are tried: random ones tell two robots apart. The causes found are proven at all states.
+# Number of states at which hypotheses are tried first: two random ones distinguish robots. Causes are proven at all.
 _TRIED_AT = 2
 
 
@@ -24,11 +24,11 @@ class RobotCause:
     """A cause with its proof.
 
     Attributes:
-        id: function of the hypothesis.
+        id: name of the hypothesis, which is that of its function.
         name: behaviour of the engine.
-        layer: the first at which it shows.
+        layer: first layer at which it shows.
         before, after: difference at that layer without and with the hypothesis.
-        remedy: action of a user.
+        remedy: action that a user can take.
         known: engines and versions in which it was seen.
     """
 
@@ -43,7 +43,7 @@ class RobotCause:
 
 @dataclasses.dataclass(frozen=True)
 class _Step:
-    """Truth of the robot, and the engine's reading, as changed by the causes found so far."""
+    """Node of the search: truth and reading as changed by the ``causes`` so far; ``found`` is layer -> difference."""
 
     truth: RobotTruth
     reading: Reading
@@ -53,13 +53,13 @@ class _Step:
 
 @dataclasses.dataclass(frozen=True)
 class Search:
-    """Looks for the causes of what an engine holds.
+    """Search for the causes of an engine's differences.
 
     Attributes:
         file: the file that was read.
         reading: model that the engine holds.
-        engine: its name.
-        tolerances: up to which a layer holds.
+        engine: name of the engine.
+        tolerances: layer -> largest difference at which it holds.
         recompiled, reread: see :class:`proofroll.robots.hypotheses.RobotEvidence`.
     """
 
@@ -71,9 +71,9 @@ class Search:
     reread: Callable[[Element], Reading | None] = lambda _: None
 
     def causes(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
-        """The causes of all differences, and the first layer that they leave unexplained.
+        """Causes of all differences, and the first layer that they leave unexplained (None: none).
 
-        They are looked for at a few of the states, and proven at all; where that fails all states are searched.
+        Causes are searched at a few states and proven at all; if the proof fails, the search repeats at all states.
         """
         if truth.states.count > _TRIED_AT:
             few = dataclasses.replace(self, reading=self.reading.first(_TRIED_AT), reread=self._reread_at_few)
@@ -88,7 +88,7 @@ class Search:
         return None if reading is None else reading.first(_TRIED_AT)
 
     def _proven(self, truth: RobotTruth, causes: tuple[RobotCause, ...]) -> _Step | None:
-        """The step after causes that were found at other states; None: one gives no other robot here."""
+        """Step after applying causes that were found at fewer states; None: one of them changes nothing."""
         known = {item.id: item for item in hypotheses()}
         step: _Step | None = self._begun(truth)
         for cause in causes:
@@ -99,7 +99,7 @@ class Search:
         return _Step(truth, self.reading, differences(truth, self.reading))
 
     def _searched(self, truth: RobotTruth) -> tuple[tuple[RobotCause, ...], str | None]:
-        """See :meth:`causes`, at the states of the truth."""
+        """Causes and first unexplained layer, searched at the states of ``truth``; see :meth:`causes`."""
         step = self._begun(truth)
         while (layer := first_failing(step.found, self.tolerances)) is not None:
             closed = self._closed(step, layer)
@@ -109,7 +109,7 @@ class Search:
         return step.causes, None
 
     def _closed(self, step: _Step, layer: str) -> _Step | None:
-        """The step after the causes that close a layer: one alone if there is one, else several one after another."""
+        """Step after the causes that close a layer: a single one if possible, else a sequence; None: none do."""
         limit = self.tolerances[layer]
         ranked = sorted(hypotheses(), key=lambda item: self.engine not in item.known)
         best = [step]
@@ -120,7 +120,7 @@ class Search:
                     if hypothesis.id in {cause.id for cause in begun.causes}:
                         continue
                     if self.engine not in hypothesis.known and any(item.found[layer] <= limit for item in candidates):
-                        break  # one that is known of this engine closes the layer
+                        break  # a cause that is known for this engine closes the layer
                     tried = self._tried(begun, hypothesis, layer, _HELPS * begun.found[layer])
                     if tried is not None:
                         candidates.append(tried)
@@ -128,7 +128,7 @@ class Search:
         return best[0] if best else None
 
     def _tried(self, step: _Step, hypothesis: RobotHypothesis, layer: str, most: float = math.inf) -> _Step | None:
-        """The step after a hypothesis; None: no other robot comes of it, or the layer is off by more than ``most``."""
+        """Step after a hypothesis; None: it changes nothing, or leaves a difference above ``most`` at the layer."""
         truth, reading = step.truth, step.reading
         changed = hypothesis.change(RobotEvidence(self.file, truth.robot, reading, self.recompiled, self.reread))
         if changed is None or changed is truth.robot:
@@ -148,7 +148,7 @@ class Search:
         return _Step(truth, reading, left, (*step.causes, cause))
 
     def _rank(self, step: _Step, layer: str) -> tuple[int, float]:
-        """Best first: one after which the most layers hold from the start, then the smallest difference."""
+        """Sort key of a step, best first: most layers that hold before the first failure, then smallest difference."""
         failing = first_failing(step.found, self.tolerances)
         order = list(LAYERS)
         return (-(order.index(failing) if failing else len(order)), step.found[layer])

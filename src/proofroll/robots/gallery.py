@@ -1,4 +1,7 @@
-"""The robots of ``comparisons/robots.toml``, which lie in packages: what engines do with each, and were expected to."""
+"""Gallery: robots of installed packages, with the expected and actual outcome of each engine's importer.
+
+``comparisons/robots.toml`` lists them.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +27,7 @@ if TYPE_CHECKING:
     from proofroll.running.cluster import Cluster
     from proofroll.running.worker_pool import Workers
 
-# What an engine may be expected to do besides the causes by which it differs.
+# Outcomes of an engine other than causes of its differences.
 REFUSES, CRASHED, OPEN = "refuses", "crashed", "open"
 
 
@@ -61,7 +64,7 @@ strict(_File, Entry)
 
 
 def read_gallery(path: str | Path | None = None) -> list[Entry]:
-    """The entries of the file. Raises InputError if it is broken, or names an unknown cause."""
+    """Entries of the gallery's file. Raises InputError if it is invalid, or names an unknown cause."""
     path = Path(path or data_folder("comparisons") / "robots.toml")
     known = sorted({REFUSES, CRASHED, OPEN, *(hypothesis.id for hypothesis in hypotheses())})
     entries = validated(_File, read_toml(path), path.name).robots
@@ -73,7 +76,7 @@ def read_gallery(path: str | Path | None = None) -> list[Entry]:
 
 
 def locate(entry: Entry) -> Path | None:
-    """The file of a robot, or None where its package is not installed."""
+    """Path of a robot's file; None if its package is not installed or has no such file."""
     try:
         inside = files(entry.package) or []
     except PackageNotFoundError:
@@ -88,9 +91,9 @@ def gallery(
     progress: Callable[[str], None] | None = None,
     cluster: Cluster | None = None,
 ) -> GalleryContent:
-    """Checks robots, each with every engine that its entry expects something of and that is installed.
+    """Checks robots, each with the installed engines that its entry names; by default all robots and engines.
 
-    By default all robots and engines; ``progress`` is called with the name of each robot.
+    ``progress`` is called with the name of each robot.
 
     Raises:
         InputError: there is no such robot or engine.
@@ -128,7 +131,7 @@ def _row(engines: Sequence[str], entry: Entry, workers: Workers | None = None) -
 
 
 def outcome(row: ImporterRow) -> list[str]:
-    """Outcome of an engine, in the words of the gallery's file."""
+    """Outcome of an engine in the words of the gallery's file: causes, ``open``, ``refuses`` or a status."""
     if not row.layers:
         return [REFUSES] if row.status == "refused" else [row.status]
     return [*dict.fromkeys(cause.id for cause in row.causes), *([OPEN] if row.unexplained else [])]

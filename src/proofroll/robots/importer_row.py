@@ -1,4 +1,4 @@
-"""Row of an engine's importer: its differences, their causes, and the joints it holds wrongly."""
+"""Row of an engine's importer: its differences, their causes, and the joints whose bodies differ."""
 
 import contextlib
 import dataclasses
@@ -39,9 +39,16 @@ def judged(
     workers: Workers | None = None,
     ask: Callable[[Path], reading.ReaderAnswer] | None = None,
 ) -> ImporterRow:
-    """The row of an engine that answered; the two formulations of the truth differ by ``bar``.
+    """Row of an engine that answered.
 
-    Changed files are compiled by one of the ``workers``, and read by the engine if ``ask`` is given.
+    Args:
+        file: the file.
+        truth: the file's meaning at random states.
+        bar: relative difference of the truth's two formulations.
+        spec: engine with options.
+        answer: the engine's answer.
+        workers: processes that compile edited files.
+        ask: path of an edited file -> the engine's answer; None: it cannot be asked again.
     """
     row = ImporterRow(
         engine=str(spec), status="refused", version=answer.version, message=answer.refused, says=answer.says
@@ -80,12 +87,12 @@ def judged(
     )
 
 
-# Of the mass: a file that MuJoCo wrote out has six digits.
+# Relative tolerance of the mass: a file that MuJoCo wrote out has six digits.
 _SAME_MASS = 1e-4
 
 
 def with_the_copy(given: reading.AsWritten, row: ImporterRow) -> str:
-    """Reading of the file as it is, beside the reading of the copy that was compared."""
+    """Clause on an engine's reading of the unchanged file, compared with its reading of the copy."""
     if given.whole is None:
         return f"refused ({given.refused})"
     if row.held is None:
@@ -101,7 +108,7 @@ _Made = TypeVar("_Made")
 
 
 def _of_changed(file: RobotFile, make: Callable[[RobotFile, Path], _Made | None]) -> Callable[[Element], _Made | None]:
-    """Function from a changed file to the product of its written copy, made once of each; None: it is refused."""
+    """Cached function from an edited file to ``make`` of its written copy; its result is None if that fails."""
 
     @cache
     def made(content: bytes) -> _Made | None:

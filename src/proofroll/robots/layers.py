@@ -1,4 +1,4 @@
-"""The layers of a comparison, in the order in which an error of one spoils the next, and how far an engine is off."""
+"""Layers of a comparison, ordered so that an error in one spoils the next, and an engine's difference at each."""
 
 from __future__ import annotations
 
@@ -34,13 +34,18 @@ LAYERS = {layer: compared for layer, (_, compared) in _LAYERS.items()}
 # Round-off of two formulations is 1e-15 to 3e-14 on robots with up to 67 velocities; the smallest known defect of an
 # importer is 1e-7.
 TOLERANCE = 1e-10
-# Of the weight times one metre: a torque of gravity below is round-off of larger ones.
+# Least scale of torques, as a part of weight times one metre: smaller torques of gravity are round-off.
 _FLOOR = 1e-3
 
 
 @dataclasses.dataclass(frozen=True)
 class RobotTruth:
-    """A robot with what it does at some states; its equations of motion are evaluated when they are asked for."""
+    """A robot with its dynamics at some states, evaluated on first use.
+
+    Attributes:
+        robot, states: the robot and the states.
+        like: truth from which this one was changed; gives scales and torques, and values that are the same.
+    """
 
     robot: Robot
     states: RobotStates
@@ -48,10 +53,7 @@ class RobotTruth:
 
     @classmethod
     def of(cls, robot: Robot, states: RobotStates, like: RobotTruth | None = None) -> RobotTruth:
-        """Truth by the first formulation; differences are relative to the sizes of ``like``, by default its own.
-
-        Joints that the states do not have are at rest.
-        """
+        """Truth of a robot; joints that the states lack are at rest."""
         return cls(robot, states.completed(robot), like)
 
     def first(self, count: int) -> RobotTruth:
@@ -60,7 +62,7 @@ class RobotTruth:
 
     @cached_property
     def dynamics(self) -> Dynamics:
-        """Dynamics evaluated by the first formulation."""
+        """Terms of the equation of motion by the first formulation."""
         if self.like is not None and _moves_alike(self.robot, self.like.robot):
             return self.like.dynamics
         return world_jacobians(self.robot, self.states, self.frames)
@@ -79,7 +81,7 @@ class RobotTruth:
 
     @cached_property
     def scales(self) -> dict[str, float]:
-        """Scale of each layer's difference: its own largest value, above the round-off of others."""
+        """Scale of each layer's differences: the layer's largest value, or a floor against round-off."""
         if self.like is not None:
             return self.like.scales
         groups = self.robot.groups.values()
@@ -113,10 +115,10 @@ class RobotTruth:
 
     @cached_property
     def torques(self) -> dict[str, Array]:
-        """Torques of the forward dynamics asked of engines: they give the accelerations of the states, by joint.
+        """Torques for which engines compute the forward dynamics, by joint, shape (states, velocities of the joint).
 
-        For a robot as an engine would hold it they are those of ``like``, which engines were asked for; zero for
-        a joint that the file does not have.
+        They give the accelerations of the states. A changed robot has the torques of ``like``, which the engine was
+        given, and zero at joints that ``like`` lacks.
         """
         if self.like is not None:
             count = self.states.count
@@ -128,13 +130,13 @@ class RobotTruth:
         return {name: torques[:, columns] for name, columns in self.robot.columns.items()}
 
 
-# What acts in joints beside M a + h.
+# Attributes of joints that enter the passive forces only, not M, h or poses.
 _PASSIVE = {"damping", "friction", "stiffness", "rest"}
 _MOTION = [field.name for field in dataclasses.fields(RobotJoint) if field.name not in _PASSIVE]
 
 
 def _moves_alike(robot: Robot, other: Robot) -> bool:
-    """True if one was made of the other by changes of passive forces and couplings alone."""
+    """True if the robots differ only in passive forces and couplings."""
     return (
         robot.bodies is other.bodies
         and robot.gravity is other.gravity
@@ -148,9 +150,9 @@ def _moves_alike(robot: Robot, other: Robot) -> bool:
 
 
 def differences(truth: RobotTruth, reading: Reading, until: str = "") -> dict[str, float]:
-    """Relative difference of an engine by layer; a layer that the engine does not offer is left out.
+    """Relative difference of an engine's reading from the truth, by layer; without layers that it does not offer.
 
-    Layers after ``until`` may be left out, too: most robots that a search tries are refuted before they move.
+    May stop after the layer ``until``, to save time in a search: most tried robots fail at an early layer.
     """
     robot = truth.robot
     dofs = dict(zip(reading.joints, reading.dofs, strict=True))
@@ -184,19 +186,19 @@ def differences(truth: RobotTruth, reading: Reading, until: str = "") -> dict[st
     if reading.inverse is not None:
         off["inverse dynamics"] = _off(reading.inverse[:, theirs], truth.inverse @ G, scales["inverse dynamics"])
     if reading.forward is not None and not d.singular:
-        given = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
+        applied = np.concatenate([truth.torques[joint.name] for joint in robot.moving], axis=1)
         reached = reading.forward[:, theirs] @ G.T
-        off["forward dynamics"] = _off(truth.torque(reached) @ G, given @ G, scales["forward dynamics"])
+        off["forward dynamics"] = _off(truth.torque(reached) @ G, applied @ G, scales["forward dynamics"])
     return off
 
 
 def first_failing(differences: dict[str, float], tolerances: dict[str, float]) -> str | None:
-    """The first layer that exceeds its tolerance; also where the difference is not a number."""
+    """First layer whose difference exceeds its tolerance or is NaN; None: all hold."""
     return next((layer for layer, value in differences.items() if not value <= tolerances[layer]), None)
 
 
 def _between(G: Array, M: Array) -> Array:
-    """Gᵀ M G, where most columns of G select one velocity alone."""
+    """Gᵀ M G for each state; by indexing if every column of G selects one velocity."""
     if np.count_nonzero(G) == G.shape[1] and np.all(G.sum(axis=0) == 1):
         rows = G.argmax(axis=0)
         return np.asarray(M[:, rows[:, None], rows])
@@ -204,7 +206,10 @@ def _between(G: Array, M: Array) -> Array:
 
 
 def _selection(robot: Robot, joints: Iterable[str], reduced: set[str]) -> Array:
-    """Map from the velocities of some joints to those of all: followers move with them, others are at rest."""
+    """Matrix from velocities of some joints to those of all, shape (n, some).
+
+    Followers in ``reduced`` move with their joints; other joints are at rest.
+    """
     columns, dofs = robot.columns, robot.dofs
     followers = {mimic.joint: mimic for mimic in robot.mimics}
     blocks = [np.zeros((dofs, 0))]
@@ -235,7 +240,7 @@ def _kinematics(truth: RobotTruth, reading: Reading, joints: list[str]) -> float
 
 
 def _apart(com: Array, mass: float, group: RobotBody, whole: float) -> float:
-    """Difference of two first moments of mass over the whole mass: without mass there is no centre to compare [m]."""
+    """Difference of first moments of mass over the whole mass [m]; defined also for a body without mass."""
     return float(np.abs(mass * com - group.mass * group.com).max()) / whole
 
 
@@ -244,6 +249,6 @@ def _off(given: Array, true: Array, scale: float) -> float:
 
 
 def _largest(values: Iterable[float]) -> float:
-    """The largest value; infinite if one is no number."""
+    """The largest value; infinity if one is not finite."""
     values = [float(value) for value in values]
     return max(values, default=0.0) if np.all(np.isfinite(values)) else float("inf")

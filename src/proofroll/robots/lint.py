@@ -1,4 +1,4 @@
-"""Errors and risks of a robot file, before any engine sees it."""
+"""Remarks on errors and risks in a robot file, found without any engine."""
 
 import math
 from collections import Counter
@@ -13,7 +13,7 @@ from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
 # Level, where and what of a :class:`LintRemark`.
 _Noticed = tuple[str, str, str]
-# An axis written with six digits is off its length by less.
+# Largest error of the length of a unit axis that is written with six digits.
 _UNIT = 1e-6
 _KNOWN = {
     "link": {"inertial", "visual", "collision"},
@@ -126,7 +126,7 @@ def _closed(file: RobotFile) -> Iterator[_Noticed]:
 
 
 def _trees(parent: Element) -> int:
-    """Bodies that hang in the world, also within frames."""
+    """Number of bodies directly below the world, also within frames."""
     return len(parent.findall("body")) + sum(map(_trees, parent.findall("frame")))
 
 

@@ -1,4 +1,4 @@
-"""Meaning of a robot file: our own reading of URDF, and of MJCF the answer of the engine that defines it."""
+"""Meaning of a robot file: of a URDF our own reading, of an MJCF the compiled model of the engine that defines it."""
 
 import tempfile
 from collections.abc import Callable, Mapping
@@ -19,20 +19,24 @@ from proofroll.running.process import Worker, WorkerDied
 from proofroll.running.worker_pool import Workers
 
 _Answer = TypeVar("_Answer")
-# Format -> the engine that was last found to define it: a guess at whose idle process to ask; until one is known a
-# process goes by the format, and is renamed when it has said whose it is.
+# Format -> engine that was last found to define it, whose idle process is asked first. Until it is known, the process
+# is named by the format, and renamed after its first answer.
 _defines: dict[str, str] = {}
 
 
 def meaning(
     file: RobotFile, written: Path, time_limit: float, workers: Workers | None = None
 ) -> tuple[Robot, defining.Compiler | None]:
-    """The robot that a file means, and the engine here that defines the format; None: we read it.
+    """The robot that a file describes, and the engine whose compiler says so; None: our own reading (URDF).
 
-    An engine that defines the format is asked for no longer than ``time_limit`` [s], of the file as engines get it.
+    Args:
+        file: the file.
+        written: path of its copy for engines, which is compiled.
+        time_limit: limit for the compiler's answer [s].
+        workers: processes in which engines run; by default a new one.
 
     Raises:
-        InputError: it has no meaning.
+        InputError: the file describes no robot.
     """
     if file.kind == "urdf":
         return read_urdf(file), None
@@ -49,9 +53,9 @@ def opened(
     time_limit: float = TIME_LIMIT,
     workers: Workers | None = None,
 ) -> RobotFile:
-    """A file as :func:`proofroll.robots.opening.open_robot` reads it, its macros written out.
+    """A file as :func:`proofroll.robots.opening.open_robot` reads it, with macros written out.
 
-    The engine that defines the format is asked for no longer than ``time_limit`` [s].
+    The engine that defines the format writes them out within ``time_limit`` [s].
     """
 
     def expand(parts: Mapping[str, Element]) -> Element:
@@ -63,7 +67,7 @@ def opened(
 def _by_definer(
     kind: str, path: Path, workers: Workers | None, ask: Callable[[Worker], tuple[_Answer, defining.Compiler]]
 ) -> tuple[_Answer, defining.Compiler]:
-    """Answer of the engine that defines a format."""
+    """Answer of the engine that defines a format, and its name. Raises InputError if its process dies."""
     asked = _defines.get(kind, kind)
     with lent_workers(workers) as lent:
         try:
@@ -72,16 +76,16 @@ def _by_definer(
         except WorkerDied as error:
             raise InputError("file", path, f"it could not be compiled: {error}") from None
         _defines[kind] = by.engine
-        lent.rename(asked, by.engine)  # which it has loaded, and is asked next what it holds
+        lent.rename(asked, by.engine)  # the process has loaded this engine, which is asked for its reading next
     return answer, by
 
 
 @lru_cache(maxsize=8)
 def meant(path: Path, kind: str, base: str, content: bytes) -> Robot:
-    """Robot of a file with this content; MJCF is compiled in a process, so the result is kept.
+    """Robot of a file with this content; cached, for an MJCF is compiled in a separate process.
 
     Raises:
-        InputError: it has no meaning.
+        InputError: the file describes no robot.
     """
     file = RobotFile(path, kind, fromstring(content), base)
     with tempfile.TemporaryDirectory() as folder:

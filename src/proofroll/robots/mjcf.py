@@ -1,4 +1,4 @@
-"""MJCF as every engine gets it: includes put in place, everything named, without looks, contacts and missing meshes."""
+"""Copy of an MJCF for every engine: includes inserted, everything named, without looks, contacts and missing meshes."""
 
 import contextlib
 import copy
@@ -13,10 +13,10 @@ from proofroll.robots.mjcf_classes import classed
 from proofroll.robots.mjcf_meshes import remove_height_fields, remove_meshes
 from proofroll.robots.robot_file import MOST_ELEMENTS, Expand, LintRemark, names_files_inside, read_xml, required_file
 
-# How deep files may include files.
+# Largest depth of includes.
 _DEEPEST = 8
 _MOST_MODELS = 32
-# Neither mass nor torque without contacts depends on these.
+# Elements that change neither masses nor torques without contacts.
 _LOOKS = {
     "visual",
     "statistic",
@@ -30,21 +30,21 @@ _LOOKS = {
     "contact",
     "custom",
 }
-# Part of a body's mass or motion that no rigid body has.
+# Elements that change masses or motion in a way that the check does not cover.
 _UNCOVERED = {"deformable", "flexcomp", "flex", "plugin"}
-# What an engine that defines the format writes out.
+# Macros, which the engine that defines the format writes out.
 _MACROS = {"replicate", "attach", "composite"}
 
 
 def stripped(
     root: Element, path: Path, inside: Path, expand: Expand | None = None
 ) -> tuple[Element, list[LintRemark], bool]:
-    """Copy of an MJCF, remarks on what it leaves out, and True if all files that the MJCF names lie in ``inside``.
+    """Copy of an MJCF, remarks on omissions, and True if all files that the MJCF names lie in ``inside``.
 
-    The copy names meshes alone, those that exist in that folder.
+    The only files that the copy names are meshes that exist in that folder.
 
     Raises:
-        InputError: it includes a file outside the folder, or holds what the check does not cover.
+        InputError: the MJCF includes a file outside the folder, or has an element that the check does not cover.
     """
     parts: dict[str, Element] = {}
     remarks, contained = _add(root, path, path.resolve(), inside, parts)
@@ -63,21 +63,22 @@ def stripped(
 
 
 def _written_out(element: Element) -> float:
-    """Approximate number of elements where macros are written out."""
+    """Approximate number of elements after macros are written out."""
     inside = 1 + sum(map(_written_out, element))
     if element.tag not in _MACROS:
         return inside
     with contextlib.suppress(ValueError):
         return inside * math.prod(max(1.0, float(part)) for part in element.get("count", "1").split())
-    return inside  # the engine says what is wrong
+    return inside  # a wrong count: the engine's own message says so
 
 
 def _add(
     root: Element, path: Path, place: Path, inside: Path, parts: dict[str, Element]
 ) -> tuple[list[LintRemark], bool]:
-    """Adds a file without looks and named files, and those that it attaches, by names that are free in one folder.
+    """Adds the stripped copy of a file, and of the files that it attaches, to ``parts`` under unique names.
 
-    The remarks, and whether all files that are named lie in the folder ``inside``.
+    Returns:
+        Remarks on omissions, and True if all files that are named lie in the folder ``inside``.
     """
     root = copy.deepcopy(root)
     root.tag = "mujoco"
@@ -115,7 +116,7 @@ def _add(
 
 
 def _include(element: Element, path: Path, folder: Path, inside: Path, open_files: tuple[Path, ...]) -> None:
-    """Puts the content of included files in place of what includes them."""
+    """Replaces each <include> below an element by the content of its file. Raises InputError if that is too much."""
     for index, child in reversed(list(enumerate(element))):
         if child.tag != "include":
             _include(child, path, folder, inside, open_files)
@@ -135,9 +136,10 @@ def _include(element: Element, path: Path, folder: Path, inside: Path, open_file
 
 
 def _merge_defaults(root: Element) -> None:
-    """Puts the defaults of included files and those of the file into one element, where that means the same.
+    """Merges the <default> elements of included files with that of the file, where that keeps their meaning.
 
-    Pinocchio reads them from two files and refuses them from one; classes take from the one above what it has so far.
+    Pinocchio refuses several in one file. A class inherits only what the class above it has so far, so plain defaults
+    must not follow an inner class.
     """
     whole, *others = root.findall("default") or [Element("default")]
     for other in others:
@@ -156,9 +158,9 @@ def _merge_defaults(root: Element) -> None:
 
 
 def _merge_worlds(root: Element) -> None:
-    """Puts the worlds of included files and that of the file into the last of them, as they mean the same.
+    """Merges the <worldbody> elements of included files with that of the file into the last, which keeps their meaning.
 
-    No engine gets a file with includes. Pinocchio reads a tree twice from two worlds, refuses a class after its use.
+    Pinocchio reads a tree twice if there are two worlds, and refuses a class that is defined after its use.
     """
     worlds = root.findall("worldbody")
     worlds[-1][:] = [child for world in worlds for child in world]
@@ -167,7 +169,7 @@ def _merge_worlds(root: Element) -> None:
 
 
 def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
-    """Leaves out what carries bodies against gravity, as actuators are."""
+    """Removes compensation of gravity from bodies; yields a remark for each."""
     for body in root.iter("body"):
         if body.attrib.pop("gravcomp", "0") not in {"0", "0.0"}:
             words = "its gravity compensation is left out, as actuators are; all engines read it without"
@@ -175,7 +177,7 @@ def _gravity_compensations(root: Element) -> Iterator[LintRemark]:
 
 
 def name_all(root: Element) -> None:
-    """Names for bodies and joints without one, so that engines can be compared by name."""
+    """Gives names to bodies and joints without one, so that engines can be compared by name."""
     root.attrib.setdefault("model", "robot")
     taken = {element.get("name") for element in root.iter()}
     for world in root.iter("worldbody"):

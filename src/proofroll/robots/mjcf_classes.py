@@ -1,4 +1,4 @@
-"""Default classes of MJCF: what an element has from the class that it belongs to."""
+"""Default classes of MJCF: attributes that an element inherits from its class."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -8,12 +8,13 @@ _MAIN = "main"
 
 
 class Classed(NamedTuple):
-    """Element below the worlds.
+    """Element below <worldbody> with the attributes of its default class.
 
     Attributes:
-        element: the element itself, which stands in ``parent``.
+        element: the element.
+        parent: the element around it.
         body: the body, or the world, to which it belongs.
-        given: its attributes, and those that its class gives it.
+        given: its attributes, own and inherited from its class.
     """
 
     element: Element
@@ -23,7 +24,7 @@ class Classed(NamedTuple):
 
 
 def classed(root: Element, tag: str) -> Iterator[Classed]:
-    """Every element of a tag below the worlds, in the order of the file."""
+    """All elements of a tag below <worldbody>, in the order of the file."""
     classes = _classes(root, tag)
 
     def below(parent: Element, body: Element, inherited: str) -> Iterator[Classed]:
@@ -39,22 +40,22 @@ def classed(root: Element, tag: str) -> Iterator[Classed]:
 
 
 def with_classes(root: Element, tag: str) -> Iterator[tuple[Element, dict[str, str]]]:
-    """Every element of a tag below the worlds, with its attributes and those that its class gives it."""
+    """All elements of a tag below <worldbody>, with their attributes, own and inherited from the class."""
     return ((item.element, item.given) for item in classed(root, tag))
 
 
 def class_of(root: Element, element: Element) -> dict[str, str]:
-    """Attributes of an element that lies in no body, with those that its class gives it."""
+    """Attributes of an element outside <worldbody>, own and inherited from its class."""
     return _classes(root, element.tag).get(element.get("class", _main(root)), {}) | element.attrib
 
 
 def _main(root: Element) -> str:
-    """Name of the class of what names none."""
+    """Name of the class of elements that name none."""
     return next((default.get("class", _MAIN) for default in root.findall("default")), _MAIN)
 
 
 def _classes(root: Element, tag: str) -> dict[str, dict[str, str]]:
-    """Class -> the attributes that it gives to elements of a tag, those of the classes around it included."""
+    """Class -> attributes that it gives to elements of a tag, own and inherited from the classes around it."""
     classes: dict[str, dict[str, str]] = {}
 
     def collect(default: Element, outer: dict[str, str]) -> None:

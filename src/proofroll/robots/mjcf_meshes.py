@@ -1,4 +1,4 @@
-"""Shapes of an MJCF that name meshes or height fields: those that give no mass are left out."""
+"""Removal of meshes and height fields of an MJCF that give no mass."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -11,7 +11,7 @@ from proofroll.robots.robot_file import LintRemark, file_inside, required_file
 
 
 def remove_height_fields(root: Element, shapes: Sequence[Classed]) -> None:
-    """Leaves out height fields, which weigh nothing."""
+    """Removes height fields, which have no mass."""
     for shape in shapes:
         if shape.given.get("hfield"):
             shape.parent.remove(shape.element)
@@ -19,7 +19,16 @@ def remove_height_fields(root: Element, shapes: Sequence[Classed]) -> None:
 
 
 def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside: Path) -> Iterator[LintRemark]:
-    """Leaves out meshes that weigh nothing or do not exist; others, in ``folder``, are named by their whole path.
+    """Removes meshes that give no mass or do not exist; names the others by their absolute paths.
+
+    Args:
+        root: content of the file.
+        shapes: its geoms.
+        folder: folder of the file, to which paths are relative.
+        inside: folder in which all files must lie.
+
+    Yields:
+        A remark for each body that loses a mesh with mass.
 
     Raises:
         InputError: a mesh that gives mass lies outside the folder ``inside``.
@@ -58,7 +67,7 @@ def remove_meshes(root: Element, shapes: Sequence[Classed], folder: Path, inside
 
 
 def _mesh_folder(root: Element, folder: Path) -> tuple[Path, bool]:
-    """The folder of meshes, and whether paths in their names do not count; taken out of the file."""
+    """Folder of meshes, and True if only the last part of their paths counts (strippath); removes these attributes."""
     attributes: dict[str, str] = {}
     for compiler in root.iter("compiler"):
         for key in ("texturedir", "assetdir", "meshdir", "strippath"):
@@ -67,7 +76,7 @@ def _mesh_folder(root: Element, folder: Path) -> tuple[Path, bool]:
 
 
 def _forget(root: Element, attribute: str, kept: set[str]) -> None:
-    """Takes an attribute out of default classes, but for some of its values."""
+    """Removes an attribute of geoms from default classes, except if its value is one of ``kept``."""
     for default in root.iter("default"):
         for geom in default.findall("geom"):
             if geom.get(attribute) not in kept:

@@ -1,4 +1,4 @@
-"""A robot as data: bodies and the joints between them, as a file describes them and as every formulation takes them."""
+"""Robot as data: bodies and the joints between them, described by a file and used by both formulations."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ import numpy.typing as npt
 from proofroll.core.arrays import slices
 
 Array = npt.NDArray[np.float64]
-# The parent of what hangs in the world; no body or joint has this name, but many a root link is called world.
+# Parent of joints in the world. It is no name of a body or joint: many root links are called ``world``.
 WORLD = ""
-# Round-off of numbers that were written with six or more digits is no defect of a body.
+# Relative violation of inertia's inequalities that counts as round-off of the file's digits.
 _ROUNDING = 1e-9
 # Degrees of freedom of each kind of joint.
 DOFS = {"fixed": 0, "revolute": 1, "prismatic": 1, "spherical": 3, "free": 6}
@@ -59,14 +59,14 @@ class RobotBody:
 
 @dataclasses.dataclass(frozen=True)
 class RobotJoint:
-    """A joint, which carries its child.
+    """A joint that connects a child body to its parent.
 
     Attributes:
         name: unique.
         kind: a key of :data:`DOFS`.
         parent: a body, or :data:`WORLD`.
         child: a body.
-        position: of the joint in the parent's frame [m], shape (3,); of a free joint what is added to its coordinates.
+        position: of the joint in the parent's frame [m], shape (3,); for a free joint, an offset of its coordinates.
         rotation: of the child's frame against the parent's at coordinate 0, shape (3, 3).
         axis: unit vector in the child's frame, shape (3,).
         child_position: of the joint in the child's frame [m], shape (3,).
@@ -75,9 +75,9 @@ class RobotJoint:
         armature: inertia added to the joint's own coordinate [kg m² or kg].
         stiffness: spring torque per coordinate [N m/rad or N/m].
         rest: coordinate at which the spring is at rest [rad or m].
-        lower, upper: limits of the coordinate; None: there is none.
-        actuated: whether an actuator acts on the joint.
-        turning: whether the armature of a free joint acts along the body's axes, not the world's.
+        lower, upper: limits of the coordinate [rad or m]; None: there is none.
+        actuated: True if an actuator acts on the joint.
+        turning: True if the armature of a free joint acts along the body's axes, False: along the world's.
     """
 
     name: str
@@ -100,7 +100,7 @@ class RobotJoint:
 
     @property
     def dofs(self) -> int:
-        """Number of velocities."""
+        """Number of velocities of the joint."""
         return DOFS[self.kind]
 
 
@@ -124,7 +124,7 @@ class Robot:
         joints: parents first; one for each body.
         mimics: joints that follow another.
         gravity: acceleration [m/s²], shape (3,).
-        sources: facts of the file that only hypotheses need, by name of the body: how its inertia was written, say.
+        sources: body -> facts of the file that only hypotheses need: its inertia as written, for example.
     """
 
     name: str
@@ -141,7 +141,7 @@ class Robot:
 
     @cached_property
     def columns(self) -> dict[str, slice]:
-        """Velocities of each joint, as slices."""
+        """Moving joint -> slice of its velocities in a stacked vector."""
         places = slices(joint.dofs for joint in self.moving)
         return {joint.name: place for joint, place in zip(self.moving, places, strict=True)}
 
@@ -152,9 +152,9 @@ class Robot:
 
     @cached_property
     def welded(self) -> dict[str, tuple[str, Array, Array]]:
-        """Body -> the moving joint that carries it, with its position and rotation in the frame of that joint's child.
+        """Body -> moving joint that carries it, and its position and rotation in the frame of that joint's child.
 
-        What is fixed to the world is carried by :data:`WORLD`.
+        A body that is fixed to the world has :data:`WORLD` instead of a joint.
         """
         welded = {WORLD: (WORLD, np.zeros(3), np.eye(3))}
         for joint in self.joints:
@@ -168,7 +168,7 @@ class Robot:
 
     @cached_property
     def groups(self) -> dict[str, RobotBody]:
-        """Bodies that each moving joint carries rigidly, as one body in the frame of the joint's child; by joint."""
+        """Moving joint -> composite of the bodies that it carries rigidly, in the frame of the joint's child."""
         parts: dict[str, list[tuple[RobotBody, Array, Array]]] = {joint.name: [] for joint in self.moving}
         for name, (home, p, R) in self.welded.items():
             if home != WORLD:
@@ -189,7 +189,7 @@ class Robot:
 
 
 def composed(name: str, parts: Iterable[tuple[RobotBody, Array, Array]]) -> RobotBody:
-    """Several bodies as one, each given with its position and rotation in the frame of the whole."""
+    """Composite of bodies, each with its position and rotation in the frame of the composite."""
     parts = list(parts)
     mass = sum(body.mass for body, _, _ in parts)
     moment = sum((body.mass * (p + R @ body.com) for body, p, R in parts), np.zeros(3))

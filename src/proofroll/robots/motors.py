@@ -1,4 +1,4 @@
-"""Actuators of an MJCF as tables of a scene, their controls at zero."""
+"""Actuators of an MJCF as tables of a scene, with their controls at zero."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,12 +9,12 @@ from proofroll.robots.model import Robot
 from proofroll.robots.robot_file import floats
 
 _PLAIN = {"motor", "position", "velocity", "general"}
-# Attributes that make something else of an actuator where they are not these values.
+# Attributes with the only values for which a scene's actuator has the same law.
 _OTHER = {"dyntype": "none", "gaintype": "fixed", "timeconst": "0", "dampratio": "0", "actlimited": "false"}
 
 
 def motors(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]]:
-    """Tables of the actuators that a scene has, and of the others a clause each."""
+    """Tables of the actuators that a scene can represent, and a clause for each other one."""
     single = {joint.name for joint in robot.moving if joint.dofs == 1}
     actuators: list[dict[str, Any]] = []
     clauses = []
@@ -39,10 +39,10 @@ def motors(root: Element, robot: Robot) -> tuple[list[dict[str, Any]], list[str]
 
 
 def _given(root: Element, element: Element) -> dict[str, str]:
-    """Attributes of an actuator; MJCF has one default for all kinds, which each writes in its own words."""
+    """Attributes of an actuator, own and inherited: MJCF's kinds share one default, but name its gains differently."""
     attributes: dict[str, str] = {}
     named = {"class": element.get("class", "")} if element.get("class") else {}
-    for tag in sorted(_PLAIN, key=lambda tag: tag == element.tag):  # that of its own kind last
+    for tag in sorted(_PLAIN, key=lambda tag: tag == element.tag):  # its own kind last
         of_class = class_of(root, Element(tag, named))
         if tag != element.tag:
             kp, kv = of_class.pop("kp", None), of_class.pop("kv", None)
@@ -55,7 +55,7 @@ def _given(root: Element, element: Element) -> dict[str, str]:
 
 
 def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
-    """Kind, gains, gear and limit of an actuator; None: a scene has no such one."""
+    """Kind, gains, gear, target and limit of an actuator; None: a scene cannot represent it."""
     if tag not in _PLAIN or any(given.get(key, plain) != plain for key, plain in _OTHER.items()):
         return None
     kp, kd = _gains(tag, given)
@@ -73,7 +73,7 @@ def _table(tag: str, given: Mapping[str, str]) -> dict[str, Any] | None:
 
 
 def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:
-    """Gains of position and velocity."""
+    """Gains of position and velocity; negative ones for a law that a scene lacks."""
     if tag == "position":
         return float(given.get("kp", 1.0)), float(given.get("kv", 0.0))
     if tag == "velocity":
@@ -86,7 +86,7 @@ def _gains(tag: str, given: Mapping[str, str]) -> tuple[float, float]:
 
 
 def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | None:
-    """One actuator in place of a position actuator and a damper (velocity 0) at the same joint; None: another pair."""
+    """Merges a position actuator and a damper (target velocity 0) of one joint; None: it is another pair."""
     by_kind = {item["kind"]: item for item in (one, two)}
     if set(by_kind) != {"position", "velocity"} or one["gear"] != two["gear"] or {"limit"} & (one.keys() | two.keys()):
         return None
@@ -97,7 +97,7 @@ def _merged(one: Mapping[str, Any], two: Mapping[str, Any]) -> dict[str, Any] | 
 
 
 def _range(given: Mapping[str, str], what: str) -> tuple[float, float] | None:
-    """Range of a control or force where the file limits it; None: it does not."""
+    """Range of a control (``ctrl``) or force; None: the file does not limit it."""
     ends = floats(given.get(f"{what}range", ""))
     if given.get(f"{what}limited") == "false" or len(ends) != 2:
         return None

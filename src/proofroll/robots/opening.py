@@ -1,4 +1,4 @@
-"""Reading of a robot file: safely, once, and without what engines must not load."""
+"""Safe reading of a robot file, without parts that engines must not load."""
 
 import os
 from pathlib import Path
@@ -15,20 +15,20 @@ _XACRO = "xacro"
 
 
 def open_robot(path: Path, base: str = "fixed", root: Path | None = None, expand: Expand | None = None) -> RobotFile:
-    """Reads a file, and leaves out what engines must not or need not load.
+    """Reads a file, without parts that engines must not or need not load.
 
     Args:
-        path: of a URDF or MJCF.
+        path: path of a URDF or MJCF.
         base: support of the root of a URDF, ``fixed`` or ``free``.
-        root: folder that the file and what it names lie in; by default the file's own.
-        expand: writes out what macros of a format (repetition, attached models) stand for.
+        root: folder that holds the file and all files named in it; by default the file's own.
+        expand: writes out macros of an MJCF (repetition, attached models); None: a file with macros is refused.
 
     Raises:
         InputError: the file is broken, of another kind, too large, or asks for files outside the folder.
     """
     require_known("base", base, BASES)
     with told_of(str(path)):
-        # not resolve(), which no loop of links may meet
+        # Path.resolve() fails at a loop of links
         inside, place = (Path(os.path.realpath(each)) for each in (path.parent if root is None else root, path))
         if not place.is_relative_to(inside):
             advice = f"{path.name} is in {place.parent}, not in this folder; name one that holds it with --root"

@@ -1,4 +1,4 @@
-"""The result of a check as one HTML file that needs nothing else."""
+"""Result of a check as one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -16,31 +16,31 @@ from proofroll.robots.terminal import amount, sentences
 if TYPE_CHECKING:
     import jinja2
 
-# The robot is seen from the front, the left and above: directions to the right and up in the picture.
+# World directions to the right and upwards in the picture, which shows the robot from the front left and above.
 _RIGHT, _UP = np.array([-0.64, 0.77, 0.0]), np.array([-0.26, -0.22, 0.94])
 _SIZE = 400.0
 
 
 def page(content: RobotCheck) -> str:
-    """The HTML page; everything from the file and the engines is escaped."""
+    """HTML page of a check; all text from the file and the engines is escaped."""
     pair = isinstance(content, AgainstCheck)
-    said = {"pair": pair, "short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
-    return rendered(_templates(), "check.html", content=content, **said)
+    parts = {"pair": pair, "short": SHORT, "skeleton": skeleton(content), "sentences": lambda row: list(sentences(row))}
+    return rendered(_templates(), "check.html", content=content, **parts)
 
 
 @cache
 def _templates() -> jinja2.Environment:
-    made = environment(Path(__file__).parent / "templates")
-    made.filters["amount"] = amount
-    return made
+    templates = environment(Path(__file__).parent / "templates")
+    templates.filters["amount"] = amount
+    return templates
 
 
 def skeleton(content: RobotCheck) -> dict[str, Any]:
     """The robot at rest coordinates as lines between the origins of its bodies, in a square of 400 units.
 
     Returns:
-        ``lines`` and ``marks``: lines with ends x1, y1, x2, y2, the joint and its kind; marks with x, y, the joint and
-        the engines that hold what it carries differently, or lack it.
+        ``lines``: ends x1, y1, x2, y2, the joint's data, and ``wrong``: True if an engine differs there; ``marks``: x,
+        y, joint, body, and the engines in which the body differs or is absent; ``size``: side of the square.
     """
     flat = {name: np.array([_RIGHT, -_UP]) @ body.position for name, body in content.robot.bodies.items()}
     points = np.array([*flat.values()])

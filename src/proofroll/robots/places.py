@@ -1,4 +1,4 @@
-"""Place of an engine's largest difference at a layer: the joint, the state, the engine's number and the true one."""
+"""Place of an engine's largest difference at a layer: joint or body, state, the engine's value and the true one."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ _TORQUES = ("gravity", "bias", "inverse dynamics")
 
 
 def worst_place(truth: RobotTruth, reading: Reading, layer: str) -> str | None:
-    """A clause with the joint (and state, counted from 0), the held and the true value; None: the layer has none."""
+    """Clause with joint or body, state (counted from 0), the engine's and the true value; None: not for this layer."""
     groups = truth.robot.groups
     common = [name for name in reading.joints if name in groups]
     bodies = {joint.name: joint.child for joint in truth.robot.moving}

@@ -1,4 +1,4 @@
-"""Numbers of a robot file that no machine has: most often another unit, or a default that was not meant."""
+"""Remarks on implausible numbers of a robot file: most often a wrong unit, or an unintended default."""
 
 import math
 from collections.abc import Iterator
@@ -9,22 +9,23 @@ from proofroll.robots.mjcf_classes import with_classes
 from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.robot_file import RobotFile, floats
 
-# Machines larger than this are rarer than lengths in millimetres [m].
+# Length above which a wrong unit is likelier than a machine of that size [m].
 _LARGE = 10.0
-# A centre of mass is not further away than this [m], or so many times all distances between joints.
+# Largest plausible distance of a centre of mass from its origin: the larger of this [m] and this many times the sum of
+# the distances between joints.
 _FAR, _TIMES = 1.0, 10.0
-# Of osmium, the densest material [kg/m³].
+# Density of osmium, the densest material [kg/m³].
 _DENSEST = 22600.0
-# Limits beyond are degrees or mean none: joints turn two times, and those that turn on have large round numbers [rad].
+# Limits of an angle between these are probably degrees [rad]: joints turn twice at most, and larger numbers mean none.
 _TURNS = 4 * math.pi, 720.0
-# What acts on a free joint as on any other.
+# Attributes with which a free joint is damped, loaded or held like any other joint.
 _LAWS = ("damping", "armature", "frictionloss", "stiffness")
-# Angles in radians that stand where degrees are read, to as many digits as people write.
+# Common angles in radians, by which a range in the wrong unit is recognised where degrees are read.
 _IN_RADIANS = (1.57, 3.14, 6.28)
 
 
 def implausible(file: RobotFile, robot: Robot) -> Iterator[tuple[str, str, str]]:
-    """Level, where and what of each such number."""
+    """Level, place and text of a remark on each implausible number."""
     noun = "link" if file.kind == "urdf" else "body"
     between = sum(float(np.linalg.norm(joint.position)) for joint in robot.joints if joint.kind != "free")
     for name, body in robot.bodies.items():

@@ -1,7 +1,7 @@
-"""Protocol by which an engine lets its own importer of robot files be checked.
+"""Protocol of readers: classes by which an engine's own importer of robot files is checked.
 
-A reader is a class that a package announces in the entry-point group ``proofroll.robot_readers`` under the name of its
-engine. It runs in a process of its own. What it raises while it reads is the engine's refusal, in its own words.
+A package announces a reader in the entry-point group ``proofroll.robot_readers`` under the name of its engine. It runs
+in a process of its own. An exception while it reads counts as the engine's refusal, with its text as the reason.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ class Request:
     """Request to a reader.
 
     Attributes:
-        path: of a file that names no other file.
+        path: path of the file; the only files that it names are meshes.
         kind: ``urdf`` or ``mjcf``.
         base: for URDF, ``fixed`` (the root is part of the world) or ``free``.
         base_joint: name under which the reading has the free joint of a URDF's root.
         options: the user's options for this engine, by keys of the reader's ``options``.
         children: moving joint -> the body that it carries, as the file names them.
-        states: at which everything is evaluated.
+        states: states at which everything is evaluated.
         torques: moving joint -> torques for the forward dynamics, shape (states, velocities of the joint).
-        gravity: for URDF, which says none [m/s²], shape (3,).
-        robot: our own reading, for an engine without an importer.
+        gravity: gravity for a URDF, which has none [m/s²], shape (3,).
+        robot: the file's meaning, for an engine without an importer.
     """
 
     path: Path
@@ -54,11 +54,11 @@ class Reading:
 
     Attributes:
         joints: moving joints in the order of velocities.
-        dofs: velocities of each.
-        mass, com, inertia: joint -> what it carries rigidly, in the frame of the body that it carries, the inertia
-            about the centre of mass.
-        position, rotation: joint -> frame of that body in the world, shapes (states, 3) and (states, 3, 3).
-        coupled: joints that the engine holds to another one as the file's mimic says.
+        dofs: number of velocities of each.
+        mass, com, inertia: joint -> mass [kg], centre of mass [m] and inertia about it [kg m²] of the composite of all
+            bodies that it carries rigidly, in the frame of its child.
+        position, rotation: joint -> frame of its child in the world, shapes (states, 3) and (states, 3, 3).
+        coupled: joints that the engine couples to another as the file's mimic says.
         M, g, h: mass matrix, torque of gravity, torque of gravity and velocities (see
             :class:`proofroll.robots.two_formulations.Dynamics`).
         inverse: torque for the accelerations asked, without damping, friction and springs, shape (states, n); None: not
@@ -83,7 +83,7 @@ class Reading:
     remarks: tuple[str, ...] = ()
 
     def first(self, count: int) -> Reading:
-        """Reading at the first states alone."""
+        """Reading restricted to the first ``count`` states."""
         return dataclasses.replace(
             self,
             position={joint: rows[:count] for joint, rows in self.position.items()},
@@ -107,20 +107,20 @@ class Whole:
 class RobotReader(Protocol):
     """An engine's importer.
 
-    A reader whose engine defines a format names it as ``defines`` and has ``compiled(path)``, which returns what the
-    engine makes of a file as a :class:`Robot`: that is what the file means; and ``expanded(path)``, a file's text with
-    its macros written out.
+    A reader whose engine defines a format has that format as ``defines``, and two methods: ``compiled(path)`` returns
+    the compiled model as a :class:`Robot`, which is the file's meaning; ``expanded(path)`` returns the file's text with
+    macros written out.
 
-    A reader that has ``as_written(request)`` loads the file of the request as a user of the engine would, and returns a
-    :class:`Whole`: what is compared is a copy without looks, contacts and meshes that weigh nothing.
+    A reader may have ``as_written(request)``, which loads the user's own file as a user of the engine would, and
+    returns a :class:`Whole`; :meth:`read` gets a copy without looks, contacts and meshes that give no mass.
 
     A reader whose engine has no importer, and that feeds it from ``request.robot``, sets ``fed = True``.
 
     Attributes:
         kinds: formats that it reads.
-        options: documented options of the importer that a user may give, each with what it does.
-        tolerances: layer -> difference up to which the engine agrees, where its own precision is less than double's;
-            each with its reason beside it in the code.
+        options: option of the importer -> its effect.
+        tolerances: layer -> largest difference that counts as agreement, where the engine computes with less than
+            double precision; the code gives the reason.
         says: a sentence that is shown with every reading; empty: nothing special.
     """
 
@@ -136,23 +136,23 @@ class RobotReader(Protocol):
         """Version of the engine."""
 
     def read(self, request: Request) -> Reading:
-        """The model that the engine holds, evaluated.
+        """Reads a file, and evaluates the engine's model of it at all states.
 
         Raises:
-            Refused: it cannot be read or evaluated; any other exception counts as the same.
+            Refused: the file cannot be read or evaluated; any other exception counts as the same.
         """
 
 
 @dataclasses.dataclass(frozen=True)
 class AtState:
-    """One state in an engine's own velocities ν_e = T ν.
+    """Terms of an engine in one state, in its own velocities ν_e = T ν; ν: those of :mod:`proofroll.robots.states`.
 
     Attributes:
-        T: shape (n, n).
+        T: matrix of the change of velocities, shape (n, n).
         drift: dT/dt ν, shape (n,).
-        M, g, h: the engine's own.
-        inverse: acceleration -> torque; None: not offered.
-        forward: torque -> acceleration; None: not offered.
+        M, g, h: as in :class:`Reading`, in the engine's velocities.
+        inverse: acceleration ν̇_e -> torque; None: not offered.
+        forward: torque -> acceleration ν̇_e; None: not offered.
     """
 
     T: Array
@@ -167,13 +167,13 @@ class AtState:
 def evaluate(
     request: Request, joints: tuple[str, ...], dofs: tuple[int, ...], at: Callable[[int], AtState]
 ) -> dict[str, Any]:
-    """The arrays of a :class:`Reading` from an engine that is asked state by state.
+    """Arrays ``M``, ``g``, ``h``, ``inverse`` and ``forward`` of a :class:`Reading`, evaluated state by state.
 
     Args:
         request: the request.
         joints: the engine's moving joints in the order of its velocities.
-        dofs: velocities of each.
-        at: puts the engine into one state; ``inverse`` and ``forward`` are called before the next one.
+        dofs: number of velocities of each.
+        at: puts the engine into the state of this index; its ``inverse`` and ``forward`` are called before the next.
     """
     rows: dict[str, list[Array]] = {"M": [], "g": [], "h": [], "inverse": [], "forward": []}
     asked = [_stack(rates, joints, dofs) for rates in (request.states.acceleration, request.torques)]
@@ -193,7 +193,7 @@ def evaluate(
 
 
 def _stack(rates: Mapping[str, Array], joints: tuple[str, ...], dofs: tuple[int, ...]) -> Array:
-    """Rates of an engine's joints in its order; of one that the file does not have, or has otherwise, zero."""
+    """Rates in the engine's order, shape (states, n); zero for joints that the file lacks or has of another kind."""
     count = len(next(iter(rates.values())))
     pairs = ((rates.get(name), np.zeros((count, dof))) for name, dof in zip(joints, dofs, strict=True))
     parts = [np.zeros((count, 0))]

@@ -1,4 +1,4 @@
-"""A file read by an engine in a process of its own: both sides of the pipe."""
+"""Reading of a file by an engine in a separate process: request and answer, both sides of the pipe."""
 
 import contextlib
 import copy
@@ -22,7 +22,7 @@ from proofroll.running.loading import here
 from proofroll.running.process import Worker
 
 _BY_JOINT = ("mass", "com", "inertia", "position", "rotation")
-# What no importer raises, but a mistake in a reader does.
+# Exceptions that come from a mistake in a reader, not from an importer.
 _OF_A_READER = (AttributeError, TypeError, NameError, LookupError, ImportError)
 _ARRAYS = ("M", "g", "h", "inverse", "forward")
 
@@ -38,7 +38,7 @@ def require_reader(name: str) -> None:
 
 
 def load_reader(name: str) -> Any:
-    """A reader.
+    """Instance of an engine's reader.
 
     Raises:
         InputError: no installed package announces one for this engine.
@@ -59,12 +59,10 @@ class ReaderAnswer:
     """Answer of a reader.
 
     Attributes:
-        version: of the engine.
-        says: sentence shown with every reading of this engine.
-        tolerances: where the engine's own precision is less than double's, by layer.
+        version: version of the engine.
+        says, tolerances, fed: see :class:`proofroll.robots.protocol.RobotReader`.
         reading: model that the engine holds; None: it refused.
-        refused: why, in its own words.
-        fed: see :class:`proofroll.robots.protocol.RobotReader`.
+        refused: reason of the refusal, in the engine's words.
     """
 
     version: str
@@ -76,7 +74,7 @@ class ReaderAnswer:
 
 
 class AsWritten(NamedTuple):
-    """Totals of a file as it is, as an engine reads it; or the reason of its refusal."""
+    """Totals that an engine reads from the unchanged file; or None, and the reason of its refusal."""
 
     whole: Whole | None
     refused: str
@@ -91,20 +89,21 @@ def ask(worker: Worker, engine: str, request: Request, folder: Path, time_limit:
     """
     asked, arrays = folder / "request.json", folder / "answer.npz"
     asked.write_text(json.dumps(plain(request) | {"path": str(request.path)}), encoding="utf-8")
-    told = worker.request(call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
+    answer = worker.request(call(read_robot, engine=engine, asked=str(asked), arrays=str(arrays)), time_limit)
     reading = None
-    if not told["refused"]:
+    if not answer["refused"]:
         with np.load(arrays, allow_pickle=False) as stored:
             values: dict[str, Any] = {name: stored[name] if name in stored.files else None for name in _ARRAYS}
             for name in _BY_JOINT:
-                values[name] = dict(zip(told[name], stored[name], strict=True))
-        values |= {name: tuple(told[name]) for name in ("joints", "dofs", "coupled", "remarks")}
+                values[name] = dict(zip(answer[name], stored[name], strict=True))
+        values |= {name: tuple(answer[name]) for name in ("joints", "dofs", "coupled", "remarks")}
         reading = Reading(**values)
-    return ReaderAnswer(told["version"], told["says"], told["tolerances"], reading, told["refused"], told["fed"])
+    about = (answer["version"], answer["says"], answer["tolerances"])
+    return ReaderAnswer(*about, reading, answer["refused"], answer["fed"])
 
 
 def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
-    """The worker's side: reads, evaluates, and writes the arrays to a file."""
+    """Worker's side of :func:`ask`: reads the file, evaluates the model, and writes arrays to the file ``arrays``."""
     from proofroll.running.worker import one_line
 
     reader, request = load_reader(here(engine)), _request(asked)
@@ -113,29 +112,29 @@ def read_robot(engine: str, asked: str, arrays: str) -> dict[str, Any]:
         require_known(f"{engine}: {option}", option, reader.options, "there is no such option; it has", value)
     if request.kind not in reader.kinds:
         raise Missing(f"{engine} reads no {request.kind.upper()}")
-    told: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
-    told["fed"] = getattr(reader, "fed", False)
+    answer: dict[str, Any] = {"version": reader.version(), "says": reader.says, "tolerances": dict(reader.tolerances)}
+    answer["fed"] = getattr(reader, "fed", False)
     try:
         with contextlib.chdir(Path(arrays).parent):  # where an engine may leave its log
             reading = reader.read(request)
         _require_whole(reading, request.states.count)
     except Refused as error:
-        return told | {"refused": str(error)}
+        return answer | {"refused": str(error)}
     except _OF_A_READER as error:
         return {"error": "crashed", "message": f"the reader of {engine} failed: {one_line(error)}"}
     except _Flawed as error:
         return {"error": "crashed", "message": f"the answer of {engine} has no meaning: {error}"}
     except Exception as error:  # whatever an importer raises is its refusal
-        return told | {"refused": one_line(error)}
+        return answer | {"refused": one_line(error)}
     parts: dict[str, Any] = {name: np.array(list(getattr(reading, name).values()), dtype=float) for name in _BY_JOINT}
     parts |= {name: getattr(reading, name) for name in _ARRAYS if getattr(reading, name) is not None}
     np.savez(arrays, **parts)
     names = {name: list(getattr(reading, name)) for name in (*_BY_JOINT, "joints", "dofs", "coupled", "remarks")}
-    return told | {"refused": ""} | names
+    return answer | {"refused": ""} | names
 
 
 def _request(asked: str) -> Request:
-    """The request in a file that the other side wrote."""
+    """Request from its file, written by :func:`ask`."""
     content = json.loads(Path(asked).read_text(encoding="utf-8"))
     content["path"], content["gravity"] = Path(content["path"]), np.array(content["gravity"])
     content["states"], content["robot"] = states_from(content["states"]), robot_from(content["robot"])
@@ -148,7 +147,7 @@ class _Flawed(Exception):  # noqa: N818 -- becomes the row of the engine
 
 
 def _require_whole(reading: Reading, states: int) -> None:
-    """Raises unless names are unique and every array has the shape that :class:`Reading` says."""
+    """Raises _Flawed unless names are unique and every array has the shape that :class:`Reading` documents."""
     if repeated := [name for name in reading.joints if reading.joints.count(name) > 1]:
         raise _Flawed(f"two joints are called {repeated[0]!r}")
     n = sum(reading.dofs)
@@ -164,19 +163,21 @@ def _require_whole(reading: Reading, states: int) -> None:
 def ask_as_written(
     worker: Worker, engine: str, request: Request, original: Path, folder: Path, time_limit: float
 ) -> AsWritten | None:
-    """Asks the worker to read the file itself; None: the reader does not offer that.
+    """Asks the worker to read the user's unchanged file; None: the reader does not offer that.
 
     Raises:
         WorkerDied: the process crashed or took longer than ``time_limit`` [s].
     """
     asked = folder / "as_written.json"
     asked.write_text(json.dumps(plain(request) | {"path": str(original.resolve())}), encoding="utf-8")
-    told = worker.request(call(read_as_written, engine=engine, asked=str(asked)), time_limit)
-    return AsWritten(Whole(*told["whole"]) if told["whole"] else None, told["refused"]) if "whole" in told else None
+    answer = worker.request(call(read_as_written, engine=engine, asked=str(asked)), time_limit)
+    if "whole" not in answer:
+        return None
+    return AsWritten(Whole(*answer["whole"]) if answer["whole"] else None, answer["refused"])
 
 
 def read_as_written(engine: str, asked: str) -> dict[str, Any]:
-    """The worker's side: how much an engine holds of a file as it is."""
+    """Worker's side of :func:`ask_as_written`: totals of the unchanged file."""
     reader = load_reader(here(engine))
     if not hasattr(reader, "as_written"):
         return {}
@@ -189,12 +190,12 @@ def read_as_written(engine: str, asked: str) -> dict[str, Any]:
 
 
 def words_of(error: BaseException) -> str:
-    """Kind and text of an engine's exception in one line."""
+    """Type and text of an exception in one line of at most 400 characters."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"[:400]
 
 
 def write(file: RobotFile, folder: Path) -> Path:
-    """The file that engines get."""
+    """Writes the copy that engines read into ``folder``; returns its path."""
     target = folder / f"robot.{'urdf' if file.kind == 'urdf' else 'xml'}"
     root = copy.deepcopy(file.root)
     ElementTree.indent(root)  # PyBullet 3.2.7 cuts lines at 8 kB
@@ -203,7 +204,7 @@ def write(file: RobotFile, folder: Path) -> Path:
 
 
 def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
-    """Options as the user writes them. Raises InputError if one is neither true nor false."""
+    """Options of an engine as booleans. Raises InputError if a value is neither true nor false."""
     options = {}
     for key, value in given.items():
         if str(value).lower() not in {"true", "false"}:
@@ -213,7 +214,7 @@ def options_of(given: Mapping[str, Any], engine: str) -> dict[str, bool]:
 
 
 def call(function: Callable[..., dict[str, Any]], **arguments: Any) -> dict[str, Any]:
-    """A request to a worker for a function of a module."""
+    """Request to a worker to call a function of a module."""
     return {"do": "call", "function": f"{function.__module__}:{function.__name__}", "arguments": arguments}
 
 

@@ -10,7 +10,7 @@ from proofroll.robots.robot_file import LintRemark
 
 @dataclass(frozen=True)
 class HeldLayer:
-    """Difference of an engine at a layer, and whether it is within the tolerance."""
+    """Relative difference of an engine at a layer, its tolerance, and True if the difference is within it."""
 
     difference: float
     tolerance: float
@@ -22,17 +22,17 @@ class ImporterRow:
     """Reading of a file by one engine's importer.
 
     Attributes:
-        engine: as the user wrote it.
+        engine: engine with options, as the user wrote it.
         status: ``holds``, ``explained``, ``differs``, ``refused``, ``missing``, or how its process ended.
         message: reason that the engine has no model of the file; None if it has one.
-        says: remark that holds for every file that this engine reads.
-        remarks: of its reader, on this file.
-        layers: those that it offers.
-        causes: of its differences.
-        unexplained: the first layer that they leave open.
+        says: remark on every file that this engine reads.
+        remarks: remarks of its reader on this file.
+        layers: layer -> difference, for the layers that it offers.
+        causes: causes of its differences.
+        unexplained: first layer whose difference they do not explain.
         held: result for the compared copy, which has no looks, no contacts and only meshes with mass.
         as_written: result of its importer on the file as it is, where that is asked.
-        fed: the engine has no importer: it was fed from our reading, and what it leaves out is no news of a file.
+        fed: the engine has no importer and was fed from our reading, so its omissions say nothing about a file.
         accepted: all causes of its differences are among those that the user accepts.
         where: body or joint with the largest difference, at the first layer that fails.
         offending: joints whose carried body it holds differently, or lacks.
@@ -68,7 +68,7 @@ class ImporterRow:
 
 @dataclass(frozen=True)
 class UsedTruth:
-    """Source of the file's meaning, and the largest relative ``difference`` of the two formulations."""
+    """Truth of a check: source of the file's meaning, and the largest relative ``difference`` of two formulations."""
 
     by: str
     difference: float
@@ -87,7 +87,7 @@ class DrawnBody:
 
 @dataclass(frozen=True)
 class DrawnJoint:
-    """Kind and ends of a joint."""
+    """Name, kind and bodies of a joint."""
 
     name: str
     kind: str
@@ -106,7 +106,7 @@ class DrawnRobot:
 
 @dataclass(frozen=True)
 class RobotCheck:
-    """A file, what is noticed in it, what is true of it, and what engines hold; ``layers``: name -> meaning."""
+    """Result of a check: remarks on the file, its truth, and a row for each engine; ``layers``: name -> meaning."""
 
     file: str
     kind: str
@@ -130,14 +130,14 @@ class UnlikeValue:
 
 @dataclass(frozen=True)
 class AgainstCheck(RobotCheck):
-    """A second file held against the first, whose row stands where those of engines do.
+    """Comparison of two files; ``engines`` has the row of the second file.
 
     Attributes:
         against: the second file.
-        against_by: by whose reading it has its meaning.
+        against_by: clause on whose reading gives the second file its meaning.
         matched: joint of the first file -> its partner in the second.
         absent, added: moving joints that only the first file has, or only the second.
-        values: other values of joints.
+        values: values of joints that differ.
     """
 
     against: str

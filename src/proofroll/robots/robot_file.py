@@ -1,4 +1,4 @@
-"""A robot file as every engine gets it: read once and safely, without what loads other files."""
+"""Safe reading of a robot file: XML with limits and without entities; paths confined to a folder."""
 
 import dataclasses
 import math
@@ -10,18 +10,18 @@ from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
 
 from proofroll.core.errors import InputError
 
-# Of the XML of strangers; a robot file is a few hundred kB, the largest known is 2 MB.
+# Limits of bytes, depth and elements for untrusted XML; a robot file has a few hundred kB, the largest known 2 MB.
 LARGEST, DEEPEST, MOST_ELEMENTS = 32 * 2**20, 400, 200_000
 
 
 @dataclasses.dataclass(frozen=True)
 class LintRemark:
-    """Finding in a file.
+    """Remark on a robot file.
 
     Attributes:
         level: ``error`` (breaks the format or physics), ``warning`` (engines treat it differently) or ``note``.
         where: ``link NAME``, ``joint NAME`` or the name of an element.
-        what: a sentence.
+        what: the remark, a sentence.
     """
 
     level: str
@@ -31,15 +31,15 @@ class LintRemark:
 
 @dataclasses.dataclass(frozen=True)
 class RobotFile:
-    """A file and what was made of it.
+    """A robot file, prepared for engines.
 
     Attributes:
-        path: as the user gave it.
+        path: path as the user gave it.
         kind: ``urdf`` or ``mjcf``.
-        root: the content that engines get; of MJCF with all includes.
-        base: ``fixed`` or ``free``: what carries the root of a URDF; of MJCF the file says so itself.
-        remarks: omissions and changes on the way.
-        contained: whether all files that it names, looks included, lie in the folder that files are read from.
+        root: content that engines get; of an MJCF with all includes inserted.
+        base: support of the root of a URDF, ``fixed`` or ``free``; an MJCF has its own.
+        remarks: remarks on omissions and changes.
+        contained: True if all files that it names, textures included, lie in the folder that files are read from.
     """
 
     path: Path
@@ -50,7 +50,7 @@ class RobotFile:
     contained: bool = True
 
 
-# Content of a file and of those that it attaches, by their names -> what an engine makes of macros in it.
+# Function: name -> content of a file (first) and of the files that it attaches -> content with macros written out.
 Expand = Callable[[Mapping[str, Element]], Element]
 
 
@@ -58,7 +58,7 @@ RUN_XACRO = "run xacro first: xacro FILE > robot.urdf"
 
 
 class _Builder(TreeBuilder):
-    """Builds elements, and stops at what no robot file needs."""
+    """Builds elements; raises _TooMuch beyond the limits of depth and number, and at a document type."""
 
     depth = elements = 0
 
@@ -84,10 +84,10 @@ class _TooMuch(Exception):  # noqa: N818 -- turned into an InputError with the n
 
 
 def read_xml(path: Path) -> Element:
-    """The root element of a file: no document types, no entities, nothing loaded, limits on size and depth.
+    """Root element of an XML file, read without document types, entities and other files.
 
     Raises:
-        InputError: it cannot be read, is too large or too deep, declares a document type or is no XML.
+        InputError: the file cannot be read, is too large or too deep, declares a document type or is no XML.
     """
     try:
         if not path.is_file():
@@ -110,8 +110,8 @@ def read_xml(path: Path) -> Element:
         raise InputError("file", path, f"this is no XML: {error}") from None
 
 
-# A comment may hold no "--", nothing may stand before <?xml and no null characters at the end: few files keep to that,
-# and MuJoCo asks for none of it.
+# XML allows no "--" in a comment, nothing before <?xml and no null characters at the end. Some files break these rules,
+# and MuJoCo reads them.
 _COMMENTS = re.compile(rb"<!--.*?-->", re.DOTALL)
 
 
@@ -123,7 +123,7 @@ def _parsed(text: bytes) -> Element:
 
 
 def file_inside(folder: Path, name: str, inside: Path) -> Path | None:
-    """A file by its name in a folder if it lies in ``inside`` or below, links followed."""
+    """Path of a file named relative to a folder, links followed; None: it lies outside the folder ``inside``."""
     try:
         target = (folder / name).resolve()
     except (OSError, RuntimeError, ValueError):  # a loop of links; a name with a null character
@@ -131,21 +131,21 @@ def file_inside(folder: Path, name: str, inside: Path) -> Path | None:
     return target if target.is_relative_to(inside) and target != inside else None
 
 
-# Attributes that name a file, the folders of an MJCF's files, and how others than paths are recognised.
+# Attributes that name a file; attributes that name folders of an MJCF's files; part of a name that is no path.
 _FILES = ("file", "filename", *(f"file{side}" for side in ("right", "left", "up", "down", "front", "back")))
 _FOLDERS = ("assetdir", "meshdir", "texturedir")
 _ADDRESS = "://"
 
 
 def names_files_inside(root: Element, folder: Path, inside: Path) -> bool:
-    """True if all files that are named lie in the folder ``inside`` or below, wherever they are looked for."""
+    """True if all files that are named lie in the folder ``inside`` or below, in every folder they may refer to."""
     folders = {folder, *(folder / element.get(key, "") for element in root.iter("compiler") for key in _FOLDERS)}
     names = {name for element in root.iter() for key in _FILES if (name := element.get(key)) and _ADDRESS not in name}
     return all(file_inside(place, name, inside) is not None for place in folders for name in names)
 
 
 def required_file(folder: Path, element: Element, inside: Path) -> Path:
-    """The file that an element names. Raises InputError if it lies outside the folder ``inside``."""
+    """Path of the file that an element names. Raises InputError if it lies outside the folder ``inside``."""
     target = file_inside(folder, element.get("file", ""), inside)
     if target is None:
         said = (
@@ -156,10 +156,10 @@ def required_file(folder: Path, element: Element, inside: Path) -> Path:
 
 
 def numbers(element: Element, attribute: str, default: str | None, count: int) -> list[float]:
-    """The numbers in an attribute.
+    """Numbers in an attribute, exactly ``count``.
 
     Raises:
-        InputError: it is absent without a default, has another number of them, or one is not finite.
+        InputError: the attribute is missing without a default, has more or fewer numbers, or one is not finite.
     """
     text = element.get(attribute, default)
     field = f"<{element.tag} {attribute}>"
@@ -177,5 +177,5 @@ def numbers(element: Element, attribute: str, default: str | None, count: int) -
 
 
 def floats(text: str) -> list[float]:
-    """The numbers in a text, however many."""
+    """All numbers in a text, separated by spaces."""
     return [float(part) for part in text.split()]

@@ -1,7 +1,7 @@
 """A robot file as a scene: its tree of links, released from a random pose under gravity.
 
-Links that fixed joints hold together are one body, in the frame of the link that the moving joint carries. Contacts and
-looks are left out, actuators of an MJCF act where they are asked for.
+Links connected by fixed joints are one body, in the frame of the child of its moving joint. Contacts and looks are left
+out; actuators of an MJCF act if the scene's parameter ``actuators`` is 1.
 """
 
 from collections.abc import Iterator, Mapping
@@ -38,7 +38,7 @@ _FACTORS = {
 
 
 class RobotScenes:
-    """See :class:`proofroll.files.scene_sources.SceneSource`."""
+    """Scenes from robot files; see :class:`proofroll.files.scene_sources.SceneSource`."""
 
     endings: ClassVar[tuple[str, ...]] = (".urdf", ".xml")
 
@@ -79,10 +79,10 @@ class RobotScenes:
 
     @staticmethod
     def tables(path: Path, values: Mapping[str, float]) -> dict[str, Any]:
-        """Gravity, bodies, joints, their couplings, and tracked points.
+        """Tables of the scene for these values of its parameters: gravity, bodies, joints, points and the rest.
 
         Raises:
-            InputError: nothing in the file moves.
+            InputError: nothing in the file moves, or a link has an impossible inertia.
         """
         file, robot = _robot(path, BASES[int(values.get("free_base", 0))])
         if not robot.moving:
@@ -131,7 +131,7 @@ def _robot(path: Path, base: str) -> tuple[RobotFile, Robot]:
 
 
 def _names(robot: Robot) -> dict[str, str]:
-    """Names of links in the scene, where ``world`` is what does not move."""
+    """Link -> name of its body in the scene; a link called ``world`` is renamed, as a scene has its own ``world``."""
     names = {joint.child: joint.child for joint in robot.moving}
     if "world" in names:
         free = ("world_link" + "_" * number for number in range(len(robot.bodies) + 1))
@@ -142,7 +142,7 @@ def _names(robot: Robot) -> dict[str, str]:
 def _joint(
     robot: Robot, joint: RobotJoint, names: Mapping[str, str], start: RobotStates, values: Mapping[str, float]
 ) -> dict[str, Any]:
-    """A joint between what its parent and its child are welded to."""
+    """Table of a joint between the bodies of the scene to which its parent and its child belong."""
     home, p, R = robot.welded[joint.parent]
     carrier = next((other.child for other in robot.moving if other.name == home), WORLD)
     table: dict[str, Any] = {"name": joint.name, "kind": joint.kind}
@@ -152,7 +152,7 @@ def _joint(
         law: values[law] * getattr(joint, law) for law in _FACTORS if joint.kind in LAWS[law] and getattr(joint, law)
     }
     v = values["speed"] * start.velocity[joint.name][0]
-    if joint.kind == "free":  # its coordinates are of the world, whatever it hangs on
+    if joint.kind == "free":  # its coordinates are relative to the world, whatever its parent is
         turned = start.rotation[joint.name][0]
         q = [*start.position[joint.name][0], *_quaternion(turned)]
         return table | laws | {"q0": q, "v0": [*(turned.T @ v[:3]), *(turned.T @ v[3:])]}
@@ -173,7 +173,7 @@ def _quaternion(R: Array) -> Any:
 
 
 def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:
-    """Joints that follow another one, as tables of a scene."""
+    """Tables of couplings for joints that follow another one."""
     for mimic in robot.mimics:
         if _follows(robot, mimic):
             ends = {"joint_a": mimic.other, "joint_b": mimic.joint}
@@ -181,13 +181,13 @@ def _coupled(robot: Robot) -> Iterator[dict[str, Any]]:
 
 
 def _follows(robot: Robot, mimic: Mimic) -> bool:
-    """True if a coupling says what a joint does that follows another."""
+    """True if a coupling of a scene can represent a mimic."""
     dofs = {joint.name: joint.dofs for joint in robot.moving}
     return bool(mimic.multiplier) and dofs.get(mimic.joint) == dofs.get(mimic.other) == 1
 
 
 def _couplings(file: RobotFile, robot: Robot) -> Iterator[str]:
-    """Parts of a robot that no scene of bodies and joints has, each as a clause."""
+    """Clause for each coupling of a robot that a scene cannot represent: mimics, constraints, tendons, a medium."""
     for mimic in (mimic for mimic in robot.mimics if not _follows(robot, mimic)):
         yield f"joint {mimic.joint} following {mimic.other} (mimic)"
     if file.kind != "mjcf":

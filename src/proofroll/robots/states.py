@@ -1,7 +1,7 @@
-"""Random states of a robot, in the convention that all results are brought to.
+"""Random states of a robot, and the convention of coordinates and velocities for all results.
 
-A velocity is that of each moving joint in the order of the tree: of a revolute or prismatic joint its rate, of a
-spherical joint the angular velocity in the child's axes, of a free joint the velocity of the child's origin and its
+Velocities are ordered as the moving joints of the tree. A revolute or prismatic joint has the rate of its coordinate; a
+spherical joint the angular velocity in the child's axes; a free joint the velocity of the child's origin and then its
 angular velocity, both in world axes.
 """
 
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from proofroll.robots.model import Array, Robot
 
-# Slower joints might stick where an engine smooths Coulomb friction [rad/s or m/s].
+# Least speed of a joint: slower ones might stick where an engine smooths Coulomb friction [rad/s or m/s].
 _SLOWEST = 0.2
 
 
@@ -42,7 +42,7 @@ class RobotStates:
         return len(next(iter(self.velocity.values()), ()))
 
     def first(self, count: int) -> RobotStates:
-        """The first states alone."""
+        """States restricted to the first ``count``."""
         parts = {name: {joint: rows[:count] for joint, rows in each.items()} for name, each in vars(self).items()}
         return RobotStates(**parts)
 
@@ -51,7 +51,7 @@ class RobotStates:
         return np.concatenate([np.zeros((self.count, 0)), *(rates[joint.name] for joint in robot.moving)], axis=1)
 
     def completed(self, robot: Robot) -> RobotStates:
-        """States in which the joints of a robot that these do not have are at rest at coordinates 0."""
+        """States of all joints of a robot; joints that are absent here are at rest at coordinate 0."""
         added = [joint for joint in robot.moving if joint.name not in self.velocity]
         if not added:
             return self
@@ -68,7 +68,7 @@ class RobotStates:
 
 
 def random_states(robot: Robot, count: int, seed: int) -> RobotStates:
-    """States within the limits of the joints (or ±π, ±1 m), of moderate velocities, which obey the mimics."""
+    """Random states within the limits of the joints (or ±π, ±1 m), with moderate velocities, consistent with mimics."""
     random = np.random.default_rng(seed)
     angle, rotation, position = {}, {}, {}
     for joint in robot.moving:

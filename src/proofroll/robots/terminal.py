@@ -1,4 +1,4 @@
-"""The result of a check on the terminal, within 80 columns."""
+"""Result of a check as text for the terminal, within 80 columns."""
 
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -33,15 +33,15 @@ def table(content: RobotCheck) -> Table:
     """One line per engine: the difference at each layer that does not hold."""
     layers = numeric(*(SHORT[layer] for layer in content.layers))
     first = "file" if isinstance(content, AgainstCheck) else "engine"
-    made = plain_table(Column(first, no_wrap=True, max_width=20), *unbroken(""), *layers)
+    rows = plain_table(Column(first, no_wrap=True, max_width=20), *unbroken(""), *layers)
     for row in content.engines:
         style = _COLOURS.get(row.status, "bold red")
-        # A path would fill the column, and the version says which it is.
+        # The path of an interpreter would fill the column; the version identifies the engine.
         name = row.engine.partition("@")[0] if "/" in row.engine else row.engine
         label = Text(one_line(f"{name} {row.version or ''}"), overflow="ellipsis")
         cells = (_cell(row.layers.get(layer)) for layer in content.layers)
-        made.add_row(label, Text(_MARKS.get(row.status, "!"), style=style), *cells)
-    return made
+        rows.add_row(label, Text(_MARKS.get(row.status, "!"), style=style), *cells)
+    return rows
 
 
 def _cell(layer: HeldLayer | None) -> Text:
@@ -51,17 +51,16 @@ def _cell(layer: HeldLayer | None) -> Text:
 
 
 def amount(value: float | None, digits: int = 2) -> str:
-    """A difference in few characters; a small whole number counts something, and is never rounded."""
+    """A difference as text; a whole number below 100 is a count, and is not rounded."""
     return f"{value:.0f}" if value in range(100) else error(value, digits)
 
 
 def lines(content: RobotCheck) -> Iterator[str]:
-    """Lines on the file, its errors, and every engine's causes, of at most 80 characters."""
+    """Lines on the file, its truth, and its errors and warnings, of at most 80 characters."""
     truth = content.truth
     base = f", {content.base} base" if content.kind == "urdf" else ""
     moves, states = counted(truth.velocities, "velocities"), counted(truth.states, "states")
-    said = f"{content.file}: {content.kind.upper()}{base}, {moves}, {states}"
-    yield from wrapped(said)
+    yield from wrapped(f"{content.file}: {content.kind.upper()}{base}, {moves}, {states}")
     yield from wrapped(f"true is {truth.by}; its two formulations differ by {amount(truth.difference)}")
     yield from remark_lines([remark for remark in content.lint if remark.level != "note"])
 
@@ -77,14 +76,14 @@ def remark_lines(remarks: Sequence[LintRemark]) -> Iterator[str]:
 
 
 def verdict_lines(content: RobotCheck) -> Iterator[str]:
-    """Lines on each engine's reading, with proof, and on the file as it is."""
+    """Lines on readings of the unchanged file, on each engine's reading with causes, and notes on the file."""
     written: dict[str, list[str]] = {}
     for row in content.engines:
         if row.as_written:
             written.setdefault(row.as_written, []).append(row.engine)
     if written:
-        said = "; ".join(f"{', '.join(names)}: {words}" for words, names in written.items())
-        yield from wrapped(f"The file as it is: {said}.")
+        readings = "; ".join(f"{', '.join(names)}: {words}" for words, names in written.items())
+        yield from wrapped(f"The file as it is: {readings}.")
     for row in content.engines:
         for sentence in sentences(row):
             yield from wrapped(sentence)
@@ -92,22 +91,22 @@ def verdict_lines(content: RobotCheck) -> Iterator[str]:
 
 
 def against_lines(content: AgainstCheck) -> Iterator[str]:
-    """Lines on how joints were matched, and on values that only one file has."""
-    here, there = (Path(name).name for name in (content.file, content.against))
-    if here == there:
-        here, there = content.file, content.against
-    yield from wrapped(f"what {there} says is {content.against_by}")
+    """Lines on partners of joints, joints that only one file has, and values that differ."""
+    first, second = (Path(name).name for name in (content.file, content.against))
+    if first == second:
+        first, second = content.file, content.against
+    yield from wrapped(f"what {second} says is {content.against_by}")
     partners = [f"{one} is {two}" for one, two in content.matched.items() if one != two]
     if partners:
         yield from wrapped(f"joints with another name there: {', '.join(partners)}")
-    for name, alone in ((here, content.absent), (there, content.added)):
+    for name, alone in ((first, content.absent), (second, content.added)):
         if alone:
             yield from wrapped(f"only in {name}: {', '.join(alone)}")
     if content.absent and content.added:
         yield "joints of the same kind are matched by --map NAME=NAME"
     for value in content.values:
-        said = (f"{_value(each)} in {name}" for each, name in ((value.here, here), (value.there, there)))
-        yield from wrapped(f"joint {value.joint}: {value.quantity} {', '.join(said)}")
+        pair = (f"{_value(each)} in {name}" for each, name in ((value.here, first), (value.there, second)))
+        yield from wrapped(f"joint {value.joint}: {value.quantity} {', '.join(pair)}")
 
 
 def _value(value: float | str | None) -> str:
@@ -115,7 +114,7 @@ def _value(value: float | str | None) -> str:
 
 
 def sentences(row: ImporterRow) -> Iterator[str]:
-    """Sentences on one engine's reading."""
+    """Sentences on one engine's reading: remarks, refusal, causes, place of the largest difference."""
     name = row.named
     if row.says and row.layers:
         yield f"{name}: {row.says}"
@@ -140,7 +139,7 @@ _VERBS = {"refused": "refuses the file", "missing": "is left out", "timeout": "t
 
 
 def wrapped(text: str) -> list[str]:
-    """A sentence in lines; what follows the first is indented."""
+    """Lines of a sentence, at most 80 characters wide; all but the first are indented."""
     return textwrap.wrap(one_line(text), WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
@@ -150,7 +149,7 @@ def one_line(text: str) -> str:
 
 
 def gallery_lines(content: GalleryContent) -> Iterator[str]:
-    """A line or more for each robot: what every engine does, and what was not expected."""
+    """Lines for each robot of the gallery: outcome of every engine, and unexpected outcomes; then a summary."""
     for row in content.robots:
         if row.file is None:
             yield from wrapped(f"{row.name}: not here: pip install {row.package}")

@@ -14,9 +14,9 @@ from proofroll.core.arrays import cross
 from proofroll.robots.model import WORLD, Array, Robot, RobotJoint
 from proofroll.robots.states import RobotStates
 
-# Smallest eigenvalue of the scaled mass matrix: some 64 velocities times round-off.
+# Smallest eigenvalue of the scaled mass matrix that counts as nonzero: some 64 velocities times round-off.
 _SINGULAR = 1e-14
-# Products of a matrix product that OpenBLAS computes in one thread; several threads cost more here than they save.
+# Largest matrix product, in multiplications, that OpenBLAS computes in one thread; more threads are slower here.
 _ALONE = 2**18
 
 
@@ -40,7 +40,7 @@ class Dynamics:
         own = np.sqrt(np.abs(np.diagonal(self.M, axis1=1, axis2=2)))
         if not own.size or not own.min():
             return True
-        try:  # as of all whose eigenvalues exceed the bound
+        try:  # Cholesky succeeds if all eigenvalues exceed the bound
             np.linalg.cholesky(self.M / own[:, :, None] / own[:, None, :] - _SINGULAR * np.eye(own.shape[1]))
         except np.linalg.LinAlgError:
             return True
@@ -94,7 +94,7 @@ def _rotate(R: Array, r: Array) -> Array:
 
 
 def skew(r: Array) -> Array:
-    """The matrix of r × for each row."""
+    """Matrix of the cross product r × for each vector, shape (..., 3, 3)."""
     matrix = np.zeros((*r.shape[:-1], 3, 3))
     matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -r[..., 2], r[..., 1], -r[..., 0]
     matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = r[..., 2], -r[..., 1], r[..., 0]
@@ -113,7 +113,10 @@ class _Motion:
 
 
 def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = None) -> Dynamics:
-    """Formulation A; ``frames`` are the :func:`poses`, where they are known."""
+    """Terms of the equation of motion by Jacobians in world axes (formulation A).
+
+    ``frames`` are the :func:`poses`, if they are known already.
+    """
     count, n = states.count, robot.dofs
     v = states.stacked(states.velocity, robot)
     frames = poses(robot, states) if frames is None else frames
@@ -141,7 +144,7 @@ def world_jacobians(robot: Robot, states: RobotStates, frames: Frames | None = N
 
 
 def _summed(one: Array, other: Array) -> Array:
-    """Sum of oneᵀ other over bodies, of arrays of shape (bodies, states, 3, any); states first."""
+    """Sum of oneᵀ other over bodies, shape (states, any, any), of arrays of shape (bodies, states, 3, any)."""
     left, right = (each.swapaxes(0, 1).reshape(each.shape[1], -1, each.shape[3]) for each in (one, other))
     total = np.zeros((one.shape[1], one.shape[3], other.shape[3]))
     rows = max(1, _ALONE // (one.shape[3] * other.shape[3]))
@@ -156,7 +159,7 @@ def armature(robot: Robot) -> Array:
 
 
 def turned_armature(robot: Robot, v: Array) -> Array:
-    """Force of armature along axes that turn with a free body: −armature ω × v, shape (states, n)."""
+    """Force of armature that acts along the axes of a free body: −armature ω × v, shape (states, n)."""
     torques = np.zeros_like(v)
     for joint in robot.moving:
         if joint.turning:
@@ -191,5 +194,5 @@ def _carried(robot: Robot, joint: RobotJoint, parent: _Motion, frames: Frames, v
 
 
 def _swung(w: Array, alpha: Array, r: Array) -> Array:
-    """Acceleration of a point at r of a body that turns so against that of its origin."""
+    """Acceleration of a point at r relative to the body's origin: α × r + ω × (ω × r)."""
     return cross(alpha, r) + cross(w, cross(w, r))

@@ -1,4 +1,4 @@
-"""Our own reading of URDF, by its specification (wiki.ros.org/urdf/XML): what the file says, nothing invented."""
+"""Our own reading of URDF, strictly by its specification (wiki.ros.org/urdf/XML), with no values invented."""
 
 import copy
 import math
@@ -13,16 +13,16 @@ from proofroll.core.errors import InputError, choices, told_of
 from proofroll.robots.model import DOFS, WORLD, Array, Mimic, Robot, RobotBody, RobotJoint
 from proofroll.robots.robot_file import LintRemark, RobotFile, numbers
 
-# What carries the root; no name in a file begins so.
+# Name of the joint between the world and the root link.
 BASE_JOINT = "(base)"
-# The last is no kind of the specification: Bullet and MuJoCo read it.
+# Kind in a URDF -> kind of a joint here. ``spherical`` is not in the specification, but Bullet and MuJoCo read it.
 _KINDS = {kind: kind for kind in ("revolute", "prismatic", "fixed", "spherical")} | {"continuous": "revolute"}
 _MOMENTS = ("xx", "xy", "xz", "yy", "yz", "zz")
 _PRIMITIVES = {"box", "sphere", "cylinder", "capsule"}
 
 
 def stripped(root: Element) -> tuple[Element, list[LintRemark]]:
-    """A copy without what needs other files or speaks to one engine alone, and what that was."""
+    """Copy of a URDF without meshes, looks and options for single programs, and remarks on omissions."""
     root, remarks = copy.deepcopy(root), []
     for child in list(root):
         if child.tag not in {"link", "joint"}:
@@ -53,7 +53,7 @@ def stripped(root: Element) -> tuple[Element, list[LintRemark]]:
 
 
 def rename_world(root: Element) -> None:
-    """Gives the root link another name where it is called as what does not move: some engines would not free it."""
+    """Renames a root link called ``world``: some engines fix such a link to the ground."""
     carried = {child.get("link") for joint in root.iter("joint") for child in joint.findall("child")}
     taken = {link.get("name") for link in root.iter("link")}
     if "world" in taken - carried:
@@ -67,10 +67,10 @@ def rename_world(root: Element) -> None:
 
 
 def read_urdf(file: RobotFile) -> Robot:
-    """The robot.
+    """Robot of a URDF.
 
     Raises:
-        InputError: the file breaks the specification so that it has no meaning, or has a planar or floating joint.
+        InputError: the file violates the specification so that it has no meaning, or has a planar or floating joint.
     """
     with told_of(str(file.path)):
         return _robot(file)
@@ -174,7 +174,11 @@ def _joint(name: str, element: Element, links: dict[str, Element]) -> RobotJoint
 
 
 def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> tuple[RobotJoint, ...]:
-    """The joints, parents first, with the one that carries the root."""
+    """Joints, parents first, starting with the one that carries the root link.
+
+    Raises:
+        InputError: the links do not form a tree with one root.
+    """
     carried = Counter(joint.child for joint in joints)
     for name, times in carried.items():
         if times > 1:
@@ -200,7 +204,11 @@ def _ordered(joints: list[RobotJoint], links: dict[str, Element], base: str) -> 
 
 
 def _direct(mimics: list[Mimic], robot: Robot) -> tuple[Mimic, ...]:
-    """Each follower in terms of a joint that follows none."""
+    """Mimics in which chains are resolved: every follower refers to a joint that follows none.
+
+    Raises:
+        InputError: a mimic names no joint, or followers form a cycle.
+    """
     by_joint = {mimic.joint: mimic for mimic in mimics}
     kinds = {joint.name: joint.kind for joint in robot.moving}
     resolved = []

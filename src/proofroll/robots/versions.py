@@ -1,4 +1,4 @@
-"""A robot file in two versions of one engine's importer."""
+"""Comparison of two versions of an engine's importer on a robot file."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +13,7 @@ from proofroll.studies.versions.versions import EngineVersion, VersionsStudy
 
 @dataclass(frozen=True)
 class LayerVersions:
-    """A layer of the check: what was found in both versions (None: not offered), and whether another verdict."""
+    """Result at a layer in both versions (None: not offered); ``changed``: True if one holds and the other does not."""
 
     layer: str
     old: str | None
@@ -23,7 +23,7 @@ class LayerVersions:
 
 @dataclass(frozen=True)
 class RobotVersions:
-    """A robot file in both versions, by layer and as each check found it."""
+    """Results for a robot file in both versions, by layer, and the rows of both checks."""
 
     file: str
     layers: list[LayerVersions]
@@ -32,7 +32,7 @@ class RobotVersions:
 
 
 def between(file: str, old: str, new: str) -> VersionsStudy:
-    """Comparison of two versions, ``NAME`` or ``NAME@PLACE``, on a robot file, as content of `proofroll versions`.
+    """Content of `proofroll versions` for a robot file: two versions, given as ``NAME`` or ``NAME@PLACE``.
 
     Raises:
         InputError, Missing: see :func:`proofroll.robots.check.check`.

@@ -1,8 +1,8 @@
-"""Known causes why an engine holds another robot than the file describes, a function each.
+"""Known causes of a difference between an engine's robot and the file's, a function each.
 
 A cause is proven by computation: the truth is evaluated for the robot that the engine would hold because of it, and
-the engine's difference from that has to vanish. Where what it holds is no robot, the engine reads a file without the
-occasion instead, and its difference from the truth has to vanish.
+the engine's difference from that has to vanish. If no robot describes the engine's error, the engine reads an
+equivalent file that does not trigger it, and its difference from the truth has to vanish.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from proofroll.robots.protocol import Reading
 from proofroll.robots.robot_file import RobotFile
 
 _Part = TypeVar("_Part", RobotBody, RobotJoint)
-# The least mass and moment with which MuJoCo compiles a body that moves: it stands for none [kg], [kg m²].
+# Mass [kg] and moment of inertia [kg m²] that stand for zero, with which MuJoCo compiles a moving body.
 LEAST = 1e-14
-# The remedy where an engine computes inertia from shapes in its own way.
+# Remedy for engines that compute inertia from shapes differently.
 WRITE_INERTIALS = (
     "give every body an <inertial>; compile once with MuJoCo and save (mj_saveLastXML, six digits) to get one"
 )
@@ -34,13 +34,13 @@ WRITE_INERTIALS = (
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class EditedRobot(Robot):
-    """A robot with the content of a file that causes have edited."""
+    """A robot with its file's content (``root``) as edited by the causes found so far."""
 
     root: Element
 
     @classmethod
     def of(cls, robot: Robot, root: Element) -> EditedRobot:
-        """The robot with this content."""
+        """Robot with this file content."""
         return cls(**{field.name: getattr(robot, field.name) for field in dataclasses.fields(Robot)}, root=root)
 
 
@@ -52,8 +52,8 @@ class RobotEvidence:
         file: the file.
         robot: model that the file describes, with the causes found so far.
         reading: model that the engine holds.
-        recompiled: meaning of a changed file, for a format that an engine defines; None where it has none.
-        reread: reads a changed file with the engine; None where it cannot be asked, or refuses.
+        recompiled: edited file -> robot that it describes (MJCF only); None: it describes none.
+        reread: edited file -> the engine's reading of it; None: the engine refuses it or cannot be asked.
     """
 
     file: RobotFile
@@ -68,10 +68,15 @@ class RobotEvidence:
         return self.robot.root if isinstance(self.robot, EditedRobot) else self.file.root
 
     def edited(self, edit: Callable[[Element], bool]) -> Robot | None:
-        """The robot with all that an edit of the file changes in bodies and joints; None: nothing, or no meaning.
+        """Robot with the values of bodies and joints that an edit of the file changes.
 
-        What the edit leaves as it is keeps the causes found so far; edits of one body add up. It says whether it
-        changed the file.
+        Values that the edit does not change keep the effect of the causes found so far; edits of one body add up.
+
+        Args:
+            edit: changes the content in place; returns True if it changed anything.
+
+        Returns:
+            None if the edit changes no body or joint, or the edited file describes no robot.
         """
         root = copy.deepcopy(self.root)
         if not edit(root):
@@ -81,7 +86,7 @@ class RobotEvidence:
         return None if robot is None else EditedRobot.of(robot, root)
 
     def carried_over(self, before: Robot, after: Robot) -> Robot | None:
-        """The robot with all that differs between two others; None: nothing does."""
+        """This robot with all values that differ from ``before`` to ``after``; None: none do."""
         robot = self.robot
         bodies = [_moved(body, before.bodies.get(name), after.bodies.get(name)) for name, body in robot.bodies.items()]
         old, new = ({joint.name: joint for joint in each.joints} for each in (before, after))
@@ -93,14 +98,14 @@ class RobotEvidence:
 
 
 def with_weightless(robot: Robot) -> Robot:
-    """The robot without the mass that only lets a body be compiled."""
+    """Robot in which bodies of the mass ``LEAST``, with which they were compiled, have none again."""
     none = np.zeros((3, 3))
     light = (name for name, body in robot.bodies.items() if 0 < body.mass <= LEAST)
     return robot.with_bodies(RobotBody(name, 0.0, np.zeros(3), none) for name in light)
 
 
 def _moved(part: _Part, before: _Part | None, after: _Part | None) -> _Part:
-    """A part with the values that another has now and had otherwise before."""
+    """A body or joint with the values that differ from ``before`` to ``after``."""
     if before is None or after is None:
         return part
     changed = {name: value for name, value in vars(after).items() if not np.array_equal(value, getattr(before, name))}
@@ -115,12 +120,12 @@ class RobotHypothesis:
     """A cause.
 
     Attributes:
-        id: name of the function that makes the robot.
+        id: name of its function.
         name: behaviour of the engine, in a few words.
-        known: engine -> versions in which it was seen; those are tried first.
-        remedy: action of a user.
-        change: the robot that the engine would hold, or what it holds of a file that means the same and gives no
-            occasion; None, or the same robot: the file gives no occasion for it.
+        known: engine -> versions in which it was seen; these engines try it first.
+        remedy: action that a user can take.
+        change: evidence -> robot that the engine would hold, or its reading of an equivalent file that does not trigger
+            the error; None, or the same robot: the cause does not apply to the file.
     """
 
     id: str
@@ -131,19 +136,19 @@ class RobotHypothesis:
 
 
 def hypothesis(known: Mapping[str, str], remedy: str) -> Callable[[Change], RobotHypothesis]:
-    """Makes a hypothesis of a function, whose first line says what the engine does; see :class:`RobotHypothesis`."""
+    """Decorator that makes a hypothesis of a function; the first line of its docstring becomes the name."""
 
-    def made(change: Change) -> RobotHypothesis:
-        said = inspect.getdoc(change) or change.__name__
-        name = said[0].lower() + said[1:].partition("\n")[0].removesuffix(".")
+    def decorate(change: Change) -> RobotHypothesis:
+        text = inspect.getdoc(change) or change.__name__
+        name = text[0].lower() + text[1:].partition("\n")[0].removesuffix(".")
         return RobotHypothesis(change.__name__, name, known, remedy, change)
 
-    return made
+    return decorate
 
 
 @functools.cache
 def hypotheses() -> tuple[RobotHypothesis, ...]:
-    """All causes in the modules of this package, by their names."""
+    """All hypotheses in the modules of this package, sorted by id."""
     modules = [importlib.import_module(f"{__name__}.{module.name}") for module in pkgutil.iter_modules(__path__)]
     causes = [item for module in modules for item in vars(module).values() if isinstance(item, RobotHypothesis)]
     return tuple(sorted(causes, key=lambda item: item.id))

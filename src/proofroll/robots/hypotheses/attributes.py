@@ -1,4 +1,4 @@
-"""Causes in which an importer of MJCF overlooks an attribute, or takes it for another."""
+"""Causes in which an importer of MJCF ignores or misreads an attribute."""
 
 import copy
 import dataclasses
@@ -13,13 +13,13 @@ from proofroll.robots.model import Robot, RobotBody
 from proofroll.robots.protocol import Reading
 
 _POSES = ("pos", "quat", "axisangle", "euler", "xyaxes", "zaxis")
-# Round-off of the length of an axis that was written as of length 1.
+# Round-off of the length of a unit axis as written.
 _UNIT = 1e-12
 _REWRITE = "write it at each element, or compile once with MuJoCo and save (mj_saveLastXML, six digits)"
 
 
 def _without(elements: Iterable[Element], *attributes: str) -> bool:
-    """Removes attributes; whether there were any."""
+    """Removes attributes; returns True if there were any."""
     removed = [element.attrib.pop(name, None) for element in elements for name in attributes]
     return any(value is not None for value in removed)
 
@@ -78,7 +78,8 @@ def _moments(inertial: Element) -> tuple[str, list[float]] | None:
 def balance_ignored(evidence: RobotEvidence) -> Robot | None:
     """Balanceinertia is ignored: impossible inertias are taken as written.
 
-    A compiler refuses such an inertia: it is raised about every axis, compiled, and lowered again by the same amount.
+    The compiler refuses such an inertia, so it is compiled with a larger one about every axis, and the same amount is
+    subtracted from the result.
     """
     root, more = copy.deepcopy(evidence.file.root), dict[str, float]()
     if not _without(root.iter("compiler"), "balanceinertia"):
@@ -102,7 +103,7 @@ def balance_ignored(evidence: RobotEvidence) -> Robot | None:
 
 
 def _other(body: RobotBody, before: RobotBody) -> bool:
-    """True if an inertia changed by more than the round-off of what was added and taken away."""
+    """True if an inertia changed by more than the round-off of adding and subtracting the same amount."""
     return bool(np.abs(body.inertia - before.inertia).max() > 1e-9 * np.abs(body.inertia).max())
 
 
@@ -110,7 +111,7 @@ def _other(body: RobotBody, before: RobotBody) -> bool:
 def axisangle_not_normalised(evidence: RobotEvidence) -> Reading | None:
     """The axis of axisangle is taken as long as it is written, which gives no rotation.
 
-    No robot has such a pose: the engine reads the file with axes of length 1.
+    No robot has such a pose, so the proof is that the engine reads the file rightly with axes of length 1.
     """
     root, long = copy.deepcopy(evidence.file.root), False
     for each in root.iter():

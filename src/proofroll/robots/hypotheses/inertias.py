@@ -1,4 +1,4 @@
-"""Causes that change masses and inertias which the file gives: impossible, small, turned or scaled ones."""
+"""Causes that change masses and inertias given in the file: impossible, small, rotated or scaled ones."""
 
 import copy
 import dataclasses
@@ -12,7 +12,7 @@ from proofroll.robots.model import Array, Robot, RobotBody
 
 
 def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
-    """Bodies that an engine holds otherwise and may have called impossible, by whatever rule."""
+    """Bodies whose inertia differs in the engine and may count as impossible there, by whatever rule."""
     robot, reading = evidence.robot, evidence.reading
     scale = max((float(np.abs(group.inertia).max()) for group in robot.groups.values()), default=1.0)
     other = {
@@ -30,7 +30,7 @@ def _suspects(evidence: RobotEvidence) -> Iterator[RobotBody]:
 
 
 def _replaced(evidence: RobotEvidence, instead: Callable[[RobotBody], RobotBody]) -> Robot | None:
-    """The robot with other values for each body whose inertia is impossible and that the engine holds differently."""
+    """Robot with ``instead(body)`` for each suspect body (see :func:`_suspects`); None: there is none."""
     bodies = [instead(body) for body in _suspects(evidence)]
     return evidence.robot.with_bodies(bodies) if bodies else None
 
@@ -65,7 +65,7 @@ def water_sphere(evidence: RobotEvidence) -> Robot | None:
 
 _BOUNDS = ("boundmass", "boundinertia")  # attributes of <compiler>
 
-# As URDF importers of MuJoCo are commonly asked for, and as our option asks [kg], [kg m²].
+# Usual values of boundmass and boundinertia for URDF in MuJoCo, which our option sets too [kg], [kg m²].
 _MASS, _MOMENT = 1e-6, 1e-8
 
 
@@ -90,7 +90,7 @@ def mass_bounded(evidence: RobotEvidence) -> Robot | None:
 
 
 def bounded_from_below(root: Element, *, replace: bool) -> None:
-    """Lets bodies that nothing weighs be compiled, as weightless; ``replace`` the bounds of the file, or keep them."""
+    """Writes bounds of almost zero, with which massless bodies compile; ``replace``: also over bounds of the file."""
     compilers = list(root.iter("compiler")) or [SubElement(root, "compiler")]
     for name in _BOUNDS:
         if replace or not any(float(compiler.get(name) or 0) for compiler in compilers):

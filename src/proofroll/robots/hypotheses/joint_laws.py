@@ -1,4 +1,4 @@
-"""Causes that change what acts in joints: armature, damping, friction, springs, couplings."""
+"""Causes that change forces and inertia in joints: armature, damping, friction, springs, couplings."""
 
 import copy
 import dataclasses
@@ -26,8 +26,8 @@ def armature_left_out(evidence: RobotEvidence) -> Robot | None:
 def armature_of_free_joints_turns(evidence: RobotEvidence) -> Robot | None:
     """Armature of a free joint acts along axes that turn with the body.
 
-    It adds mass to the velocity in body axes, whose derivative has the term of a turning frame; in the file it is mass
-    for the velocity in axes of the world.
+    The engine multiplies it with the derivative of the velocity's components in body axes. The file means those in
+    world axes; they differ by ω × v.
     """
     robot = evidence.robot
     if not any(joint.kind == "free" and joint.armature for joint in robot.joints):

@@ -1,4 +1,4 @@
-"""Causes that misplace the inertia of links which fixed joints hold together."""
+"""Causes that misplace the inertia of links joined by fixed joints."""
 
 import dataclasses
 
@@ -11,7 +11,7 @@ from proofroll.robots.model import WORLD, Array, Robot, RobotBody
 
 
 def _moments(inertia: Array) -> Array:
-    """Principal moments, each at the axis that it is nearest to."""
+    """Principal moments, each at the index of the coordinate axis nearest to its own axis, shape (3,)."""
     values, axes = np.linalg.eigh(inertia)
     _, order = linear_sum_assignment(-np.abs(axes))
     return np.asarray(values[order])
@@ -32,17 +32,17 @@ def merged_at_link_origins(evidence: RobotEvidence) -> Robot | None:
         for name, _, R in members:
             body = robot.bodies[name]
             written = np.array(robot.sources.get(name, {}).get("written", body.inertia))
-            held = R.T @ np.diag(_moments(written)) @ R  # so that turned with the link they have the whole's axes
+            held = R.T @ np.diag(_moments(written)) @ R  # in the link's frame: diagonal in the axes of the composite
             bodies.append(dataclasses.replace(body, com=np.zeros(3), inertia=held))
     return robot.with_bodies(bodies) if bodies else None
 
 
-# MuJoCo ends its rotations at this size of an off-diagonal element, and takes moments that differ by less as equal.
+# Off-diagonal element at which MuJoCo's Jacobi rotations end; moments that differ by less count as equal.
 _SMALL = 1e-12
 
 
 def _principal(inertia: Array) -> tuple[Array, Array]:
-    """Principal moments in descending order, shape (3,), and axes as columns, shape (3, 3), in MuJoCo's choice."""
+    """Principal moments, descending, shape (3,), and axes as columns, shape (3, 3), chosen as MuJoCo does."""
     axes = np.eye(3)
     for _ in range(500):
         turned = axes.T @ inertia @ axes
@@ -64,7 +64,10 @@ def _principal(inertia: Array) -> tuple[Array, Array]:
 
 
 def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
-    """The robot with such links, whose principal axes are turned with the link, Q R, or stay Q."""
+    """Robot with misplaced inertials of merged links (None: it has none), see :func:`merged_inertial_misplaced`.
+
+    Principal axes are Q R if ``turned``, else Q.
+    """
     robot, bodies = evidence.robot, []
     for joint in robot.joints:
         home, p, R = robot.welded[joint.child]
@@ -73,7 +76,7 @@ def _misplaced(evidence: RobotEvidence, *, turned: bool) -> Robot | None:
             continue
         source = robot.sources.get(joint.child, {})
         moments, Q = _principal(np.array(source.get("written", body.inertia)))
-        # in the moving link's frame: at c + Q p with axes Q R; here in the link's own, which stays where it is
+        # c + Q p and axes Q R are in the frame of the moving link; here they are transformed to the merged link's own
         axes, com = R.T @ (Q @ R if turned else Q), R.T @ (body.com + Q @ p - p)
         bodies.append(dataclasses.replace(body, com=com, inertia=axes @ np.diag(moments) @ axes.T))
     return robot.with_bodies(bodies) if bodies else None

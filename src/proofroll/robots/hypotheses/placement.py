@@ -1,4 +1,4 @@
-"""Causes that misplace bodies or lose them, and gravity."""
+"""Causes that misplace or drop bodies, and the cause of a wrong gravity."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from proofroll.robots.model import WORLD, Robot, RobotBody, RobotJoint
 def body_placed_by_last_joint(evidence: RobotEvidence) -> Robot | None:
     """All but the last of several joints in one body are placed in the parent's frame.
 
-    The body's pose comes with the last.
+    The body's pose is applied at the last joint.
     """
     robot = evidence.robot
     chains: dict[str, list[int]] = {}
@@ -60,7 +60,7 @@ def first_tree_only(evidence: RobotEvidence) -> Robot | None:
 
 
 def _with_joints(robot: Robot, joints: Sequence[RobotJoint]) -> Robot:
-    """The robot with some of its joints, and what they carry."""
+    """Robot with only these joints, and the bodies and mimics that belong to them."""
     moving, kept = {joint.name for joint in joints}, {joint.child for joint in joints}
     mimics = tuple(mimic for mimic in robot.mimics if {mimic.joint, mimic.other} <= moving)
     bodies = {name: body for name, body in robot.bodies.items() if name in kept}
@@ -89,7 +89,7 @@ def _without_frames(root: Element) -> bool:
 def tree_read_again(evidence: RobotEvidence) -> Robot | None:
     """The first tree is read once for every <worldbody>: its masses are added again, with joints that carry nothing.
 
-    Of these the ones that share a body with others keep their armature.
+    Of these joints, those that share a body with others keep their armature.
     """
     robot, file = evidence.robot, evidence.file
     times = sum(1 for _ in file.root.iter("worldbody"))
@@ -109,7 +109,7 @@ def tree_read_again(evidence: RobotEvidence) -> Robot | None:
 
 
 def _one_of_several(joint: RobotJoint, robot: Robot) -> bool:
-    """True if the joint's body in the file has others: bodies without mass, ``name/0``, lie between them."""
+    """True if the joint's body has further joints in the file: massless bodies ``name/0`` … connect them."""
     return joint.parent.rpartition("/")[0] == joint.child or joint.child.rpartition("/")[0] in robot.bodies
 
 

@@ -1,4 +1,4 @@
-"""Causes in the mass and inertia that shapes give a body, or do not."""
+"""Causes that change masses and inertias computed from shapes."""
 
 import dataclasses
 import math
@@ -12,12 +12,12 @@ from proofroll.robots.hypotheses import WRITE_INERTIALS, RobotEvidence, hypothes
 from proofroll.robots.hypotheses.inertias import bounded_from_below
 from proofroll.robots.model import Array, Robot, RobotBody, composed
 
-# Bullet's margin around shapes, also around none [m].
+# Bullet's margin around the box of a body's shapes, also if it has no shape [m].
 _MARGIN = 1e-3
 
 
 def _half(kind: str, sizes: dict[str, str]) -> Array | None:
-    """Half lengths of a shape's own box; None: not known here."""
+    """Half lengths of a shape's bounding box [m], shape (3,); None: the kind of shape is not covered."""
     name, count, part = {"box": ("size", 3, 0.5), "sphere": ("radius", 1, 1.0)}.get(kind, ("", 0, 0.0))
     try:
         lengths = [part * float(length) for length in sizes.get(name, "").split()]
@@ -27,7 +27,10 @@ def _half(kind: str, sizes: dict[str, str]) -> Array | None:
 
 
 def _box(mass: float, shapes: list[Any], com: Array, frame: Array) -> Array | None:
-    """Principal moments in the inertial's axes, shape (3,); None: a shape whose box is not known here."""
+    """Principal moments of the box around all shapes, in the inertial's axes [kg m²], shape (3,).
+
+    None: a shape is not covered.
+    """
     low, high = (np.full(3, np.inf), np.full(3, -np.inf)) if shapes else (np.zeros(3), np.zeros(3))
     for kind, sizes, position, rotation in shapes:
         half = _half(kind, sizes)
@@ -85,7 +88,7 @@ _DENSITY = 1000.0
 
 
 def _solid(kind: str, sizes: Mapping[str, str]) -> tuple[float, Array] | None:
-    """Mass and principal moments of a shape; None: not a solid that is known here."""
+    """Mass [kg] and principal moments [kg m²] of a shape at 1000 kg/m³; None: the kind of shape is not covered."""
     if kind == "box":
         x, y, z = (float(part) for part in sizes["size"].split())
         m = _DENSITY * x * y * z
