@@ -95,7 +95,7 @@ class Actuator:
         return effort - (n * n * self.kd) * v if self.kind == "position" and self.kd else effort
 
     def effort(self, time: float, q: float, v: float, mode: str | None = None) -> float:
-        """Effort at the joint in a mode of :data:`MODES`, or without one clamped to its limit [N m, N]."""
+        """Effort at the joint in a mode of :data:`MODES` [N m, N]; None: clamped to the limit."""
         if mode in {"least", "greatest"}:
             return -self.bound if mode == "least" else self.bound
         wanted = float(self.wanted(time, q, v))

@@ -86,7 +86,7 @@ class Loop:
 
     @cached_property
     def frame_b(self) -> Array:
-        """Axes of the loop's frame on body_b, as columns; chosen so that a joint's rows hold between it and frame_a."""
+        """Axes of the loop's frame B on body_b, as columns; with :attr:`frame_a` as A it obeys the rows of a joint."""
         if self.kind in {"fixed", "prismatic"}:
             return read_only(rotations.from_rpy(self.orientation).T @ self.frame_a)
         if self.kind == "universal":  # the joint's row is: z of A perpendicular to x of B

@@ -209,7 +209,7 @@ class ReportedComparison:
 
     @property
     def unreached(self) -> str:
-        """Sentence instead of rows where processor time did not suffice for the truth; empty: something was judged."""
+        """Sentence shown instead of rows if processor time did not suffice for the truth; else empty."""
         lacking = any(name.startswith("the truth") for name in self.beyond_budget)
         if not lacking or any(row.verdict != Verdict.NOT_JUDGED for row in self.rows):
             return ""

@@ -48,7 +48,7 @@ def number(
         change: ball with another value of the number.
         remedy: what to do.
         only: True for balls whose scene has the number.
-        signed: True if the number may have the wrong sign.
+        signed: True if the engine may have the wrong sign of the number.
     """
 
     @hypothesis(name, "one factor on this number of the scene closes accelerations and forces at every sample")

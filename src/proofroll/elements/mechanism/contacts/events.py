@@ -23,7 +23,8 @@ _States = NDArray[np.bool_]
 _CREEPS = 1e-3
 # Gap at the start that counts as closed, relative to the mechanism's size.
 _CLOSED = 1e-6
-# Kinds of events that samples do not tell apart: what stands may still begin to move, rebounds may be no end of them.
+# Kinds of events that samples cannot distinguish from others: a resting contact may still begin to move, and a settling
+# one may go on rebounding.
 _ALIKE = {"rest": "stick", "settle": "impact"}
 
 
@@ -96,7 +97,7 @@ class ContactWatch:
 
 
 def _alike(one: Event, seen: Event) -> bool:
-    """True if an event may be the one that samples show, to one interval between them."""
+    """True if an event may be the one seen in the samples: same contact and kind, at most one interval off."""
     wide = seen.time_high - seen.time_low
     near = seen.time_low - wide <= one.time <= seen.time_high + wide
     return near and one.name == seen.name and _ALIKE.get(one.kind, one.kind) == _ALIKE.get(seen.kind, seen.kind)

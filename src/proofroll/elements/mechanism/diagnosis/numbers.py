@@ -31,7 +31,7 @@ def factor_of_all(
         change: of a mechanism, for a factor.
         has: True if a mechanism has the number at all.
         remedy: what to do.
-        signed: True if the number may have the wrong sign, as a mass cannot.
+        signed: True if the engine may have the wrong sign of the number; masses are never negative.
     """
 
     @hypothesis(name, "the equations of motion are linear in it: one factor balances them at every state of the run")
