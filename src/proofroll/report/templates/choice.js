@@ -12,7 +12,7 @@
   const first = {{ decades.start }}, count = {{ decades|length }};
   form.hidden = false;
 
-  // Texts are put in as text: what an engine says is no markup.
+  // Texts are inserted as text nodes, for an engine's message must not become markup.
   function fill(cell, [state, text, title, href], best) {
     cell.className = `cell ${state}${best ? " best" : ""}`;
     cell.replaceChildren();
@@ -27,7 +27,7 @@
   }
   const chosen = (on) => [...form.querySelectorAll("[name=engine]")].filter((box) => box.checked === on).map((box) => box.value);
   const { needs, unit, nothing, unjudged, tolerances, with_forces, same, lacking: unheld } = {{ answer_words|tojson }};
-  // The cheapest of the engines that are chosen, as `ChoiceMatrix.answer` says it of all.
+  // The cheapest of the chosen engines, worded as `ChoiceMatrix.answer`.
   function sentence(best, { groups, judged }) {
     const held = best.filter((found, j) => found && groups[j]).map((found) => found[1]);
     const without = groups.filter((group, j) => group && !best[j] && judged[+forces.checked].includes(group));
@@ -36,7 +36,7 @@
     const whole = held.length ? `The cheapest to hold ${asked}, ${unit}: ${[held.join(", "), lacking].filter(Boolean).join("; ")}.` : `To hold ${asked}: ${lacking || (groups.some(Boolean) ? unjudged : "nothing was run")}.`;
     return chosen(false).length ? `${whole} This is of ${chosen(true).join(", ") || "no engine"} alone.` : whole;
   }
-  // What forces change, as `ChoiceMatrix.with_forces` says it.
+  // Changes if forces count, worded as `ChoiceMatrix.with_forces`.
   function also(motion, both, { groups, judged }) {
     const asked = groups.map((group, j) => ({ group, before: motion[j]?.[1], now: both[j]?.[1] })).filter(({ group }) => group && judged[1].includes(group));
     const listed = (words, test) => { const found = asked.filter(test).map(({ group }) => group); return found.length ? `${words} ${found.join(", ")}` : ""; };
@@ -44,7 +44,7 @@
     const said = [other, listed(same, ({ before, now }) => now && now === before), listed(nothing, ({ now }) => !now)];
     return asked.length ? `${with_forces.replace("{0}", tolerances[Number(slider.value) - first])}: ${said.filter(Boolean).join("; ")}.` : "";
   }
-  // Advice for each column of the engines that are chosen, as `of_column` gives it of all, without what forces change.
+  // Advice for each column, of the chosen engines, worded as `of_column` but without the effect of forces.
   function advised({ said, heads, engines }) {
     const off = new Set(chosen(false));
     if (!off.size) return said;
@@ -82,7 +82,7 @@
   }
   everywhere(hide);
   form.addEventListener("submit", (event) => event.preventDefault());
-  // Scenes are shown by their names at once where the screen has room for them, those of small groups first.
+  // Scenes of a group are unfolded at first where the screen has room, small groups first.
   addEventListener("load", () => {
     if (innerWidth <= 800) return;
     const scenes = (button) => button.title.split(", ").length;

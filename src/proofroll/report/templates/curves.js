@@ -1,9 +1,9 @@
-// What one figure shows, as plotly wants it. Above: the curves. Below: their distances from the truth on a logarithmic
-// axis, with the truth's error bar, the tolerances, and beside them the limits of small steps with theirs.
-// A figure is told by { rows, time, observable, off, paint }: `off` holds the rows that are switched off, `paint` gives
+// Data of one figure for plotly. Above: the curves. Below: their distances from the truth on a logarithmic axis, with
+// the truth's error bar, the tolerances, and at the side the limits of small steps with their error bars.
+// A figure is described by { rows, time, observable, off, paint }: `off` holds the rows that are switched off, `paint` gives
 // the colour of a name.
 const picture = (() => {
-  // plotly reads a few HTML tags and %{…} in names: show them as they are written.
+  // plotly interprets a few HTML tags and %{…} in names; escape them.
   const literal = (text) => String(text).replace(/[&<>{}]/g, (sign) => `&#${sign.charCodeAt(0)};`);
   const unit = ({ observable }) => (observable.unit ? ` ${literal(observable.unit)}` : "");
   const short = (value) => (value === null ? "∞" : String(Number(value.toPrecision(3))));
@@ -19,7 +19,7 @@ const picture = (() => {
     for (const { row, difference, at } of observable.engines) {
       const { name, colour, dash, width, opacity, symbol } = rows[row];
       const where = at ?? [...time.keys()];
-      // Symbols above only where the curve can be told from the truth: on top of each other they would hide it.
+      // Symbols above only where the curve differs visibly from the truth, which they would hide otherwise.
       const apart = difference.some((d) => Math.abs(d) > 0.02 * observable.scale);
       const shared = {
         type: "scatter", mode: "lines+markers", opacity, x: where.map((i) => time[i]), meta: row,
@@ -54,7 +54,7 @@ const picture = (() => {
     return found;
   }
 
-  // Where a ladder of steps leads, as far as it can tell: a whisker that reaches the bottom holds the truth.
+  // Limit of a ladder of steps with its error bar: a whisker that reaches the bottom includes the truth.
   function limits(figure) {
     const { rows, paint } = figure;
     return limited(figure).map(({ row, limit: [error, bar, order] }, place) => {
@@ -68,7 +68,7 @@ const picture = (() => {
     });
   }
 
-  // Events that a kind of element marks, on the bound that the curve must reach for one.
+  // Events that a kind of element marks, drawn on the bound that the curve must reach for one to happen.
   function marks({ rows, observable, paint }) {
     return (observable.marks ?? []).map(({ row, time, name: event }) => ({
       type: "scatter", mode: "markers", x: [time], y: [observable.bounds[0].value], meta: row, name: event,
@@ -87,7 +87,7 @@ const picture = (() => {
     return [(low + high) / 2 - half, (low + high) / 2 + half];
   }
 
-  // Decades of the lower half: all distances but the smallest twentieth, the tolerances, the limits and the truth's bar.
+  // Decades of the lower half: for all distances but the smallest 5 %, tolerances, limits and the truth's error bar.
   function decades(figure) {
     const { engines, error_bar: bar } = figure.observable, ends = [...shared(figure.observable).keys()];
     for (const { difference } of engines) {

@@ -57,7 +57,7 @@ const plots = (() => {
     }
   }
 
-  // plotly reports what it was told as well as what a person did, and later: only what is not so yet is passed on.
+  // plotly reports changes by this program like those of a reader, and late: pass on only real changes.
   function linkTime(figure, change) {
     const range = change["xaxis.range"] ?? (change["xaxis.range[0]"] === undefined ? null : [change["xaxis.range[0]"], change["xaxis.range[1]"]]);
     if (range === null && !change["xaxis.autorange"]) return;
@@ -144,7 +144,7 @@ const plots = (() => {
     [...hidden.keys()].forEach(show);
   });
 
-  // Once one figure has been drawn, what the others need is here and they can be drawn before the page is printed.
+  // After the first figure the library is loaded, so that all others can be drawn before the page is printed.
   addEventListener("beforeprint", () => {
     paper.add("paper");
     if (!parts) return;

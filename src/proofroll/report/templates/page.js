@@ -2,13 +2,13 @@
 // Text that the page keeps until it is needed, e.g. the curves.
 const stored = unpack;
 
-// Does something with the page, and with each part that is built later.
+// Applies a function to the page, and to each part that is built later.
 function everywhere(action) {
   action(document);
   document.addEventListener("built", (event) => action(event.target));
 }
 
-// What is folded is built when it is opened: until then it is a text, which other folds may be part of.
+// A fold is built when it is opened; until then it is a text, which may contain further folds.
 const folds = (() => {
   const button = document.getElementById("unfold");
   const place = (number) => document.querySelector(`[data-fold="${number}"]`);
@@ -24,7 +24,7 @@ const folds = (() => {
   function every(which) {
     for (let empty = document.querySelector(which); empty; empty = document.querySelector(which)) build(empty);
   }
-  // The element with an id, built with all that it lies in.
+  // The element with an id; builds the folds around it first.
   async function find(id) {
     if (document.getElementById(id)) return document.getElementById(id);
     await ready();
@@ -47,13 +47,13 @@ const folds = (() => {
     every("[data-fold]");
     document.querySelectorAll("details").forEach((fold) => { fold.open = true; });
   });
-  // Paper has what is folded, but not each run; a browser that prints does not wait, so the texts are there before.
+  // Print shows folds, but not each run; printing does not wait, so the texts are unpacked before.
   addEventListener("beforeprint", () => { if (texts) every("[data-fold]:not(.run > *)"); });
   addEventListener("load", () => (window.requestIdleCallback ?? setTimeout)(ready));
   return { find };
 })();
 
-// A link to evidence opens what it lies in.
+// A link to evidence opens the folds around it.
 (() => {
   async function reveal() {
     document.querySelectorAll(".target").forEach((element) => element.classList.remove("target"));
@@ -90,7 +90,7 @@ const folds = (() => {
   follow();
 })();
 
-// A table says so while there are rows below those that it shows; its edge fades while there are columns beyond it.
+// A table notes that rows follow below its visible ones; its edge fades while columns follow beyond it.
 (() => {
   const look = (region) => {
     region.classList.toggle("more", region.scrollTop + region.clientHeight < region.scrollHeight - 4);

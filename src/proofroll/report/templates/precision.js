@@ -11,7 +11,7 @@
   const decade = () => Number(slider?.value ?? {{ first_decade }});
   let parts;
 
-  // The points that there are of a quantity, those of hidden engines left out.
+  // Points with a value of the quantity, without hidden engines.
   function curves(study, quantity) {
     const off = new Set([...(form?.querySelectorAll("[name=engine]:not(:checked)") ?? [])].map((box) => box.value));
     const found = study.curves.filter(({ engine }) => !off.has(engine)).map((curve, number) => ({

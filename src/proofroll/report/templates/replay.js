@@ -48,7 +48,7 @@
   const until = (run) => (shown.frames < 2 ? shown.until : (shown.until * (run.frames - 1)) / (shown.frames - 1));
   const there = (run) => time <= until(run) + 1e-9;
 
-  // Between frames: straight, for what may jump, or smooth, for a path (Catmull-Rom).
+  // Interpolation between frames: linear for values that may jump, smooth for a path (Catmull-Rom).
   function straight({ values, width, length }) {
     const x = Math.min(place(), length - 1), i = Math.min(Math.floor(x), Math.max(length - 2, 0)), f = x - i;
     const j = Math.min(i + 1, length - 1);
@@ -111,7 +111,7 @@
     ui.speed.value = shown.speed;
   }
 
-  // In millimetres; below `least` nothing is seen.
+  // Text in millimetres; sizes below `least` are invisible.
   const distance = (mm, least) => (mm < least ? `< ${least}` : fixed(mm, Math.max(0, -Math.log10(least) - (mm >= 1000 * least))));
 
   function write() {
@@ -257,7 +257,7 @@
     ui.key.hidden = false;
   }
 
-  // The camera that shows the whole path, or, where a body would be lost in it, follows.
+  // A camera that shows the whole path, or follows the body if that would be too small in it.
   function reset() {
     const reach = kind.reach(stage.size);
     ui.follow.checked = reach < stage.size;
@@ -290,7 +290,7 @@
   };
   const kinds = Object.fromEntries(Object.entries(replayed).map(([name, made]) => [name, made(replay)]));
 
-  // ---- what a person does ----
+  // ---- input ----
   async function choose() {
     stop();
     shown = await load(Number(ui.case.value));

@@ -36,7 +36,7 @@
     delete body.dataset.engine;
     body.classList.remove("off");
   }
-  // What a cell is sorted by: its verdict, or the first number in it; beyond all numbers what is infinite.
+  // Sort key of a cell: its verdict, or its first number; infinite values come last.
   function rank(cell, numeric) {
     const verdict = cell.querySelector(":scope > .v");
     if (verdict) return order.indexOf(verdict.classList[1]);

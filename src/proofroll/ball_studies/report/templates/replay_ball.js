@@ -60,7 +60,7 @@ replayed.ball = (replay) => {
   }
 
   // ---- picture ----
-  // Octants in two tones, and a band where the first meridian is: what turns is seen to turn.
+  // Octants in two tones and a band on the first meridian make the rotation visible.
   function marks(light, dark, band) {
     const tile = document.createElement("canvas");
     [tile.width, tile.height] = [512, 256];
@@ -100,7 +100,7 @@ replayed.ball = (replay) => {
     return parts;
   }
 
-  // The trace of the true contact on the wall, a ribbon in the colour of what the contact did.
+  // The trace of the true contact on the wall, a ribbon coloured by the state of the contact.
   function trace() {
     const { T } = replay.view, { shown } = replay, truth = shown.runs[0], n = truth.contact.length, at = truth.contact.values, up = truth.normal.values;
     const points = new Float32Array(6 * n), tones = new Float32Array(6 * n), faces = [];
@@ -180,7 +180,7 @@ replayed.ball = (replay) => {
     ...(replay.shown.runs[0].state ? [{ sign: "line", text: "where it slips, and its friction then", tone: "var(--slips)" }] : []),
   ];
 
-  // The camera follows where the ball would be lost in the whole path.
+  // The camera follows if the ball would be too small in the whole path.
   const reach = (size) => (size > 22 * replay.shown.scale ? 14 * replay.shown.scale : size);
 
   return { columns, rows, write, compare, build, draw, key, reach };

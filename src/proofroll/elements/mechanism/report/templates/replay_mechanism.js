@@ -42,7 +42,7 @@ replayed.mechanism = (replay) => {
     return mesh;
   }
 
-  // One group for each body, whose frame it is; what is fastened to the world has the last.
+  // One group for each body, in the body's frame; the last one is the world's.
   function skeleton(scene, index) {
     const { T } = replay.view, { shown } = replay, ghost = index > 0, size = shown.scale;
     const tone = new T.Color(ghost ? css(`--e${shown.runs[index].colour}`) : css("--dark"));
@@ -51,7 +51,7 @@ replayed.mechanism = (replay) => {
     const groups = shown.bodies.map(({ rods, com }) => {
       const group = new T.Group();
       for (const [from, to] of rods) group.add(rod(from, to, (ghost ? 0.2 : 0.22) * size, material));
-      // What has no length shows by its axes that it turns.
+      // A body whose rods are all short gets axes, so that its rotation is visible.
       if (com && rods.every(([from, to]) => Math.hypot(...from.map((x, k) => x - to[k])) < 0.5 * size)) {
         const axes = new T.AxesHelper(2.5 * size);
         axes.position.set(...com);
@@ -76,7 +76,7 @@ replayed.mechanism = (replay) => {
       mesh.quaternion.set(...turn);
       mesh.scale.set(...half.map((one) => one || 1));
       groups[body].add(mesh);
-      // A round shape shows by a line on it that it turns: a radius on a disc, two great circles on the others.
+      // Lines make the rotation of round shapes visible: a radius on a disc, two great circles on others.
       const round = (from, to) => Array.from({ length: 65 }, (_, k) => from.clone().multiplyScalar(Math.cos((Math.PI * k) / 32)).addScaledVector(to, Math.sin((Math.PI * k) / 32)));
       const [x, y, z] = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].map((axis) => new T.Vector3(...axis));
       const lines = { circle: [[new T.Vector3(), x]], sphere: [round(x, z), round(y, z)], ellipsoid: [round(x, z), round(y, z)] }[kind] || [];
@@ -108,7 +108,7 @@ replayed.mechanism = (replay) => {
     if (truth.force) {
       stage.arrows = Array.from({ length: truth.force.width / 3 }, () => replay.arrow(0.12 * shown.scale));
       stage.arrows.forEach(({ group }) => scene.add(group));
-      // The scale is that of the nineteenth of twenty largest: what is passed at a singular pose would hide the rest.
+      // Scale by the 95th percentile: the peaks at a singular pose would make all other forces invisible.
       const sizes = Array.from({ length: truth.force.length * stage.arrows.length }, (_, k) => Math.hypot(...truth.force.values.subarray(3 * k, 3 * k + 3)));
       largest = sizes.sort((a, b) => a - b)[Math.floor(0.95 * (sizes.length - 1))];
     }
@@ -155,7 +155,7 @@ replayed.mechanism = (replay) => {
       ({ sign: "dot", text: `contact that ${word}`, tone: `var(--${tone})` })) : []),
   ];
 
-  // The camera follows where the mechanism would be lost in its way.
+  // The camera follows if the mechanism would be too small in its path.
   const reach = (size) => {
     const { scale, shapes, falls } = replay.shown, widest = Math.max(0, ...shapes.filter(({ kind }) => kind !== "plane").flatMap(({ half }) => half));
     return size > (falls ? 40 : 75) * scale ? Math.min(size, Math.max(30 * scale, 1.6 * widest)) : size;
