@@ -1,8 +1,8 @@
 """Implicit collocation at Radau points: order 2s - 1, stiffly accurate, never evaluated at the start of a step.
 
-The last property is why it is used here: at the start of a slip the direction of slip does not exist, and the step
-goes over that point without any special start. The step's error is read off the decay of the Legendre coefficients of
-the collocation polynomial, so the polynomial is as accurate between the ends of a step as at them.
+Hence its use here: at the start of a slip the direction of slip is undefined, and no special start is needed. The error
+of a step is estimated by the decay of the Legendre coefficients of the collocation polynomial, so the polynomial is as
+accurate within a step as at its ends.
 
 Source of the method: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, sections IV.5 and IV.8.
 """
@@ -17,15 +17,15 @@ from scipy.linalg import lu_factor, lu_solve
 from proofroll.core.arrays import FloatArray
 
 _STAGES = 13
-_NEWTON = 9  # iterations after which a step is taken again with half its length
-_GOOD = 1e-4  # a guess that is as near as this keeps its Jacobians
-_NOISE = 3e-16  # size of the last coefficients, relative to the scale, that is only round-off
-_SEEN = 1e-13  # size of coefficients that round-off does not hide
-_ROUND_OFF = 1e-15  # Newton corrections, relative to the scale, that are only noise
+_NEWTON = 9  # Newton iterations at most; a step that needs more is repeated with a shorter length
+_GOOD = 1e-4  # first Newton correction, relative to the scale, up to which the Jacobians are kept
+_NOISE = 3e-16  # last Legendre coefficients, relative to the scale, that are only round-off
+_SEEN = 1e-13  # Legendre coefficients, relative to the scale, that exceed round-off
+_ROUND_OFF = 1e-15  # Newton corrections, relative to the scale, that are only round-off
 
 
 def _tableau(stages: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Nodes in (0, 1], integration matrix, and the map from stage values to Legendre coefficients."""
+    """Radau nodes in (0, 1], integration matrix, and the matrix from values at the nodes to Legendre coefficients."""
     # Right Radau points: zeros of P_{s-1} - P_s on [-1, 1]; the last is 1.
     polynomial = np.zeros(stages + 1)
     polynomial[-2:] = 1.0, -1.0
@@ -36,7 +36,8 @@ def _tableau(stages: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return (x + 1) / 2, integrals @ to_coefficients / 2, to_coefficients
 
 
-# Nodes, the matrix that integrates from values at the nodes (its last row: over the whole step), and coefficients.
+# Nodes; MATRIX @ values at the nodes: integrals from the start to each node of a unit step (last row: over all of it);
+# Legendre coefficients.
 _NODES, MATRIX, _TO_LEGENDRE = _tableau(_STAGES)
 
 
@@ -57,11 +58,11 @@ class System:
 
 @dataclass(frozen=True)
 class Step:
-    """One accepted or rejected step.
+    """One attempted step, accepted or not.
 
     Attributes:
         time, length: start and length [s].
-        values: at the start and at the nodes, shape (s + 1, n).
+        values: states at the start and at the nodes, shape (s + 1, n).
         error: estimate relative to the scale; inf where Newton's method failed.
     """
 
@@ -72,11 +73,11 @@ class Step:
 
     @property
     def last(self) -> FloatArray:
-        """State at the end of the step."""
+        """State at the end of the step, shape (n,)."""
         return np.asarray(self.values[-1])
 
     def __call__(self, times: FloatArray) -> FloatArray:
-        """States at times within the step, shape (m, n)."""
+        """States at times [s] within the step, shape (m, n)."""
         # Barycentric interpolation through the start and the nodes
         away = ((np.asarray(times) - self.time) / self.length)[:, None] - _WITH_START
         at_node = np.abs(away) < 1e-15
@@ -89,12 +90,12 @@ _WEIGHTS = 1 / np.prod(_WITH_START[:, None] - _WITH_START + np.eye(_STAGES + 1),
 
 
 def nodes(length: float) -> FloatArray:
-    """Times of the stages after the start of a step of this length [s], shape (s,)."""
+    """Times of the nodes after the start of a step of this length [s], shape (s,)."""
     return length * _NODES
 
 
 def take(system: System, time: float, state: FloatArray, length: float, guess: FloatArray) -> Step:
-    """One step from a time [s]; Newton's method starts from a guess of the states at the nodes, shape (s, n)."""
+    """Attempts one step from a time [s]; ``guess``: states at the nodes to start Newton's method from, shape (s, n)."""
     s, n = guess.shape
     values = guess
     before, factors, grown = np.inf, None, 0
@@ -114,7 +115,7 @@ def take(system: System, time: float, state: FloatArray, length: float, guess: F
         change = float(np.max(np.abs(correction) / system.scale))
         if change < _ROUND_OFF or (change < 1e-11 and change > 0.3 * before):  # converged, or as far as round-off lets
             coefficients = length * _TO_LEGENDRE @ system.rates(values) / system.scale
-            # The last two: one of them may vanish by symmetry
+            # Two coefficients, as one alone may vanish by symmetry
             return Step(time, length, np.vstack([state, values]), float(np.max(np.abs(coefficients[-2:]))))
         if change > 0.02 * before or (before == np.inf and change > _GOOD):
             factors = None
@@ -129,7 +130,8 @@ def by_states(step: Step, scale: FloatArray) -> tuple[float, float]:
     """Error of a step from its states instead of their rates, whose round-off stiff dampers magnify.
 
     Returns:
-        The error, and what it is without round-off, by the decay of the coefficients above it, relative to the scale.
+        Error estimate, and the same without round-off, extrapolated from the decay of coefficients above round-off;
+        both relative to the scale.
     """
     if not np.isfinite(step.error):
         return np.inf, np.inf
@@ -140,9 +142,9 @@ def by_states(step: Step, scale: FloatArray) -> tuple[float, float]:
 
 
 def next_length(step: Step, tolerance: float) -> float:
-    """Length of the next try: the error falls with the power s - 1 of the length."""
+    """Length of the next attempt [s]: the error falls with the power s - 1 of the length."""
     if not np.isfinite(step.error):
         return 0.4 * step.length
-    error = step.error if step.error > _NOISE else 0.0  # of noise nothing follows for a longer step
+    error = step.error if step.error > _NOISE else 0.0  # round-off alone does not limit the next step
     growth = (tolerance / max(error, 1e-30)) ** (1 / (_STAGES - 1))
     return step.length * float(np.clip(0.8 * growth, 0.2, 3.0))

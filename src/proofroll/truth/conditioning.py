@@ -1,9 +1,9 @@
-"""Conditioning of a sequence of events: its change with slightly changed parameters.
+"""Conditioning of a sequence of events: its change when parameters change slightly.
 
-Which events come, and in which order, may hang on less than round-off: a crest of the needed friction that just reaches
-the friction there is, a slip that all but stops. The arithmetic decides there, not the question. So the same
-motion is followed with its parameters moved down and up by a part :data:`MOVE`, far above round-off: the question is
-well posed where the same events come, and where they and the motion between them move evenly.
+Round-off may decide which events occur, and in which order: a peak of the needed friction just reaches the available
+friction, or a slip almost stops. So the same motion is computed again with its parameters decreased and increased by
+the relative amount :data:`MOVE`, far above round-off. The problem is well-posed if the same events occur, and their
+times and the states between them change linearly with the parameters.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,16 +14,17 @@ import numpy as np
 
 from proofroll.core.arrays import FloatArray
 
-# Part by which parameters are moved. Round-off is 1e-6 of it, and a route that stops refining a slip too early is wrong
-# within 1e-10 of an edge.
+# Relative change of the parameters. Round-off is 1e-6 of it, and a route that stops refining a slip too early is wrong
+# only within 1e-10 of an edge.
 MOVE = 1e-9
-# Part of the scale of the motion by which the moves down and up may differ. What is smooth differs by the square of a
-# move; beyond an edge another slip, landing or impact comes.
+# Largest second difference of the states, relative to their scale. For a smooth motion it is of the order of MOVE
+# squared; beyond an edge another slip, landing or impact occurs.
 _UNEVEN = 1e-4
-# The same of the times of events, in parts of the pace: far less than between one crest of the needed friction and the
-# next, far more than the error of the end of a slip that is all but none. So near its end a run may lack an event.
+# Largest second difference of event times, relative to the pace: far below the time between two peaks of the needed
+# friction, far above the error of the end of a very short slip. A run may lack events that close to its end.
 _SAME = 1e-2
-# Where between two events the motion is looked at: no simple part of the way, at which a bounce too low to be told is.
+# Fraction of the interval between two events at which states are compared: no simple fraction, where a bounce too low
+# to be an event might end.
 _BETWEEN = 0.381966
 
 Events = Sequence[tuple[str, float]]
@@ -31,24 +32,28 @@ Events = Sequence[tuple[str, float]]
 
 @dataclass(frozen=True)
 class Story:
-    """Sequence of events: kind and time [s] of each, and states at times, each relative to its scale, shape (n, k)."""
+    """Sequence of events: kind and time [s] of each.
+
+    ``states`` gives the states at times [s], relative to their scale, shape (n, k).
+    """
 
     events: Events
     states: Callable[[FloatArray], FloatArray]
 
 
 def in_common(first: Events, second: Events, pace: float, until: float) -> tuple[int, bool]:
-    """Number of leading events that two routes agree about, and whether these are all until ``until`` [s].
+    """Number of leading events that two routes share, and True if there are no others until ``until`` [s].
 
-    ``pace`` is the time [s] in which the motion goes on by its own scale.
+    ``pace`` is the time [s] in which the motion changes by its own scale.
     """
     return _shared([first, second], pace, until, lambda times: abs(times[0] - times[1]) <= _SAME * pace)
 
 
 def unmoved(own: Story, moved: Sequence[Story], pace: float, until: float) -> tuple[int, bool]:
-    """Number of leading events that stay as they are when parameters move down and up, and whether all is well posed.
+    """Number of leading events that small changes of the parameters keep, and True if the whole motion is well-posed.
 
-    The motion is looked at between events: friction that an impact just uses up makes no event of its own.
+    ``moved`` holds the stories with decreased and with increased parameters. States between events are compared too:
+    friction that an impact just uses up makes no event of its own.
     """
     stories = [own, *moved]
     number, alike = _shared(
@@ -57,12 +62,12 @@ def unmoved(own: Story, moved: Sequence[Story], pace: float, until: float) -> tu
     knots = np.array([0.0, *(time for _, time in own.events[:number]), *([until] if alike else [])])
     between = knots[:-1] + _BETWEEN * np.diff(knots)
     off = np.max(_uneven(*(story.states(between) for story in stories)), axis=-1) > _UNEVEN
-    off &= np.diff(knots) > 0  # two events at once have nothing between them, and an impact may be one
+    off &= np.diff(knots) > 0  # simultaneous events have nothing between them, and one of them may be an impact
     return (int(np.argmax(off)), False) if np.any(off) else (number, alike)
 
 
 def _uneven(own: Any, less: Any, more: Any) -> Any:
-    """Difference of what a move down and a move up do."""
+    """Second difference: deviation of a response to a decrease and an increase from a linear one."""
     return np.abs(less + more - 2 * own)
 
 

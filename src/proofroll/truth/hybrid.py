@@ -1,7 +1,7 @@
-"""Motions that switch: smooth stretches, and what happens at the instants between them.
+"""Hybrid motions: smooth stretches in one mode each, and transitions between them.
 
-A route integrates one stretch and decides what comes next; :func:`follow` puts the stretches together and knows no
-physics. Two routes may share this module, which finds where guards rise through zero, and nothing else.
+A route integrates one stretch and decides what comes next; :func:`follow` chains the stretches and knows no physics.
+Two routes may share this module and its root finder of guards, and nothing else.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,25 +19,26 @@ State = FloatArray
 ModeT = TypeVar("ModeT")
 LegT = TypeVar("LegT", bound="Span")
 Rates = Callable[[float, State], FloatArray]
-# Stretches without any length, one after the other, after which a route is taken to make no progress.
+# Successive stretches of zero length after which a route makes no progress.
 _STUCK = 50
-# Stretches shorter than this part of the time that has passed, after which it makes none either unless they have shrunk
-# to this part of what they were: rebounds shrink by e each, 400 by a tenth for every e up to 0.9997.
+# A route makes no progress either after _MANY successive stretches, each shorter than _SHORT times the elapsed time,
+# unless they have shrunk below _SHRUNK of their first length. Rebounds shrink by e each: 400 of them by a tenth for
+# every e up to 0.9997.
 _SHORT, _MANY, _SHRUNK = 1e-6, 400, 0.9
-# Stretches after which those to come are counted if neither they nor their states shrink; and the most of a path: a
-# minute of work.
+# After every _LOOK stretches the number still to come is estimated, unless they or their states shrink. _MOST:
+# stretches of a path at most, a minute of work.
 _LOOK, _MOST = 100, 1000
 
 
 @dataclass(frozen=True)
 class Happening:
-    """A change of what acts.
+    """A change of mode.
 
     Attributes:
-        kind: as the kind of element names its events.
-        name: of what changes.
+        kind: kind of event, as the kind of element names it.
+        name: name of the contact, joint or drive that changes.
         time: [s].
-        blur: uncertainty of the time, of every route [s].
+        blur: uncertainty of the time that all routes share [s].
     """
 
     kind: str
@@ -47,19 +48,19 @@ class Happening:
 
 
 class Span(Protocol):
-    """A stretch of time in one mode, as a kind of element describes it."""
+    """Protocol of a stretch of time in one mode, as a kind of element describes it."""
 
     @property
     def start(self) -> float:
-        """Its start [s]."""
+        """Start [s]."""
 
     @property
     def end(self) -> float:
-        """Its end [s]."""
+        """End [s]."""
 
     @property
     def guard(self) -> object | None:
-        """The guard that ended it; None: the end of time."""
+        """Guard that ended it; None: it reached its time limit."""
 
 
 @dataclass(frozen=True)
@@ -68,11 +69,11 @@ class Stretch(Generic[ModeT]):
 
     Attributes:
         start, end: [s].
-        mode: names of the constraints and forces that act.
-        first: the state at the start.
-        last: the state at the end, before anything changes there.
-        guard: number of the guard that ended it; None: the end of time.
-        visited: time [s] and state at the start of each step, where they were kept.
+        mode: active constraints and forces.
+        first: state at the start.
+        last: state at the end, before any transition.
+        guard: index of the guard that ended it; None: it reached its time limit.
+        visited: time [s] and state at the start of each step, if they were kept.
     """
 
     start: float
@@ -86,14 +87,15 @@ class Stretch(Generic[ModeT]):
 
 @dataclass(frozen=True)
 class Transition(Generic[ModeT]):
-    """Transition of a route at the end of a leg.
+    """State and mode after a leg, with the changes that led there.
 
     Attributes:
-        state, mode: of the next leg; no mode: what follows is not known, and the path ends.
-        happenings: changes of mode, by name.
+        state, mode: of the next leg; mode None: the continuation is unknown and the path ends.
+        happenings: kind and name of each change.
         margin: relative distance of the forces from another outcome; inf where nothing was decided.
-        delay: time after the leg's end at which the changes are over [s]: infinitely many may follow each other within.
-        blur: uncertainty of that delay, of every route [s].
+        delay: time from the end of the leg to the end of the changes [s]; infinitely many may follow each other
+            meanwhile.
+        blur: uncertainty of that delay that all routes share [s].
     """
 
     state: State
@@ -105,34 +107,34 @@ class Transition(Generic[ModeT]):
 
 
 class Legs(Protocol[ModeT, LegT]):
-    """One way of integrating the legs, in state variables of its own."""
+    """Protocol of a route: integrates legs in its own state variables and decides the transitions."""
 
     def begin(self) -> Transition[ModeT]:
-        """The state and mode at time 0."""
+        """State and mode at time 0."""
 
     def walk(self, time: float, state: State, mode: ModeT, until: float) -> LegT:
-        """One leg from ``time`` to its first guard, or to ``until`` [s]."""
+        """Integrates one leg from ``time`` to its first guard, or to ``until`` [s]."""
 
     def change(self, leg: LegT) -> Transition[ModeT]:
-        """State and mode after a leg that a guard or a break ended."""
+        """Transition after a leg that ended at a guard or at a break."""
 
 
 class HybridRoute(Legs[ModeT, Stretch[ModeT]], Protocol):
-    """Legs as stretches with a state at their start, from which any time within is found."""
+    """Protocol of a route whose legs are stretches: states within are found from the state at the start."""
 
     def within(self, leg: Stretch[ModeT], times: FloatArray) -> FloatArray:
-        """States at rising times from the start of a leg on [s], shape (times, state)."""
+        """States at rising times [s] within a leg, shape (times, state)."""
 
 
 @dataclass(frozen=True)
 class HybridPath(Generic[LegT]):
-    """The whole sequence.
+    """A whole motion.
 
     Attributes:
-        legs: one after another from time 0.
-        happenings: each change, with its time.
-        margins: of each decision: time [s] and distance from another outcome, relative.
-        known: the last leg reaches the end of time; else what follows it is not known.
+        legs: in order, from time 0.
+        happenings: changes of mode, in order of time.
+        margins: time [s] and relative distance from another outcome, of each decision.
+        known: True if the last leg reaches the end time; otherwise its continuation is unknown.
     """
 
     legs: tuple[LegT, ...]
@@ -141,7 +143,7 @@ class HybridPath(Generic[LegT]):
     known: bool = True
 
     def leg_at(self, times: FloatArray) -> list[int]:
-        """Number of the leg at each time [s]; a time of a change belongs to the later leg."""
+        """Index of the leg at each time [s]; the time of a change belongs to the later leg."""
         ends = [leg.end for leg in self.legs[:-1]]
         return [int(k) for k in np.searchsorted(ends, times, side="right")]
 
@@ -149,12 +151,14 @@ class HybridPath(Generic[LegT]):
 def follow(
     route: Legs[ModeT, LegT], until: float, breaks: Sequence[float] = (), close: float = 0.0
 ) -> HybridPath[LegT]:
-    """Path from time 0 to ``until`` [s]; a leg ends at each of the rising ``breaks`` [s] of its rates.
+    """Path from time 0 to ``until`` [s]; legs also end at the rising ``breaks`` [s], where the rates are not smooth.
 
-    After a decision with a margin below ``close``, where round-off decides, what is refused ends the path.
+    After a decision with a margin below ``close``, where round-off decides, a refusal ends the path instead of being
+    raised.
 
     Raises:
-        Diverged, Refused: by the route, or it makes no progress.
+        Diverged: the route fails, or makes no progress.
+        Refused: by the route.
     """
     time, over, change, still = 0.0, 0.0, route.begin(), 0
     short, longest = 0, 0.0
@@ -162,7 +166,7 @@ def follow(
     happenings: list[Happening] = []
     margins = []
     while True:
-        over = max(over, time + change.delay)  # nothing is told to happen before what led to it is over
+        over = max(over, time + change.delay)  # no change is reported before the delay of an earlier one is over
         happenings += [Happening(*what, over, change.blur) for what in change.happenings]
         margins.append((time, change.margin))
         if change.mode is None:
@@ -191,16 +195,16 @@ def follow(
 
 
 def _refuse_many(legs: Sequence[Span], until: float) -> None:
-    """Refuses a motion whose modes change thousands of times, as soon as it can be seen.
+    """Refuses early a motion whose mode will change thousands of times.
 
     Raises:
-        Diverged: they do, by what the last stretches lasted.
+        Diverged: the durations of the last stretches predict more than _MOST stretches until ``until`` [s].
     """
     if len(legs) % _LOOK:
         return
     last, end = legs[-_LOOK:], legs[-1].end
     spans = [last[_LOOK // 2].start - last[0].start, end - last[_LOOK // 2].start]
-    calm = sum(spans) < _SHRUNK * end * _LOOK / len(legs)  # what was calm before may be so again
+    calm = sum(spans) < _SHRUNK * end * _LOOK / len(legs)  # changes came slower before, and may again
     ahead = (until - end) * _LOOK / sum(spans) if sum(spans) > 0.0 else np.inf
     if len(legs) + (0.0 if calm else ahead) > _MOST and min(spans) > _SHRUNK * max(spans) and not _narrows(last):
         raise Diverged(
@@ -210,7 +214,7 @@ def _refuse_many(legs: Sequence[Span], until: float) -> None:
 
 
 def _narrows(legs: Sequence[Span]) -> bool:
-    """True if the states between which stretches lead come nearer to each other; their last number is the time."""
+    """True if the states at the starts of stretches contract; their last component, the time, does not count."""
     starts = np.array([leg.first[:-1] for leg in legs if isinstance(leg, Stretch)])
     if not len(starts):
         return False
@@ -231,25 +235,26 @@ def walked(
     noise: FloatArray | None = None,
     visited: list[tuple[float, State]] | None = None,
 ) -> tuple[float, State, int | None]:
-    """Integrate by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
+    """Integrates by DOP853 to the first rise of a guard through zero, or to ``until`` [s].
 
     Args:
         rates: right-hand side.
-        time: where the leg starts [s].
-        state: there.
-        until: its last end [s].
+        time: start of the leg [s].
+        state: state at the start.
+        until: time limit [s].
         tolerance: absolute, of each component of the state.
         guards: values that are negative while the mode lasts, shape (guards,).
-        corrected: puts a state back on its constraints; applied after every step.
-        first_step: [s], of the order of the leg before: rebounds get shorter and shorter. None: by the rates.
-        noise: round-off of the guards, by which they must rise above zero to be seen, shape (guards,); None: none.
-        visited: takes time and state at the start of each step, for :func:`between`.
+        corrected: projects a state onto its constraints; applied after every step.
+        first_step: length of the first step at most [s], from the leg before, as rebounds get shorter and shorter;
+            None: chosen from the rates.
+        noise: round-off of the guards, shape (guards,); a guard counts as risen only above it. None: zero.
+        visited: list to which time and state at the start of each step are appended, for :func:`between`.
 
     Returns:
-        Time [s], state there, and number of the guard; None: the end of time.
+        Time [s] and state at the end, and index of the guard that rose; None: the time limit.
 
     Raises:
-        Diverged: the integration stops.
+        Diverged: the integration fails.
     """
     if not until > time:
         return time, state, None
@@ -273,7 +278,7 @@ def between(
     tolerance: FloatArray,
     corrected: Callable[[State], State],
 ) -> FloatArray:
-    """States at rising times [s], each from the start of the step that holds it, shape (times, state)."""
+    """States at rising times [s], each integrated from the start of the step that holds it, shape (times, state)."""
     starts = np.searchsorted([begun for begun, _ in visited], times, side="right") - 1
     steps = [visited[max(int(k), 0)] for k in starts]
     rtol = float(np.min(tolerance))
@@ -288,12 +293,12 @@ def between(
 def states_of(
     route: HybridRoute[ModeT], path: HybridPath[Stretch[ModeT]], times: FloatArray, legs: Sequence[int]
 ) -> FloatArray:
-    """States at rising times [s], each within the leg of the given number, shape (times, state)."""
+    """States at rising times [s], each within the leg of the given index, shape (times, state)."""
     at = np.asarray(legs)
     parts = [route.within(path.legs[number], times[at == number]) for number in sorted(set(legs))]
     return np.concatenate(parts)
 
 
 def first_close(paths: Sequence[HybridPath[Any]], close: float) -> float:
-    """Time [s] of the first decision that is nearer to another outcome than ``close``; inf: there is none."""
+    """Time [s] of the first decision whose margin is below ``close``; inf: there is none."""
     return min((time for path in paths for time, margin in path.margins if margin < close), default=np.inf)

@@ -1,6 +1,6 @@
-"""Vectors of anything that adds and multiplies: numbers, long doubles, heyoka's expressions.
+"""Vector algebra over any scalars: floats, long doubles, expressions of heyoka.
 
-Zeros and ones that are plain floats fold away, so that what a mechanism's geometry makes zero never becomes a term.
+Plain float zeros and ones are folded away: terms that vanish by a mechanism's geometry are never formed.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ def is_zero(a: Scalar) -> bool:
 
 
 def mul(a: Scalar, b: Scalar) -> Scalar:
-    """a·b."""
+    """Product a·b."""
     if type(a) is float and a in _FOLDED:
         return b if a else _ZERO
     if type(b) is float and b in _FOLDED:
@@ -35,19 +35,19 @@ def add(*terms: Scalar) -> Scalar:
 
 
 def sub(a: Scalar, b: Scalar) -> Scalar:
-    """A − b."""
+    """Difference a − b."""
     if is_zero(b):
         return a
     return -b if is_zero(a) else a - b
 
 
 def dot(a: Vector, b: Vector) -> Scalar:
-    """a·b."""
+    """Scalar product a·b."""
     return add(*map(mul, a, b))
 
 
 def cross(a: Vector, b: Vector) -> list[Scalar]:
-    """a×b."""
+    """Vector product a×b."""
     return [sub(mul(a[i], b[j]), mul(a[j], b[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
 
 
@@ -57,25 +57,25 @@ def plus(*vectors: Vector) -> list[Scalar]:
 
 
 def minus(a: Vector, b: Vector) -> list[Scalar]:
-    """A − b."""
+    """Difference a − b of vectors."""
     return list(map(sub, a, b))
 
 
 def scaled(factor: Scalar, a: Vector) -> list[Scalar]:
-    """factor·a."""
+    """Product factor·a."""
     return [mul(factor, x) for x in a]
 
 
 def turned(R: Sequence[Vector], a: Vector) -> list[Scalar]:
-    """R a, for R as a list of rows."""
+    """Product R a; R is a list of rows."""
     return [dot(row, a) for row in R]
 
 
 def turned_back(R: Sequence[Vector], a: Vector) -> list[Scalar]:
-    """Rᵀ a."""
+    """Product Rᵀ a."""
     return [dot(column, a) for column in zip(*R, strict=True)]
 
 
 def product(R: Sequence[Vector], S: Sequence[Vector]) -> list[list[Scalar]]:
-    """R S."""
+    """Product R S."""
     return [[dot(row, column) for column in zip(*S, strict=True)] for row in R]

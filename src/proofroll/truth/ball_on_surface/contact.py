@@ -1,8 +1,8 @@
-"""Stick and slip by Newton-Euler in the world: the surface only through its signed distance, every force unknown.
+"""Stick and slip by Newton-Euler in the world frame; the surface enters only by its signed distance.
 
-The wall's force R follows from what the contact point must do, as vectors: along the wall's normal it never moves, and
-along the wall it sticks or obeys the law of friction. Integrated by implicit collocation, so that neither the stiff
-start of a slip nor its end is regularised.
+The wall's force R follows from the acceleration of the contact point, as vectors: zero along the wall's normal; along
+the wall, the point sticks or obeys the law of friction. Implicit collocation integrates the equations, so neither the
+stiff start of a slip nor its end is regularised.
 """
 
 from typing import Any
@@ -20,14 +20,14 @@ _ONES = np.ones(3)
 
 
 def _dot(x: AnyArray, y: AnyArray) -> AnyArray:
-    """Product x · y along the last axis, which stays; not conjugated."""
+    """Scalar product x · y along the last axis, which is kept with length 1; complex values are not conjugated."""
     return np.asarray(((x * y) @ _ONES)[..., None])
 
 
 class ContactRates:
-    """Rates of the state y = (p, ω, u), shape (n, 9), with the slip velocity u in place of the centre's velocity.
+    """Rates of the state y = (p, ω, u), shape (n, 9), with the slip velocity u instead of the centre's velocity v.
 
-    u is a state because the difference v + a ω × e1 would lose the digits of a small slip.
+    u is a state because v + a ω × e1 would lose the digits of a small slip.
     """
 
     def __init__(self, body: RollingBall) -> None:
@@ -38,29 +38,29 @@ class ContactRates:
         self.scale = np.repeat([max(body.surface.length_scales[0], body.ball.radius), spin, pace], 3)
 
     def velocity(self, y: FloatArray) -> FloatArray:
-        """v_WB [m/s], shape (n, 3): slip without the part that the spin makes."""
+        """Velocity v_WB of the centre [m/s], shape (n, 3): slip velocity minus the part due to spin."""
         e1 = self._body.surface.normal(y[:, :3])
         return np.asarray(y[:, 6:] - self._body.ball.radius * cross(y[:, 3:6], e1))
 
     def force(self, y: FloatArray, sticking: bool) -> FloatArray:
-        """R: force of the wall on the ball [N], shape (n, 3)."""
+        """Force R of the wall on the ball [N], shape (n, 3)."""
         return np.asarray(self._solve(*self._geometry(y[:, :3]), y[:, 3:6], y[:, 6:], sticking)[1])
 
     def split(self, y: FloatArray, sticking: bool) -> tuple[FloatArray, FloatArray]:
-        """Friction on the ball, shape (n, 3), and N, shape (n,) [N]."""
+        """Friction on the ball, shape (n, 3), and normal force N, shape (n,), both in [N]."""
         e1 = self._body.surface.normal(y[:, :3])
         R = self.force(y, sticking)
         N = -np.sum(R * e1, axis=-1)
         return R + N[:, None] * e1, N
 
     def slip_direction_at_rest(self, y: FloatArray) -> FloatArray:
-        """Direction in which a slip starts, shape (3,): against the friction that sticking would need."""
+        """Unit direction in which a slip starts, shape (3,), opposite to the friction needed to stick; else zero."""
         friction, _ = self.split(y[None, :], sticking=True)
         size = float(np.linalg.norm(friction))
         return np.asarray(-friction[0] / size) if size > 0 else np.zeros(3)
 
     def system(self, sticking: bool) -> System:
-        """System for the integrator."""
+        """Rates, Jacobian and scales for the integrator."""
         return System(lambda y: self.rates(y, sticking), lambda y: self._jacobian(y, sticking), self.scale)
 
     def rates(self, y: FloatArray, sticking: bool) -> FloatArray:
@@ -71,7 +71,7 @@ class ContactRates:
         return self._body.surface.normal(p), self._body.surface.normal_gradient(p)
 
     def _jacobian(self, y: FloatArray, sticking: bool) -> FloatArray:
-        """∂ẏ/∂y: exact by complex steps for ω and u, where it is stiff; by differences for the smooth geometry."""
+        """∂ẏ/∂y, shape (n, 9, 9): by complex steps for ω and u, which are stiff; by differences for the geometry."""
         n, stiff = len(y), np.arange(3, 6 if sticking else 9)
         result = np.zeros((n, 9, 9))
         tilted = np.tile(y[:, 3:].astype(np.complex128), (len(stiff), 1, 1))
@@ -88,11 +88,11 @@ class ContactRates:
     def _solve(
         self, e1: FloatArray, bend: FloatArray, w: AnyArray, u: AnyArray, sticking: bool
     ) -> tuple[AnyArray, AnyArray]:
-        """ẏ and R; w and u may be complex.
+        """Rates ẏ, shape (n, 9), and wall force R [N], shape (n, 3); w and u may be complex.
 
-        Newton p̈ = g + R/m and Euler J ω̇ = a e1 × R + f (v/V) × (R · e1) e1 with R = R1 e1 + T leave for the contact
-        point's acceleration p̈ + a ω̇ × e1 + a ω × ė1, with λ = 1/m + a²/J and the direction d of v,
-
+        Newton's p̈ = g + R/m and Euler's J ω̇ = a e1 × R + f (v/V) × (R · e1) e1, with R = R1 e1 + T, are inserted into
+        the acceleration p̈ + a ω̇ × e1 + a ω × ė1 of the contact point. With λ = 1/m + a²/J and the direction d of v
+        this gives
             along e1:        R1/m + e1 · g = -ė1 · v, for e1 · v = 0 always,
             along the wall:  λ T + g - (a f/J) R1 d + a ω × ė1 = 0 in stick;  T = μ R1 u/|u| in slip.
         """

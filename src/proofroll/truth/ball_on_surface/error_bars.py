@@ -1,4 +1,4 @@
-"""Answer of a route about a ball, and the error bar of two routes: the difference of their answers."""
+"""Dataset of one route's motion, and error bars from the difference of two routes."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from proofroll.truth.ball_on_surface.orientation import Quadrature, orientation
 if TYPE_CHECKING:
     import xarray as xr
 
-# A route's own round-off: values carry a relative error of some machine epsilons even where the routes agree.
+# Relative round-off of a route: values may be wrong by a few machine epsilons even where the routes agree.
 ROUND_OFF = 4 * np.finfo(float).eps
-# What is a small difference of large numbers, and of which.
+# Variables that are small differences of large variables, with the large one.
 _DIFFERENCE_OF = {"gap": "p_WB", "slip": "v_WB", "slip2": "v_WB", "slip3": "v_WB"}
-# Where the normal force is this many of its own error bars or less, the friction needed is 0/0.
+# Below this many of its own error bars the normal force is zero, and the needed friction 0/0.
 _NOTHING = 10.0
 
 
@@ -36,9 +36,10 @@ def dataset_of(
     kinks: Iterable[float],
     quadrature: Quadrature,
 ) -> xr.Dataset:
-    """All variables of a route's motion; spin, its kinks and a quadrature are for the orientation, if it is asked for.
+    """Dataset of all variables of a route's motion.
 
-    See :func:`proofroll.elements.ball_on_surface.dataset.columns` and :func:`.orientation.orientation`.
+    ``spin``, ``kinks`` and ``quadrature`` serve for the orientation, if the scene requires it; see
+    :func:`.orientation.orientation`. Variables: :func:`proofroll.elements.ball_on_surface.dataset.columns`.
     """
     q_WB = orientation(spin, times, kinks, quadrature) if BallCapability.ORIENTATION in scene.requires else None
     motion = (found.p_WB, found.v_WB, found.w_WB)
@@ -49,15 +50,15 @@ def dataset_of(
 def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
     """Gives each variable of ``result`` the attribute ``error_bar`` in its own unit.
 
-    It is ``SAFETY`` times the largest difference to ``check``, of the second route, plus ``floor``: what both may
-    have in common, relative to the size of the variable [1].
+    It is ``SAFETY`` times the sum of the largest difference to ``check``, the second route, and ``floor`` times the
+    size of the variable: the relative error that both routes may share [1].
 
     Raises:
-        Diverged: a value is not finite, other than the friction needed where nothing presses.
+        Diverged: a value is not finite, except needed friction at zero normal force.
     """
     for name, values in result.data_vars.items():
         mine, other = (np.asarray(x.to_numpy(), dtype=np.float64) for x in (values, check[name]))
-        if name == "needed_friction":  # comes after N
+        if name == "needed_friction":  # N is earlier in data_vars, so it has its error bar
             pressed = np.minimum(*(np.abs(x["N"].to_numpy()) for x in (result, check)))
             known = pressed > _NOTHING * result["N"].attrs["error_bar"]
             mine, other = mine[known], other[known]
@@ -65,6 +66,6 @@ def put_error_bars(result: xr.Dataset, check: xr.Dataset, floor: float) -> None:
             raise Diverged(f"the truth is not finite (NaN or overflow) in {name}; take less extreme parameters")
         size = 0.0 if values.dtype == bool else np.max(np.abs(mine), initial=0.0)
         difference = np.max(np.abs(mine - other), initial=0.0)
-        if name in _DIFFERENCE_OF:  # it has the round-off of what it is a difference of
+        if name in _DIFFERENCE_OF:  # plus the round-off of the large variable
             difference += ROUND_OFF * np.max(np.abs(result[_DIFFERENCE_OF[name]].to_numpy()), initial=0.0)
         values.attrs["error_bar"] = float(SAFETY * (difference + floor * size))

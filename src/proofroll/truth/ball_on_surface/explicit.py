@@ -1,4 +1,4 @@
-"""Explicit integration (DOP853) step by step, with exact stops: what the polar route integrates with."""
+"""Explicit integration (DOP853), step by step, with exact ends: the integrator of the polar route."""
 
 import math
 from collections.abc import Callable
@@ -14,10 +14,10 @@ Rates = Callable[[FloatArray], FloatArray]
 
 
 class ExplicitRun:
-    """A run from ``start`` until something ends it; see :class:`proofroll.truth.ball_on_surface.sliding.IntegratedRun`.
+    """Integration from ``start`` to its end; implements :class:`proofroll.truth.ball_on_surface.sliding.IntegratedRun`.
 
-    Of each step of a solver ``ended`` tells where it reached what ends the run, the state there, and the reason; None:
-    it goes on. No step is longer than ``cap`` says of the state before it.
+    After each step ``ended`` gets the solver and returns time [s], state and reason of an end within that step; None:
+    the run goes on. A step is at most ``cap(state before it)`` long [s].
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class ExplicitRun:
         self.end, self.last, self.why = until, state, End.TIME
         self._between: list[Callable[[float], FloatArray]] = []
         ends, states = [start], [state]
-        # where a run has no length its rates may not be finite
+        # rates may not be finite for a run of zero length
         solver = solver_from(lambda _, y: rates(y), start, state, TIGHTEST, atol) if until > start else None
         while solver is not None and solver.t < until:
             controlled_step(solver, None, until, math.inf if cap is None else max(cap(solver.y), 1e-300))

@@ -11,32 +11,34 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.route import End, Leg, Route, World
 
-# A ball that leaves the wall is looked for on it from this part of its pace on; its gap has grown from zero till then.
+# Fraction of the ball's time scale after take-off at which the search for a landing starts: at take-off itself the gap
+# is zero.
 _LEFT = 1e-3
 
 
-# Parts of the speed of a fall by the radius: bounces slower than the first are over, and only those faster than the
-# second, a hundredth of the radius high, are told as events; slower than the third a contact point stands still.
+# Speeds relative to sqrt(radius · gravity). Bounces slower than _LOW are not followed; only those faster than _SEEN (a
+# hundredth of the radius high) are reported as events. A contact point slower than _STANDS (times all speeds of the
+# ball) is at rest.
 _LOW, _SEEN, _STANDS = 1e-6, 0.14, 1e-12
-# Way over the radius of curvature up to which the gap is taken along it: places are rounded by as much as the last
-# bounces are high. Points and weights of Gauss on (0, 1) for the mean normal.
+# Displacement times curvature below which the gap is integrated along the displacement: the difference of two positions
+# would have a round-off as large as the last bounces are high. Gauss points and weights on (0, 1) for the mean normal.
 _NEAR = 0.01
 _POINTS, _WEIGHTS = (1 + np.polynomial.legendre.leggauss(3)[0]) / 2, np.polynomial.legendre.leggauss(3)[1] / 2
 
 
 def pressed(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> float:
-    """Normal force over mass that keeps the centre on its surface [m/s²]."""
+    """Normal force divided by mass that keeps the centre on its surface [m/s²]."""
     e1, bend = body.surface.normal(p_WB), body.surface.normal_gradient(p_WB)
     return float(e1 @ body.gravity + v_WB @ bend @ v_WB)
 
 
 @dataclass(frozen=True)
 class Bounce:
-    """A ball that leaves its impact.
+    """State after an impact from which the ball leaves the wall again.
 
     Attributes:
-        world: its place [m], velocity [m/s] and spin [rad/s] after it.
-        seen: it goes high enough to be an event.
+        world: position [m], velocity [m/s] and spin [rad/s] after the impact.
+        seen: the bounce is high enough to be an event.
     """
 
     world: World
@@ -45,14 +47,14 @@ class Bounce:
 
 @dataclass(frozen=True)
 class Landed:
-    """A ball that has come to stay on the wall.
+    """State of a ball that stays on the wall.
 
     Attributes:
-        rest: time from the impact that is the last to be followed to the last of all, since when it stays [s]; it goes
-            as far meanwhile as if it stayed.
+        rest: time from the last followed impact to the end of all further ones [s]; meanwhile the ball moves as if it
+            was in contact.
         blur: uncertainty of that time [s], the same for both routes.
-        world: its place [m], velocity [m/s] and spin [rad/s] at the impact that is the last to be followed.
-        slip: velocity of its contact point [m/s], shape (3,); None: it rolls.
+        world: position [m], velocity [m/s] and spin [rad/s] at the last followed impact.
+        slip: velocity of the contact point [m/s], shape (3,); None: it rolls.
     """
 
     rest: float
@@ -62,18 +64,17 @@ class Landed:
 
 
 def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | None:
-    """Outcome of a landing: a bounce, or contact from then on; None: unknown.
+    """Outcome of a landing: a bounce, or lasting contact.
 
-    A ball that leaves each impact with e times its speed bounces infinitely often in a finite time: below a speed that
-    does not matter (:data:`_LOW`) its last impact takes all of it, which gives the wall the same impulse as all the
-    others together.
+    A ball that leaves each impact with e times its speed bounces infinitely often in a finite time. Below the speed
+    :data:`_LOW` a single impact with e = 0, of the same total impulse, replaces all that remain.
 
     Returns:
-        None: the contact has no restitution, so nothing is said about what follows.
+        None if the contact has no coefficient of restitution: the continuation is unknown.
 
     Raises:
         Refused: the wall moves, or the spin has no limit.
-        Diverged: the flight has no length.
+        Diverged: the flight has zero length.
     """
     e, e_t = body.contact.restitution, body.contact.tangential_restitution
     time = flight.end
@@ -96,21 +97,21 @@ def landed(body: RollingBall, route: Route, flight: Leg) -> Bounce | Landed | No
             "which turns back its contact point whole, so its spin has no limit; "
             "end the run earlier, take tangential_restitution below 1, or give friction a bound (mu_static)"
         )
-    # The last of infinitely many leaves no slip to be turned back; where it is the only one, it does, and friction
-    # without bound stops that at once.
+    # Infinitely many impacts (e > 0) leave no slip, as with e_t = 0. A single impact (e = 0) reverses the slip by e_t,
+    # unless unbounded friction stops it at once.
     v, w = route.impact(body, p, v, w, 0.0, e_t if e == 0 and np.isfinite(body.contact.mu_static) else 0.0)
     rest = 2 * e * approach / ((1 - e) * weight) if e else 0.0
-    blur = rest**2 * (natural + np.linalg.norm(v)) * _bend(body, p)  # the weight changes meanwhile
+    blur = rest**2 * (natural + np.linalg.norm(v)) * _bend(body, p)  # the normal force changes during ``rest``
     return Landed(rest, float(blur), (p, v, w), _slip(body, v, w, e1))
 
 
 def _bend(body: RollingBall, p_WB: FloatArray) -> float:
-    """Largest curvature of the centre's surface [1/m]."""
+    """Largest curvature of the surface of the ball's centre [1/m]."""
     return float(np.linalg.norm(body.surface.normal_gradient(p_WB), 2))
 
 
 def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> FloatArray | None:
-    """Velocity of the contact point along the wall [m/s], shape (3,); None: zero but for round-off."""
+    """Velocity of the contact point along the wall [m/s], shape (3,); None: zero within round-off."""
     a, gravity = body.ball.radius, np.linalg.norm(body.gravity)
     slip = v + a * cross(w, e1)
     slip -= (slip @ e1) * e1
@@ -119,9 +120,10 @@ def _slip(body: RollingBall, v: FloatArray, w: FloatArray, e1: FloatArray) -> Fl
 
 
 def flown(body: RollingBall, world: World, time: float, until: float, state: FloatArray) -> Leg:
-    """Free fall from ``time`` [s] with constant spin until the ball is on the wall again, or to ``until`` [s].
+    """Free fall from ``time`` [s] with constant spin until the ball lands, or to ``until`` [s].
 
-    ``state`` is the route's own at take-off; it passes through to the leg, flight uses ``world``.
+    ``world``: position, velocity and spin at take-off. ``state``: the same in the route's variables, handed on to the
+    leg.
     """
     p, v, w = world
 
@@ -145,10 +147,11 @@ def flown(body: RollingBall, world: World, time: float, until: float, state: Flo
     leaving = -float(v @ e1)
     pace = _LEFT * body.ball.radius / (np.sqrt(body.ball.radius * pull) + np.linalg.norm(v) or 1.0)
     if leaving > _LOW * np.sqrt(body.ball.radius * pull):
-        # It is in the air for longer than it takes to lose that speed; 0.7, lest a look end where it lands on a plane.
+        # The flight lasts longer than gravity and curvature need to cancel the speed ``leaving``. Search intervals
+        # double; the factor 0.7 keeps their ends off the landing time on a plane.
         pace = 0.7 * leaving / (pull + bend * float(v @ v))
     lands, start = None, time + float(pace)
-    while lands is None and start < until:  # the gap is a smooth function of the time since: ever longer looks suffice
+    while lands is None and start < until:  # intervals may double: the gap is a smooth function of time
         end = min(time + 2 * (start - time), until)
         lands, start = first_rise(sunk, start, end), end
     if lands is None:

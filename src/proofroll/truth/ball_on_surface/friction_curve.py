@@ -1,8 +1,8 @@
-"""The friction that rolling without slip would need, against time, with its crests: the stairs of slip onset.
+"""Friction needed to roll without slip, over time, with its peaks: the staircase of slip onset.
 
-While the ball sticks its motion does not depend on μ. One integration of rolling without slip therefore answers for
-every μ when the first slip comes: when the curve n(t) = |F|/N first reaches μ. As μ grows past a crest of n that no
-earlier crest reaches, the onset jumps to a later rise: each such crest is an edge of the staircase.
+While the ball sticks its motion does not depend on μ. One integration of rolling without slip therefore gives the first
+slip for every μ: the time when n(t) = |F|/N first reaches μ. When μ grows past a peak of n that exceeds all earlier
+ones, the onset jumps to a later rise: each such peak is an edge of the staircase.
 """
 
 from collections.abc import Callable
@@ -16,9 +16,9 @@ from proofroll.core.crossing import first_rise
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.ball_on_surface.stick_slip import first_route
 
-_UNREACHABLE = 1e6  # a static friction that stands for rolling without slip, and still can be squared
+_UNREACHABLE = 1e6  # a static friction that stands for rolling without slip; its square is still finite
 _POINTS = 12
-_SAME = 1e-10  # crests that differ by less, relatively, are the same crest again
+_SAME = 1e-10  # relative difference below which two peaks are equal
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class FrictionCurve:
     """Needed friction |F|/N [1] of rolling without slip.
 
     Attributes:
-        until: last time that is known [s]; earlier than asked for where the normal force vanishes.
-        times, values: on a grid fine enough that one step holds no more than one crest, shape (n,).
+        until: last known time [s]; earlier than requested where the normal force vanishes.
+        times, values: on a grid with at most one peak per interval, shape (n,).
         crest_times, crest_values: local maxima between the ends, shape (k,).
     """
 
@@ -43,15 +43,15 @@ class FrictionCurve:
         return self._needed(np.asarray(times, dtype=np.float64))
 
     def slope(self, time: float) -> float:
-        """Rate of the needed friction [1/s]."""
+        """Time derivative of the needed friction [1/s]."""
         span = 1e-2 * (self.times[1] - self.times[0])
         low, high = max(time - span, 0.0), min(time + span, self.until)
         x = np.cos(np.pi * np.arange(5) / 4)
-        fit = np.polynomial.Chebyshev.fit((low + high) / 2 + (high - low) / 2 * x, self(_spread(low, high, x)), 4)
+        fit = np.polynomial.Chebyshev.fit(nodes := _spread(low, high, x), self(nodes), 4)
         return float(fit.deriv()(time))
 
     def onset(self, mu: float) -> float | None:
-        """Time at which the needed friction first reaches ``mu`` [s]; None: not until the end."""
+        """Time at which the needed friction first reaches ``mu`` [s]; None: not until ``until``."""
         if self.values[0] > mu:
             return 0.0
         times = np.concatenate([self.times, self.crest_times])
@@ -66,21 +66,21 @@ class FrictionCurve:
         return end if rise is None else rise
 
     def edges(self) -> FloatArray:
-        """Values of μ at which the onset jumps, rising: the crests that are higher than everything before them."""
+        """Values of μ at which the onset jumps, rising: the peaks that exceed all earlier values."""
         values = np.concatenate([self.values[:1], self.crest_values])
         return values[1:][values[1:] > (1 + _SAME) * np.maximum.accumulate(values)[:-1]]
 
     def rises_before(self, time: float) -> int:
-        """Number of crests before a time: which stair an onset stands on."""
+        """Number of peaks before a time [s]: the index of the stair of an onset at that time."""
         return int(np.searchsorted(self.crest_times, time))
 
 
 def friction_curve(body: RollingBall, until: float) -> FrictionCurve:
-    """The curve of needed friction from time 0 to ``until`` [s], whatever μ the scene has."""
+    """Needed friction from time 0 to ``until`` [s]; independent of the scene's own μ."""
     endless = body.with_contact(mu_static=_UNREACHABLE, mu_kinetic=_UNREACHABLE)
     route = first_route(endless)
     leg = route.stick(0.0, route.start(), until)
-    # One sample per turn of the ball by about a radian: crests come at the pace of the path, many turns apart.
+    # One sample per radian of rolling: peaks follow the scale of the path, many radians apart.
     pace = body.ball.radius / (np.linalg.norm(body.v0) + np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)))
     times = np.linspace(0.0, leg.end, max(int(np.ceil(leg.end / pace)), 4) + 1)
 
@@ -108,7 +108,7 @@ def _spread(low: float, high: float, x: FloatArray) -> FloatArray:
 
 
 def _crest(needed: Callable[[FloatArray], FloatArray], low: float, high: float) -> tuple[float, float]:
-    """Time and height of the one crest between two times, from a polynomial through Chebyshev points."""
+    """Time [s] and value of the only peak between two times, from a polynomial through Chebyshev points."""
     x = chebyshev.chebpts2(_POINTS)
     fit = chebyshev.chebfit(x, needed(_spread(low, high, x)), _POINTS - 1)
     roots = chebyshev.chebroots(chebyshev.chebder(fit))

@@ -1,8 +1,8 @@
-"""Impact on the wall: velocity and spin after it, computed in two ways: one for each route of the truth.
+"""Impact on the wall: velocity and spin after it, computed in two ways, one for each route of the truth.
 
-Newton's coefficient of restitution e for the normal velocity; along the wall the contact point's velocity u is turned
-to -e_t u where friction suffices, else the impulse of friction is μk times the normal one against u (Walton, in
-Particulate Two-Phase Flow, 1993). e_t = 0 stops the contact point, e_t = 1 turns it back whole (Garwin, Am. J. Phys.
+Newton's coefficient of restitution e for the normal velocity. Along the wall the contact point's velocity u becomes
+-e_t u if friction suffices; otherwise the impulse of friction is μk times the normal one, opposite to u (Walton, in
+Particulate Two-Phase Flow, 1993). e_t = 0 stops the contact point, e_t = 1 reverses its velocity (Garwin, Am. J. Phys.
 37, 1969).
 """
 
@@ -15,7 +15,7 @@ from proofroll.elements.ball_on_surface.model import RollingBall
 def by_coefficients(
     body: RollingBall, p: FloatArray, v: FloatArray, w: FloatArray, e: float, e_t: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Velocity [m/s] and spin [rad/s] after an impact at the centre ``p`` [m]: the impulse from the mobility."""
+    """Velocity [m/s] and spin [rad/s] after an impact at the centre ``p`` [m], from the contact's effective mass."""
     a, m, J, contact = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact
     e1 = body.surface.normal(p)
     approach = float(v @ e1)
@@ -30,24 +30,24 @@ def by_coefficients(
 def by_equations(
     body: RollingBall, p: FloatArray, v: FloatArray, w: FloatArray, e: float, e_t: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Impact as :func:`by_coefficients`, with velocity, spin and impulse as nine unknowns of linear equations."""
+    """Result of :func:`by_coefficients`, from linear equations for velocity, spin and impulse (nine unknowns)."""
     a, m, J, contact = body.ball.radius, body.ball.mass, body.ball.inertia, body.contact
     e1 = body.surface.normal(p)
     cross = np.array([[0, -e1[2], e1[1]], [e1[2], 0, -e1[0]], [-e1[1], e1[0], 0]])
-    before = v - a * cross @ w  # of the contact point; its part along e1 is that of the centre
+    before = v - a * cross @ w  # velocity of the contact point; along e1 it equals that of the centre
     slip = before - (before @ e1) * e1
     matrix, right = np.zeros((9, 9)), np.zeros(9)
     matrix[:3, :3], matrix[:3, 6:], right[:3] = m * np.eye(3), -np.eye(3), m * v
     matrix[3:6, 3:6], matrix[3:6, 6:], right[3:6] = J * np.eye(3), -a * cross, J * w
     matrix[6:, :3], matrix[6:, 3:6] = np.eye(3), -a * cross
     right[6:] = -e * (before @ e1) * e1 - e_t * slip
-    found = np.linalg.solve(matrix, right)
-    press, size = -float(found[6:] @ e1), float(np.linalg.norm(slip))
-    if size and np.linalg.norm(found[6:] + press * e1) > contact.mu_static * press:
+    solution = np.linalg.solve(matrix, right)
+    press, size = -float(solution[6:] @ e1), float(np.linalg.norm(slip))
+    if size and np.linalg.norm(solution[6:] + press * e1) > contact.mu_static * press:
         along = slip / size
         matrix[6:] = 0.0
         matrix[6:, 6:] = np.eye(3) - np.outer(e1 + contact.mu_kinetic * along, e1)
         matrix[6:, :3] += np.outer(e1, e1)
         right[6:] = -e * (before @ e1) * e1
-        found = np.linalg.solve(matrix, right)
-    return np.asarray(found[:3]), np.asarray(found[3:6])
+        solution = np.linalg.solve(matrix, right)
+    return np.asarray(solution[:3]), np.asarray(solution[3:6])

@@ -21,11 +21,11 @@ from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
 from proofroll.truth.collocation import Step, System, next_length, nodes, take
 
 _TOLERANCE = 1e-13  # of a step, relative to the scale of each variable
-_APPROACH = 0.5  # part of the time left until something stands still that one step may take, while it is far,
-_CLOSE = 0.99  # and when it is near, where the time left is well known
-_FURTHER = 1.2  # a polynomial is continued over this part of the length of its own step
-_MANY = 300  # steps of a leg that rolls: the rest of a longer one is left to a compiled series
-_STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
+_APPROACH = 0.5  # fraction of the time left until standstill that one step may take, far from it,
+_CLOSE = 0.99  # and near it, where that time is known accurately
+_FURTHER = 1.2  # how far a polynomial is extrapolated, relative to its own step
+_MANY = 300  # steps of a rolling leg; the rest of a longer one is left to a compiled Taylor series
+_STILL = 1e-9  # time left until standstill, relative to the pace, below which the state is extrapolated
 
 
 class Implicit(Route):
@@ -33,7 +33,7 @@ class Implicit(Route):
 
     Args:
         body: the scene's ball.
-        first_step: longest first step of a slip, relative to the pace of the motion. That step goes from u = 0 on.
+        first_step: longest first step of a slip, relative to the pace of the motion; that step starts at u = 0.
     """
 
     name = "world frame by signed distance, implicit collocation"
@@ -45,7 +45,7 @@ class Implicit(Route):
         self._first = first_step
         self._pace = body.ball.radius / max(float(self._contact.scale[-1]), 1e-300)  # [s]
         self._mu = body.contact.mu_static
-        self._held = always_pressed(body)  # then no step need be searched for a lift-off
+        self._held = always_pressed(body)  # then no step is searched for a lift-off
 
     def start(self) -> FloatArray:
         """See :class:`Route`."""
@@ -99,7 +99,7 @@ class Implicit(Route):
         return walk.leg(self, True, until, walk.state, End.TIME)
 
     def _rolls_on(self, walk: _Walk, until: float) -> Leg:
-        """The rest of a long leg by Taylor series of the same equations, which take a fraction of the time."""
+        """Continues a long rolling leg by Taylor series of the same equations, which take a fraction of the time."""
         y, begun = walk.state, walk.time
         end, slips, states = unreduced_taylor.until_slip(self._body, begun, y[:6], until)
 
@@ -137,11 +137,11 @@ class Implicit(Route):
         return walk.leg(self, False, until, walk.state, End.TIME)
 
     def motion(self, y: FloatArray, sticking: bool) -> BallMotion:
-        """Motion in states, shape (n, 9)."""
+        """Motion of the ball in the given states, shape (n, 9)."""
         return BallMotion(y[:, :3], self._contact.velocity(y), y[:, 3:6], self._contact.force(y, sticking), self.name)
 
     def force_at_start(self, state: FloatArray) -> FloatArray:
-        """Force of the wall at the very start of a slip [N], shape (3,), where u = 0 but has a direction."""
+        """Force of the wall at the start of a slip [N], shape (3,), where u = 0 but its direction is known."""
         tiny = np.concatenate([state[:6], 1e-100 * self._contact.slip_direction_at_rest(state)])
         return np.asarray(self._contact.force(tiny[None, :], False)[0])
 
@@ -150,16 +150,16 @@ class Implicit(Route):
         return np.linalg.norm(friction, axis=-1), self._mu * N
 
     def _excess_along(self, step: Step, times: FloatArray) -> FloatArray:
-        """Friction that is missing [N]: smooth also where a step reaches beyond N = 0."""
+        """Needed minus available friction [N]; smooth even if a step reaches beyond N = 0."""
         needed, available = self._needed_and_available(step(times))
         return needed - available
 
     def _pull_along(self, step: Step, sticking: bool, times: FloatArray) -> FloatArray:
-        """-N [N]: rises through zero where the ball leaves the wall."""
+        """-N [N]; rises through zero where the ball leaves the wall."""
         return -self._contact.split(step(times), sticking)[1]
 
     def _until_still(self, state: FloatArray, sticking: bool) -> float:
-        """Time until the centre (sticking) or the contact point (slipping) stands still at the present rate [s]."""
+        """Time until the centre (sticking) or the contact point (slipping) stops at this rate [s]; inf: never."""
         rates = self._contact.rates(state[None, :], sticking)[0]
         if sticking:
             v, e1 = self._contact.velocity(state[None, :])[0], self._body.surface.normal(state[:3])
@@ -171,11 +171,14 @@ class Implicit(Route):
         return size / slowing if slowing > 0 else np.inf
 
     def _approach(self, left: float) -> float:
-        """Longest step when so much time is left until something stands still [s]."""
+        """Longest step [s] when ``left`` [s] remain until standstill."""
         return left * float(np.clip(1 - 2 * left / self._pace, _APPROACH, _CLOSE))
 
     def _first_guess(self, state: FloatArray) -> Callable[[float], FloatArray]:
-        """States at the nodes of a first step: u = (G t + α t²/2) d, the rest along its tangent."""
+        """Guess of the states at the nodes of the first step of a slip, as a function of its length [s].
+
+        The slip velocity is u = (G t + α t²/2) d; the other variables follow their tangent.
+        """
         d = self._contact.slip_direction_at_rest(state)
 
         def growth(y: FloatArray) -> tuple[float, FloatArray]:
@@ -197,7 +200,7 @@ class Implicit(Route):
 
 
 class _Walk:
-    """Steps of one leg, each controlled by its error."""
+    """Steps of one leg with error control."""
 
     def __init__(self, system: System, time: float, state: FloatArray, until: float) -> None:
         self._system, self.start, self._state, self._until = system, time, state, until
@@ -205,7 +208,7 @@ class _Walk:
 
     @property
     def time(self) -> float:
-        """Reached so far [s]; exactly ``until`` at the end."""
+        """Time reached so far [s]; exactly ``until`` at the end."""
         if not self.steps:
             return self.start
         end = self.steps[-1].time + self.steps[-1].length
@@ -213,13 +216,13 @@ class _Walk:
 
     @property
     def state(self) -> FloatArray:
-        """Reached so far, shape (9,)."""
+        """State reached so far, shape (9,)."""
         return self.steps[-1].last if self.steps else self._state
 
     def step(self, length: float, guess: Callable[[float], FloatArray] | None = None) -> tuple[Step, float]:
-        """One accepted step, at most of this length [s], and the length to try next."""
+        """Takes one accepted step, at most ``length`` long [s]; returns it and the length to try next."""
         length = min(length, self._until - self.time)
-        # A spin or slip that has grown has round-off of its present size, below which no error can be told.
+        # The round-off of a large spin or slip is relative to its present size, so its tolerance is too.
         sizes = [0.0, *np.linalg.norm(self.state[3:].reshape(2, 3), axis=-1)]
         system = replace(self._system, scale=np.maximum(self._system.scale, np.repeat(sizes, 3)))
         guess = guess or self._continued
@@ -234,22 +237,22 @@ class _Walk:
             length, guess = min(wanted, 0.8 * length), self._tangent if self.steps else guess
 
     def _continued(self, length: float) -> FloatArray:
-        """The last step's polynomial, or where it would have to reach too far the tangent at its end."""
+        """Guess from the last step's polynomial, or from the tangent at its end if that would extrapolate too far."""
         if not self.steps or length > _FURTHER * self.steps[-1].length:
             return self._tangent(length)
         return self.steps[-1](self.time + nodes(length))
 
     def _tangent(self, length: float) -> FloatArray:
-        """Tangent at the end of the last step: a poorer guess for Newton's method than a polynomial, but safer."""
+        """Guess along the tangent at the end of the last step: less accurate than the polynomial, but safer."""
         rates = self._system.rates(self.state[None, :])[0]
         return np.asarray(self.state + nodes(length)[:, None] * rates)
 
     def cut(self, time: float) -> FloatArray:
-        """State at a time within the last step, shape (9,)."""
+        """State at a time [s] within the last step, shape (9,)."""
         return np.asarray(self.steps[-1](np.array([time]))[0])
 
     def leg(self, route: Implicit, sticking: bool, end: float, state: FloatArray, why: End) -> Leg:
-        """The leg made of the steps so far."""
+        """Leg made of the steps so far."""
         steps, first = self.steps, self._state
         starts = np.array([step.time for step in steps])
 
@@ -257,8 +260,8 @@ class _Walk:
             y = np.broadcast_to(first, (len(times), 9)).copy()
             index = np.searchsorted(starts, times, side="right") - 1
             for number in np.unique(index[index >= 0]):
-                here = index == number
-                y[here] = steps[number](np.minimum(times[here], starts[number] + steps[number].length))
+                inside = index == number
+                y[inside] = steps[number](np.minimum(times[inside], starts[number] + steps[number].length))
             result = route.motion(y, sticking)
             if not sticking:
                 for row in np.flatnonzero(~np.any(y[:, 6:], axis=-1)):

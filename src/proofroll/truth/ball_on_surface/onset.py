@@ -1,4 +1,4 @@
-"""First slip: its time, its conditioning, and the distance to the next stair edge."""
+"""First slip: its time, its conditioning, and the distance to the next edge of the onset staircase."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -11,7 +11,7 @@ from proofroll.elements.ball_on_surface.element import rolling_ball
 from proofroll.elements.ball_on_surface.model import RollingBall
 from proofroll.truth.ball_on_surface.friction_curve import FrictionCurve, friction_curve
 
-_STEP = 1e-4  # relative step of the difference in f: its error, 1e-8, is far below what a sensitivity is used for
+_STEP = 1e-4  # relative step of the finite difference in f; its error, 1e-8, is far below any use of a sensitivity
 
 
 @dataclass(frozen=True)
@@ -19,15 +19,15 @@ class Onset:
     """The first slip and its conditioning.
 
     Attributes:
-        time: of the first slip [s]; 0: the ball slips from the start; None: not until the end.
-        by_mu: d ln t / d ln μ [1]; None where there is no slip or it comes at once.
-        by_f: d ln t / d ln f [1]; 0 without rolling resistance.
+        time: of the first slip [s]; 0: the ball slips from the start; None: no slip until the end.
+        by_mu: d ln t / d ln μ [1]; None without slip, or if it starts at time 0.
+        by_f: d ln t / d ln f [1]; 0 without rolling resistance; None as for ``by_mu``.
         edge_below, edge_above: next values of μ at which the time jumps [1]; None: there is none until the end.
-        distance: to the nearer of them, relative to μ [1]; inf where there is none.
-        uncertainty: of μ and f, relative, for which the verdict holds [1].
+        distance: relative distance of μ from the nearer edge [1]; inf: there is none.
+        uncertainty: relative uncertainty of μ and f for which the verdict holds [1].
         verdict: ``ill-posed`` where a change within the uncertainty moves the slip to another rise of the needed
             friction, or makes or removes it.
-        earliest, latest: of the first slip with μ and f at the corners of their ranges [s]; None: no slip.
+        earliest, latest: times of the first slip with μ and f at the corners of their ranges [s]; None: no slip.
     """
 
     time: float | None
@@ -51,7 +51,7 @@ def first_slip(scene: Scene, until: float) -> float | None:
 
 
 def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
-    """The first slip until ``until`` [s], and its conditioning if μ and f have this relative uncertainty [1].
+    """First slip until ``until`` [s], and its conditioning for this relative uncertainty of μ and f [1].
 
     Raises:
         InputError: ``uncertainty`` is not between 0 and 1.
@@ -59,7 +59,7 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     if not 0 <= uncertainty < 1:
         raise InputError("uncertainty", uncertainty, "give a relative uncertainty of mu and f between 0 and 1")
     body = rolling_ball(scene)
-    if np.any(body.slip0):  # whatever its friction is
+    if np.any(body.slip0):  # independent of friction
         return Onset(0.0, None, None, None, None, float("inf"), uncertainty, "well-posed", 0.0, 0.0)
     mu = body.contact.mu_static
     curve = friction_curve(body, until)
@@ -72,7 +72,7 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
     edges = curve.edges()
     below, above = max(edges[edges <= mu], default=None), min(edges[edges > mu], default=None)
     distances = [abs(float(edge) / mu - 1) for edge in (below, above) if edge is not None and mu > 0]
-    # Every corner of the ranges of f and μ: more resistance does not always mean an earlier slip.
+    # All corners of the ranges of f and μ: more resistance does not always mean an earlier slip.
     changed = [_changed(body, sign * uncertainty, until) for sign in (1, -1)]
     stairs = [_stair(each, mu * (1 + sign * uncertainty)) for each in changed for sign in (1, -1)]
     own = _stair(curve, mu)
@@ -92,10 +92,10 @@ def onset(scene: Scene, until: float, uncertainty: float = 1e-3) -> Onset:
 
 
 def edge_between(scene: Scene, low: float, high: float, until: float, digits: int = 6) -> float | None:
-    """A value of μ between ``low`` and ``high`` at which the time of the first slip jumps, by bisection [1].
+    """Value of μ between ``low`` and ``high`` at which the time of the first slip jumps, by bisection [1].
 
-    The question that is halved is on which rise of the needed friction the slip comes, so the answer does not depend
-    on how large the jump is. The result is rounded to ``digits`` decimal places.
+    Bisection asks on which rise of the needed friction the slip starts, so the answer does not depend on the size of
+    the jump. The result is rounded to ``digits`` decimal places.
 
     Returns:
         None where both ends slip on the same rise.
@@ -114,7 +114,7 @@ def edge_between(scene: Scene, low: float, high: float, until: float, digits: in
 
 
 def _stair(curve: FrictionCurve, mu: float) -> tuple[float | None, int]:
-    """Time of the first slip [s] and the number of the rise on which it comes; -1: at once, -2: never."""
+    """Time of the first slip [s] and the index of the rise on which it starts; -1: at time 0, -2: never."""
     time = curve.onset(mu)
     if time is None:
         return None, -2
@@ -127,7 +127,7 @@ def _changed(body: RollingBall, relative: float, until: float) -> FrictionCurve:
 
 
 def _by_f(body: RollingBall, time: float, until: float) -> float:
-    """Value of f times the derivative of the needed friction by f at a fixed time [1]."""
+    """Product of f and the derivative of the needed friction with respect to f, at a fixed time [1]."""
     if not body.contact.rolling_resistance:
         return 0.0
     high, low = (float(_changed(body, step, until)(np.array([time]))[0]) for step in (_STEP, -_STEP))

@@ -1,7 +1,8 @@
-"""The ball's orientation from its spin over time, by two quadratures that share nothing: one for each route.
+"""Orientation of the ball from its spin over time, by two quadratures that share nothing: one for each route.
 
 The orientation R(t) from the ball's axes to the world's obeys Ṙ = [ω]× R, and as a quaternion q̇ = (0, ω) q / 2, with
-the identity at time 0. Both quadratures take steps between the kinks of the spin and multiply what each step turns.
+the identity at time 0. Both quadratures take steps between the kinks of the spin and multiply the rotations of the
+steps.
 """
 
 from collections.abc import Callable, Iterable
@@ -11,11 +12,12 @@ import numpy as np
 from proofroll.core.arrays import FloatArray
 from proofroll.truth import collocation
 
-# Turn of the ball within one step [rad], so small that a step's error is that of the spin itself.
+# Rotation of the ball per step [rad], so small that the error of the spin dominates that of the step.
 _TURN = 2.0
 _IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
-# A quadrature: nodes in (0, 1), and quaternions (n, 4) from lengths of steps [s], (n,), and spins there, (n, nodes, 3).
+# Nodes in (0, 1), and a function: step lengths [s] (n,), spins at the nodes (n, nodes, 3) -> rotations of the steps as
+# quaternions (n, 4).
 Quadrature = tuple[FloatArray, Callable[[FloatArray, FloatArray], FloatArray]]
 
 
@@ -38,7 +40,8 @@ def orientation(
     starts = np.repeat(knots[:-1], parts) + h * (np.arange(len(h)) - np.repeat(np.cumsum(parts) - parts, parts))
     q = [_IDENTITY]
     if len(h):
-        # An end of a step belongs to it, and a time of a kink to what follows: there an impact may let the spin jump.
+        # The end of a step belongs to that step, and the time of a kink to the step after it: an impact may let the
+        # spin jump.
         at = np.minimum(starts[:, None] + h[:, None] * nodes, np.nextafter(starts + h, 0)[:, None])
         at_nodes = spin(at.ravel()).reshape(len(h), len(nodes), 3)
         for step in turns(h, at_nodes):
@@ -48,14 +51,14 @@ def orientation(
 
 
 def _left(q: FloatArray) -> FloatArray:
-    """Matrices of the multiplication by quaternions (..., 4) from the left, shape (..., 4, 4)."""
+    """Matrices that multiply by quaternions (..., 4) from the left, shape (..., 4, 4)."""
     w, x, y, z = np.moveaxis(q, -1, 0)
     rows = [[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]]
     return np.asarray(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
 
 
 def _quaternions(h: FloatArray, spin: FloatArray) -> FloatArray:
-    """The quaternion itself by collocation at Gauss points, which keeps its length: order 16."""
+    """Rotation of each step by collocation of the quaternion at Gauss points, which keeps its length: order 16."""
     s = len(_GAUSS)
     rates = _left(np.concatenate([np.zeros((*spin.shape[:2], 1)), spin / 2], axis=-1)) * h[:, None, None, None]
     stages = _stages(rates, rates[..., :1], _GAUSS_MATRIX).reshape(-1, s, 4)
@@ -63,7 +66,7 @@ def _quaternions(h: FloatArray, spin: FloatArray) -> FloatArray:
 
 
 def _matrices(h: FloatArray, spin: FloatArray) -> FloatArray:
-    """The rotation matrix by collocation at Radau points (:mod:`proofroll.truth.collocation`): order 25."""
+    """Rotation of each step by collocation of its matrix, :mod:`proofroll.truth.collocation`: order 25."""
     from scipy.spatial.transform import Rotation  # slow to load, and few truths need it
 
     x, y, z = np.moveaxis(spin * h[:, None, None], -1, 0)
@@ -72,11 +75,15 @@ def _matrices(h: FloatArray, spin: FloatArray) -> FloatArray:
     stages = _stages(rates, rates, collocation.MATRIX).reshape(len(h), -1, 3, 3)
     turned = np.eye(3) + np.einsum("j,njrc->nrc", collocation.MATRIX[-1], stages)
     q = np.roll(Rotation.from_matrix(turned).as_quat(), 1, axis=-1)
-    return np.asarray(q * np.where(q[:, :1] < 0, -1.0, 1.0))  # a step turns by less than half a turn
+    return np.asarray(q * np.where(q[:, :1] < 0, -1.0, 1.0))  # the sign: a step rotates by less than half a turn
 
 
 def _stages(rates: FloatArray, right: FloatArray, matrix: FloatArray) -> FloatArray:
-    """Rates of change X = h A(t) (1 + Σ a X) at the nodes of each step, h A (n, nodes, k, k); one row for each."""
+    """Stage derivatives X_i = h A_i (1 + Σ_j a_ij X_j) of collocation, from h A of shape (n, nodes, k, k).
+
+    ``right`` holds h A times the initial columns, shape (n, nodes, k, columns); the result has shape (n, nodes·k,
+    columns).
+    """
     n, s, k = rates.shape[:3]
     system = np.eye(s * k) - np.einsum("nirc,ij->nirjc", rates, matrix).reshape(n, s * k, s * k)
     return np.asarray(np.linalg.solve(system, right.reshape(n, s * k, -1)))

@@ -1,4 +1,4 @@
-"""The truth of a ball on a surface: which two routes it takes, and its error bar."""
+"""Truth of a ball on a surface: choice of its two routes, and its error bars."""
 
 from __future__ import annotations
 
@@ -36,48 +36,51 @@ class BallOnSurfaceTruth:
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """Every ball on a surface."""
+        """True for every ball on a surface."""
         return isinstance(element, BallOnSurface)
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:
-        """See :func:`truth`; with bounded friction also the conditioning of the first slip."""
+        """Dataset of :func:`truth`; with bounded friction also the conditioning of the first slip."""
         scene = Scene(element.name, "", (element,), asks=tuple(asks))
         try:
-            # What is not finite is refused by name; a warning before that says nothing more.
+            # Non-finite values are refused by name below; a warning would add nothing.
             with np.errstate(invalid="ignore", divide="ignore"):
-                found = truth(scene, times)
+                result = truth(scene, times)
         except ZeroDivisionError:
-            said = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
-            raise Diverged(f"{said}; start further off") from None
-        if "sticking" in found and BallCapability.SLIPPING_START not in element.requires:
+            message = "the ball comes to a point where its wall has no curvature, as at the apex of a cone"
+            raise Diverged(f"{message}; start further off") from None
+        if "sticking" in result and BallCapability.SLIPPING_START not in element.requires:
             first = onset(scene, float(times[-1]))
-            found.attrs["onset"] = json.dumps(dataclasses.asdict(first))
+            result.attrs["onset"] = json.dumps(dataclasses.asdict(first))
             if first.verdict == "ill-posed":
-                # Where the routes disagree too, they have said it, and from when on.
-                found.attrs.setdefault("ill_posed", _ILL_POSED)
-        return found
+                # A disagreement of the routes is recorded there already, with its time.
+                result.attrs.setdefault("ill_posed", _ILL_POSED)
+        return result
 
     @staticmethod
     def edge_between(element: Element, parameter: str, low: float, high: float, until: float) -> float | None:
-        """A value of static friction at which the time of the first slip jumps, see :func:`.onset`."""
+        """Value of static friction at which the time of the first slip jumps, see :func:`.onset`; None: there is none.
+
+        Raises:
+            InputError: ``parameter`` is not ``mu_static``.
+        """
         if parameter != "mu_static":
             raise InputError(parameter, "edge_between", "an edge can be found only for mu_static")
         return edge_between(Scene(element.name, "", (element,)), low, high, until)
 
 
 def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
-    """The true trajectory, each variable with the attribute ``error_bar`` in its own unit.
+    """True trajectory at rising times [s]; each variable has the attribute ``error_bar`` in its own unit.
 
-    The first route is the closed form where there is one, else the reduced equations; the second is the unreduced
-    Newton-Euler system, derived and integrated independently (where heyoka is installed by Taylor series, which ten
-    thousand oscillations take a second). The error bar of a variable is the largest difference
-    between the routes plus round-off, times a factor of safety. Where the scene asks for the orientation, each route
-    gives it by a quadrature of its own.
+    The first route is the closed form if one is known, else the reduced equations. The second is the unreduced
+    Newton-Euler system, derived and integrated independently (by Taylor series if heyoka is installed: ten thousand
+    oscillations in a second). The error bar of a variable is the largest difference between the routes plus round-off,
+    times a factor of safety. If the scene asks for the orientation, each route gives it by a quadrature of its own.
 
-    With bounded friction, where the ball leaves the wall, and where rolling is resisted, the routes are those of
-    :mod:`truth.stick_slip`; with bounded friction the dataset also holds ``sticking`` and the events
-    (:func:`events.events_of`), which it has of a ball that leaves the wall too.
+    With bounded friction or rolling resistance, or if the ball leaves the wall, the routes are those of
+    :mod:`truth.stick_slip`. The dataset then has the events (:func:`events.events_of`), and with bounded friction
+    ``sticking``.
 
     Raises:
         Diverged: a route could not be integrated, or a value is not finite.
@@ -86,8 +89,8 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     body, bounded = rolling_ball(scene), BallCapability.BOUNDED_FRICTION in scene.requires
     times = np.asarray(times, dtype=np.float64)
     by_series = unreduced_taylor.available(body)
-    # Between its ends a step of DOP853 is less accurate than at them, and an orientation asks between samples; and it
-    # takes some ten times as long.
+    # Within a step DOP853 is less accurate than at its ends, and an orientation needs the spin within steps. It also
+    # takes some ten times as long as the series.
     stepped = not by_series or BallCapability.ORIENTATION in scene.requires
     stepped = stepped and closed_form(body, times[:1]) is None
     if bounded or stepped or body.gap0 or not (always_pressed(body) or stays_on(body, float(times[-1]))):
@@ -101,7 +104,7 @@ def truth(scene: Scene, times: FloatArray) -> xr.Dataset:
     def second(at: FloatArray) -> BallMotion:
         return unreduced_taylor.unreduced(body, at) if by_series else rolling.unreduced(body, at)
 
-    def second_spin(at: FloatArray) -> FloatArray:  # forces would take longer than all of a series
+    def second_spin(at: FloatArray) -> FloatArray:  # computing forces would take longer than the whole series
         return unreduced_taylor.states(body, at)[:, 6:] if by_series else second(at).w_WB
 
     def from_start(spin: Callable[[FloatArray], FloatArray]) -> Callable[[FloatArray], FloatArray]:

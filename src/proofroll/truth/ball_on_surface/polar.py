@@ -1,4 +1,4 @@
-"""Stick and slip on the surface's coordinates with size and direction of the slip: the first route on any surface.
+"""Stick and slip in surface coordinates, with magnitude and direction of the slip: first route on any surface.
 
 With A = (1 + κ)/(κ m) and the friction F* that sticking would need, the slip velocity u obeys u̇ = A (F - F*) for any
 friction F. In polar form u = |u| (cos φ e2 + sin φ e3), F = -μk N (cos φ, sin φ) and b = -A F*,
@@ -22,8 +22,8 @@ from proofroll.truth.ball_on_surface.route import End
 from proofroll.truth.ball_on_surface.sliding import Sliding
 
 _Stop = tuple[End, Callable[[FloatArray], float]]
-_APPROACH = 0.6  # part of the time left until the centre stands still that one step may take
-_STILL = 1e-9  # time left, relative to the pace of the motion, that is extrapolated
+_APPROACH = 0.6  # fraction of the time left until the centre stops that one step may take
+_STILL = 1e-9  # time left until standstill, relative to the pace, below which the state is extrapolated
 
 
 class Polar(Sliding):
@@ -34,7 +34,7 @@ class Polar(Sliding):
     def __init__(self, body: RollingBall, handover: float = 1e-5) -> None:
         super().__init__(body, handover)
         ball = body.ball
-        self._mu_k = body.contact.mu_kinetic if np.isfinite(body.contact.mu_kinetic) else 0.0  # then it never slips
+        self._mu_k = body.contact.mu_kinetic if np.isfinite(body.contact.mu_kinetic) else 0.0  # unbounded: never slips
         self._A = (1 + ball.inertia_ratio) / (ball.inertia_ratio * ball.mass)
         pace = max(float(np.sqrt(ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)), 1e-300)
         self._pace = ball.radius / pace
@@ -60,7 +60,7 @@ class Polar(Sliding):
         return float(np.linalg.norm(b)) / self._A, self._body.contact.mu_static * N
 
     def _missing(self, state: FloatArray) -> float:
-        """Friction that is missing to stick [N]: smooth also where a step reaches beyond N = 0."""
+        """Needed minus available friction [N]; smooth even if a step reaches beyond N = 0."""
         needed, available = self.friction(state)
         return needed - available
 
@@ -91,7 +91,7 @@ class Polar(Sliding):
     def _grown(self, time: float, state: FloatArray, until: float) -> float:
         strength, change = self._pull(state)
         pace = min(strength / change if change > 0 else np.inf, until - time, self._turning_back(state))
-        # Below the last digits of the time a slip cannot be seen to grow.
+        # A slip must grow by more than the round-off of the time resolves.
         return float(max(self._handover * strength * pace, 64 * strength * np.spacing(time), np.finfo(float).tiny))
 
     def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> ExplicitRun:
@@ -113,24 +113,24 @@ class Polar(Sliding):
         )
 
         def ended(solver: Any) -> tuple[float, FloatArray, End] | None:
-            # Clock and ln|u| pass their limits but once, so the end of a step tells whether one was passed.
+            # The clock and ln|u| pass their limits only once, so values at the end of a step suffice.
             return _first(solver, [(end, g) for end, g in stops if g(solver.y) > 0])
 
         return ExplicitRun(self._slipping, 0.0, first, np.inf, atol=self._atol, ended=ended)
 
     def _drive(self, y: FloatArray) -> tuple[FloatArray, float]:
-        """Drive b along e2, e3 [m/s²], shape (2,), and N [N]."""
+        """Drive b along e2, e3 [m/s²], shape (2,), and normal force N [N]."""
         return self._with_slip(y, 0.0, 0.0)[1:3]
 
     def _pull(self, y: FloatArray) -> tuple[float, float]:
-        """|b| and |ḃ| while sticking; ḃ by a central difference, for it only sets a scale."""
+        """Magnitudes of the drive b and of ḃ while sticking; ḃ by a central difference, as it only sets a scale."""
         rates = self.rates(y)
         span = self._span(y)
         b_rate = (self._drive(y + span * rates)[0] - self._drive(y - span * rates)[0]) / (2 * span)
         return float(np.linalg.norm(self._drive(y)[0])), float(np.linalg.norm(b_rate))
 
     def _turning_back(self, y: FloatArray) -> float:
-        """Time in which gravity and friction stop the centre [s], where the direction of the resistance jumps."""
+        """Time in which gravity and friction would stop the centre [s], where rolling resistance reverses."""
         contact, body = self._body.contact, self._body
         if not contact.rolling_resistance:
             return np.inf
@@ -142,11 +142,11 @@ class Polar(Sliding):
         return speed / strength if speed > 0 and strength > 0 else np.inf
 
     def _span(self, y: FloatArray) -> float:
-        """Time over which to difference the drive [s]: short where the centre is about to stand still."""
+        """Time span of the central differences of the drive [s]: short if the centre is about to stop."""
         return min(1e-4 * self._pace, 0.1 * self._turning_back(y))
 
     def _with_slip(self, y: FloatArray, size: float, phi: float) -> tuple[FloatArray, FloatArray, float, float]:
-        """Rates of (u, u̇, ω1) while slipping, b, N and ė2 · e3."""
+        """Rates of (u, u̇, ω1), drive b, N and ė2 · e3 for a slip of ``size`` [m/s] in the direction ``phi`` [rad]."""
         body, surface = self._body, self._body.surface
         a, m, kappa, f = body.ball.radius, body.ball.mass, body.ball.inertia_ratio, body.contact.rolling_resistance
         frame, tangents, bending = surface.frame(y[:2]), surface.tangents(y[:2]), surface.second(y[:2]) @ y[2:4]
@@ -181,7 +181,7 @@ class Polar(Sliding):
         return np.array([self._following(y)[1] for y in states])
 
     def _following(self, y: FloatArray) -> tuple[FloatArray, float]:
-        """Rates of (u, u̇, ω1, |u|) and φ on the slow solution, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
+        """Rates of (u, u̇, ω1, |u|) and φ of the slaved slip, where φ - φ_b = -|u| φ̇_b / (|b| + d|u|/dt)."""
         b, N = self._drive(y)
         grip = self._A * self._body.contact.mu_kinetic * N
         phi, size, strength = float(np.arctan2(b[1], b[0])), float(y[5]), float(np.linalg.norm(b))
@@ -208,7 +208,7 @@ class Polar(Sliding):
         return speed / slowing if slowing > 0 else np.inf
 
     def _ended(self, solver: Any) -> tuple[float, FloatArray, End] | None:
-        """First end of rolling without slip within a step: time, state and reason."""
+        """First end of rolling without slip within a step: time [s], state and reason; None: it goes on."""
         ends: list[_Stop] = [(End.LIFTOFF, lambda y: -self._drive(y)[1])]
         if np.isfinite(self._body.contact.mu_static):
             ends.append((End.CONE, self._missing))
@@ -230,6 +230,6 @@ class Polar(Sliding):
 
 
 def _first(solver: Any, stops: Sequence[_Stop]) -> tuple[float, FloatArray, End] | None:
-    """The first of some stops within the last step: time, state and reason."""
+    """First of some stops within the last step: time or τ, state and reason; None: there is none."""
     rise = located(solver, lambda y: np.array([g(y) for _, g in stops])) if stops else None
     return (rise.time, rise.state, stops[rise.guard][0]) if rise else None

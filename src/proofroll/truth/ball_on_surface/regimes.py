@@ -1,4 +1,4 @@
-"""Regimes of the ball in the truth, and the analytic boundaries between them."""
+"""Regime of a ball by the first route of the truth, and analytic boundaries between regimes."""
 
 from enum import IntEnum
 
@@ -14,11 +14,11 @@ from proofroll.truth.ball_on_surface.switching import follow
 
 
 class Regime(IntEnum):
-    """Regime of the ball until the end of the run."""
+    """Regime of a ball over a whole run."""
 
     NEVER_SLIPS = 0
-    RECOVERS = 1  # slips, and sticks at the end or still could carry its weight by friction
-    FALLS = 2  # slips at the end, and all the friction there is does not carry its weight; or has left the wall
+    RECOVERS = 1  # slips, and sticks at the end or could still carry its weight by friction
+    FALLS = 2  # slips at the end with too little friction to carry its weight, or has left the wall
 
 
 def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
@@ -38,17 +38,18 @@ def classify(body: RollingBall, until: float) -> tuple[Regime, int, float]:
 
 
 def _carries(body: RollingBall, p_WB: FloatArray, v_WB: FloatArray) -> bool:
-    """True if friction could hold the weight along the surface if it pointed straight against it."""
+    """True if friction, pointing straight up along the surface, could carry the weight."""
     e1 = body.surface.normal(p_WB)
     weight = np.linalg.norm(body.gravity - float(e1 @ body.gravity) * e1)
     return bool(body.contact.mu_kinetic * pressed(body, p_WB, v_WB) >= weight)
 
 
 def analytic_boundaries(body: RollingBall, speeds: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """μ below which the ball falls and above which it never slips, without rolling resistance [1], shape (n,).
+    """Boundaries in μ, each of shape (n,): the ball falls below the first and never slips above the second [1].
 
-    From the closed form on a vertical cylinder with a level start and no spin about the normal; None elsewhere. The
-    friction needed is m g (1 - cos νt / (1 + κ)) with κ = J/ma²: at most 12/7 of the weight of a homogeneous ball.
+    Without rolling resistance, for initial ``speeds`` [m/s], shape (n,), by the closed form on a vertical cylinder with
+    a level start and no spin about the normal; None elsewhere. The friction needed is m g (1 - cos νt / (1 + κ)) with κ
+    = J/ma²: at most 12/7 of the weight of a homogeneous ball.
     """
     surface = body.surface
     if not isinstance(surface, Cylinder):

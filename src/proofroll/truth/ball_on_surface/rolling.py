@@ -5,7 +5,7 @@
 * :func:`unreduced`: nine states (p, v, ω) in the world, reactions from a linear system, and the surface only through
   its signed distance.
 
-They do not stop where rolling resistance brings a ball to rest: its truth is that of :mod:`truth.stick_slip`.
+Neither stops where rolling resistance brings a ball to rest; that case belongs to :mod:`truth.stick_slip`.
 """
 
 import itertools
@@ -23,12 +23,16 @@ from proofroll.elements.ball_on_surface.rolling_equations import placed, reduced
 
 # The tightest relative tolerance that scipy accepts is 100 machine epsilons.
 _RTOL = 100 * np.finfo(float).eps
-# Absolute tolerance over the natural size of each state: round-off of a state that passes through zero.
+# Absolute tolerance relative to the natural size of each state: the round-off where a state passes through zero.
 _ROUND_OFF = 1e-15
 
 
 def reduced(body: RollingBall, times: FloatArray) -> BallMotion:
-    """The reduced equations at tight tolerance."""
+    """Motion at rising times [s] by the reduced equations.
+
+    Raises:
+        Diverged: the integration fails.
+    """
     length, speed, spin = _sizes(body)
     per_metre = 1 / np.array(body.surface.length_scales)
     scales = np.array([*(length * per_metre), *(speed * per_metre), spin])
@@ -39,7 +43,11 @@ def reduced(body: RollingBall, times: FloatArray) -> BallMotion:
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
-    """Newton-Euler in the world with all constraint forces, at tight tolerance."""
+    """Motion at rising times [s] by Newton-Euler in the world with all constraint forces.
+
+    Raises:
+        Diverged: the integration fails.
+    """
 
     def rates(x: FloatArray) -> FloatArray:
         acceleration, w_rate, _ = newton_euler(body, x[:3], x[3:6], x[6:])
@@ -62,7 +70,7 @@ def _sizes(body: RollingBall) -> tuple[float, float, float]:
 def _integrate(
     rates: Callable[[FloatArray], FloatArray], scales: FloatArray, x: FloatArray, times: FloatArray
 ) -> FloatArray:
-    """States from ``x`` on, each reached by a step that ends there: the dense output of DOP853 has a lower order."""
+    """States at the times, shape (n, k), each at the end of a step: the dense output of DOP853 has a lower order."""
     from scipy.integrate import DOP853
 
     states, step = [x], math.inf

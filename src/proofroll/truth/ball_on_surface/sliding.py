@@ -1,4 +1,4 @@
-"""Slip followed by its size and direction, shared by the routes: its beginning, course and end."""
+"""Slip by magnitude and direction, from start to end; shared by two implementations of the first route."""
 
 from abc import abstractmethod
 from typing import Protocol
@@ -11,31 +11,38 @@ from proofroll.elements.ball_on_surface.motion import BallMotion
 from proofroll.truth.ball_on_surface.impact import by_coefficients
 from proofroll.truth.ball_on_surface.route import End, Leg, Route, World, joined
 
-_FLOOR = 1e-4  # |u| at which the rest of a slip is extrapolated, relative to where it began
-_BEGUN = 1e-8  # the same of a slip that does not begin from rest, relative to its initial |u|
-_ROUNDS = 50  # of Newton's method for the clock
+_FLOOR = 1e-4  # |u| below which the rest of a slip is extrapolated, relative to |u| at the handover
+_BEGUN = 1e-8  # smallest handover of a slip that does not start from rest, relative to its initial |u|
+_ROUNDS = 50  # Newton iterations for τ at a given time
 
 
 class IntegratedRun(Protocol):
-    """A run of an integrator until something ends it: where, the state there, and the reason."""
+    """Finished integration, over time or τ.
+
+    Attributes:
+        end: independent variable at the end.
+        last: state at the end.
+        why: reason for the end.
+    """
 
     end: float
     last: FloatArray
     why: End
 
     def steps(self) -> tuple[FloatArray, FloatArray]:
-        """Ends of its steps from the start on, shape (n,), and the states there, shape (n, k)."""
+        """Independent variable at the ends of all steps, from the start on, shape (n,), and states, shape (n, k)."""
 
     def at(self, where: FloatArray) -> FloatArray:
         """States, shape (n, k), at values of the independent variable within the run."""
 
 
 class Sliding(Route):
-    """Route in five variables, joined while slipping by (ln|u|, φ) and the time t, against τ with dt = |u| dτ.
+    """Route in five variables; while slipping also ln|u|, φ and the time t, integrated over τ with dt = |u| dτ.
 
-    Against τ the end of a slip, |u| → 0, is a smooth decay to infinity. The start of a slip is not: there the direction
-    follows the drive b, against which sticking would need friction, ever more stiffly. Until |u| reaches ``handover``
-    |b| T, with T = |b|/|ḃ| the time in which b changes, the direction is slaved to it.
+    Over τ the end of a slip, |u| → 0, is a smooth decay to infinity. The start of a slip is stiff: the smaller |u|, the
+    tighter its direction follows the drive b, the rate of slip without friction. So until |u| reaches ``handover`` |b|
+    T, where T = |b|/|ḃ| is the time in which b changes, the direction is computed from b (slaved slip) and not
+    integrated.
     """
 
     impact = staticmethod(by_coefficients)
@@ -45,35 +52,35 @@ class Sliding(Route):
 
     @abstractmethod
     def _stick(self, time: float, state: FloatArray, until: float) -> IntegratedRun:
-        """Rolling without slip."""
+        """Integrates rolling without slip from ``time`` to ``until`` [s]."""
 
     @abstractmethod
     def _creep(self, time: float, state: FloatArray, until: float, handover: float) -> IntegratedRun:
-        """The start of a slip, with |u| as sixth state, until that has grown to ``handover`` [m/s]."""
+        """Integrates a slaved slip from rest, with |u| as sixth state, until |u| reaches ``handover`` [m/s]."""
 
     @abstractmethod
     def _slide(self, first: FloatArray, floor: float, until: float) -> IntegratedRun:
-        """The slip against τ, of eight states, until ln|u| falls to ``floor``."""
+        """Integrates a slip over τ, with eight states, until ln|u| falls to ``floor`` or t reaches ``until`` [s]."""
 
     @abstractmethod
     def _grown(self, time: float, state: FloatArray, until: float) -> float:
-        """The size |u| of a slip from rest [m/s] from which on its direction is a state."""
+        """Handover |u| of a slip from rest [m/s]: its direction is integrated above."""
 
     @abstractmethod
     def _slaved(self, states: FloatArray) -> FloatArray:
-        """Directions φ of the slaved slip in states with |u|, shape (n, 6) -> (n,)."""
+        """Directions φ [rad] of a slaved slip, from states with |u|: shape (n, 6) -> (n,)."""
 
     @abstractmethod
     def _stood_still(self, last: FloatArray) -> FloatArray:
-        """The state at |u| = 0, linearly from a |u| so small that nothing else is seen."""
+        """State at |u| = 0, extrapolated linearly from a tiny |u|."""
 
     @abstractmethod
     def _axes(self, state: FloatArray) -> FloatArray:
-        """The surface's frame at a state, shape (3, 3)."""
+        """Frame (e1, e2, e3) of the surface at a state as columns, shape (3, 3)."""
 
     @abstractmethod
     def _motion(self, y: FloatArray, size: FloatArray, phi: FloatArray | None) -> BallMotion:
-        """Motion in states, shape (n, 5), slipping with speed ``size`` [m/s] in direction ``phi`` (None: sticking)."""
+        """Motion of states, shape (n, 5), with slip ``size`` [m/s] and direction ``phi`` [rad]; phi None: sticking."""
 
     def world(self, state: FloatArray) -> World:
         """See :class:`Route`."""
@@ -92,7 +99,7 @@ class Sliding(Route):
     def slip(self, time: float, state: FloatArray, until: float, slip: FloatArray | None = None) -> Leg:
         """See :class:`Route`."""
         handover = self._grown(time, state, until)
-        # One that does not begin from rest has no such start.
+        # A slip that does not start from rest has no slaved part.
         creep = self._creep(time, state, until if slip is None else time, handover)
 
         def creeping(times: FloatArray) -> BallMotion:
@@ -100,7 +107,7 @@ class Sliding(Route):
             return self._motion(y[:, :5], y[:, 5], self._slaved(y))
 
         if slip is None:
-            if creep.why is not End.GROWN:  # the time is over, or the ball stands still before
+            if creep.why is not End.GROWN:  # the time limit, or the slip stops before
                 return Leg(time, creep.end, False, creep.last[:5], creep.why, creeping)
             small, phi = creep.last, self._slaved(creep.last[None, :])[0]
         else:
@@ -124,7 +131,7 @@ class Sliding(Route):
 
 
 def _at_clock(run: IntegratedRun, times: FloatArray) -> FloatArray:
-    """States of a slip, shape (n, 8), where its clock shows the times: Newton's method for τ."""
+    """States of a slip at times [s], shape (n, 8): Newton's method for τ."""
     knots, states = run.steps()
     tau = np.interp(times, states[:, 7], knots)
     for _ in range(_ROUNDS):

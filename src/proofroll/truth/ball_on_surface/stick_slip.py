@@ -1,4 +1,4 @@
-"""The truth with bounded friction: stick, slip, stick again, by two independent routes."""
+"""Truth with bounded friction, rolling resistance or lift-off: stick and slip by two independent routes."""
 
 from __future__ import annotations
 
@@ -27,29 +27,29 @@ from proofroll.truth.conditioning import MOVE, Story, in_common, unmoved
 if TYPE_CHECKING:
     import xarray as xr
 
-# What the routes may have in common, relative to a value's size: both stop refining at 1e-13 per step.
+# Relative error that the routes may share: both stop refining at 1e-13 per step.
 _FLOOR = 1e-12
 
 
 def first_route(body: RollingBall) -> Route:
-    """The route that is taken as the answer: Taylor series where heyoka and the surface allow them, else DOP853."""
+    """Route whose values are the answer: Taylor series if heyoka and the surface allow it, else DOP853."""
     return taylor.SlidingTaylor(body) if taylor.supports(body) else Polar(body)
 
 
 def stays_on(body: RollingBall, until: float) -> bool:
-    """True if the ball is on the wall until ``until`` [s], by the first route."""
+    """True if the ball stays on the wall until ``until`` [s], by the first route."""
     return all(kind != "lift_off" for kind, _ in follow(body, first_route(body), until).events)
 
 
 def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]]:
-    """The true trajectory of one ball on one surface at rising times [s], and the events, with error bars.
+    """True trajectory of a ball on a surface at rising times [s], and its events, with error bars.
 
     Returns:
-        Dataset as of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in
-        its own unit, and ``sticking`` (bool per sample; a sample at an event belongs to what follows); and the events
-        up to the last sample, each with a bracket that holds both routes. Where other things happen if the parameters
-        are moved by a part :data:`proofroll.truth.conditioning.MOVE` (:func:`moved`), the attribute ``ill_posed`` says
-        from when on; the events are those before, and the error bars as large as the difference of the routes.
+        Dataset of :func:`.error_bars.dataset_of`, each variable with the attribute ``error_bar`` in its own unit, and
+        ``sticking`` (bool per sample; a sample at an event belongs to the later leg); events up to the last sample,
+        each with a bracket that contains both routes. If relative changes of the parameters by
+        :data:`proofroll.truth.conditioning.MOVE` (:func:`moved`) change the events, the attribute ``ill_posed`` says
+        from which time on; only earlier events are returned, and the error bars cover the difference of the routes.
 
     Raises:
         Diverged: a route could not be integrated.
@@ -61,7 +61,7 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
     routes: tuple[Route, Route] = (first_route(body), Implicit(body))
     paths = [follow(body, route, until) for route in routes]
     if paths[0].lands is not None:
-        # One that starts in the air has not left the wall.
+        # A ball that starts in the air has not left the wall.
         leaves = f"leaves the wall at t = {paths[0].events[-1][1]:.9g} s and " if paths[0].events else ""
         raise Refused(
             f"the ball {leaves}lands at t = {paths[0].lands:.9g} s; "
@@ -94,9 +94,9 @@ def stick_slip(scene: Scene, times: FloatArray) -> tuple[xr.Dataset, list[Event]
 
 
 def moved(body: RollingBall, part: float) -> RollingBall:
-    """The ball with its friction, resistance, restitution and gravity moved by this part or less.
+    """Ball with friction, rolling resistance, restitution and gravity changed by this relative amount or less.
 
-    What is zero stays zero, and a restitution of 1 stays 1. The parts differ, lest two of them make up for each other.
+    Zero stays zero, and a restitution of 1 stays 1. The amounts differ, so that two changes cannot cancel.
     """
     contact = body.contact
 
@@ -122,17 +122,17 @@ def _unmoved(body: RollingBall, own: Path, pace: float, until: float) -> tuple[i
 
     def story(path: Path) -> Story:
         def states(times: FloatArray) -> FloatArray:
-            found = path.motion(times, "")
+            motion = path.motion(times, "")
             speed = natural_speed(body)
             a = body.ball.radius
-            return np.hstack([found.p_WB / a, found.v_WB / speed, found.w_WB * a / speed])
+            return np.hstack([motion.p_WB / a, motion.v_WB / speed, motion.w_WB * a / speed])
 
         return Story(path.events, states)
 
     try:
         others = [follow(ball, Implicit(ball), until) for ball in (moved(body, -MOVE), moved(body, MOVE))]
     except (Diverged, Refused):
-        return 0, False  # one of them is not known to the end
+        return 0, False  # a changed ball has no known motion to the end
     return unmoved(story(own), [story(path) for path in others], pace, until)
 
 

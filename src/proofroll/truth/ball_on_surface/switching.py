@@ -1,7 +1,7 @@
-"""Rolling, slipping, flight and rest of a ball, one after the other, whatever integrates each leg.
+"""Sequence of rolling, slipping, flight and rest of a ball, for any route.
 
-A :class:`Route` integrates one leg at a time and says why it ended; here is decided what comes next.
-:func:`proofroll.truth.hybrid.follow` puts the legs together.
+A :class:`Route` integrates one leg at a time and reports why it ended; this module decides what comes next.
+:func:`proofroll.truth.hybrid.follow` chains the legs.
 """
 
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ from proofroll.truth.ball_on_surface.flight import Bounce, flown, landed, presse
 from proofroll.truth.ball_on_surface.route import End, Leg, Path, Route, World
 from proofroll.truth.hybrid import Transition
 
-# Relative distance from the friction cone below which round-off decides on which side a state is; round-off is 1e-15.
+# Relative distance from the friction cone below which round-off (1e-15) decides on which side a state is.
 _ON_CONE = 1e-12
-# Normal force at time 0, relative to the natural one, below which the ball is off the wall and not at its round-off.
+# Normal force at time 0, relative to the natural one, below which the ball is off the wall beyond round-off.
 _OFF_WALL = 1e-12
-# Part of the natural speed at which a ball that goes back and forth ever less is taken to be at rest: it has some 1e-9
-# of the natural time to go, and 1e-18 of the way. Reversals much smaller than that drown in the round-off of the time.
+# Speed relative to the natural one at which a ball that rocks ever less counts as at rest: it has some 1e-9 of the
+# natural time to go, and 1e-18 of the length. Much smaller reversals drown in the round-off of the time.
 _AT_REST = 1e-9
-# As many slips in a row, each shorter than the one before by more than a part of it, are followed on the way there;
-# each costs both routes the search for the place where the direction of the resistance jumps.
+# Successive slips that are followed when each is shorter than the one before by more than the fraction _SHORTER; each
+# costs both routes a search for the place where the rolling resistance changes direction.
 _REVERSALS = 10
 _SHORTER = 1e-6
 
@@ -38,10 +38,10 @@ class Mode:
     """Mode of a ball's motion during a leg: flight, rolling, slip or rest.
 
     Attributes:
-        flight: place [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: it touches the wall.
+        flight: position [m], velocity [m/s] and spin [rad/s] at the start of a flight; None: the ball touches the wall.
         sticking: it rolls without slip, or rests.
-        slip: velocity of the contact point at the start of a slip [m/s], shape (3,); None: at rest.
-        rests: nothing moves any more but a spin about the normal.
+        slip: velocity of the contact point at the start of a slip [m/s], shape (3,); None: zero.
+        rests: nothing moves except a spin about the normal.
     """
 
     flight: World | None = None
@@ -68,18 +68,18 @@ def follow(body: RollingBall, route: Route, until: float) -> Path:
 
 
 class SwitchedBall:
-    """The legs of a ball by one route. See :class:`proofroll.truth.hybrid.Legs`."""
+    """Legs of a ball by one route; implements :class:`proofroll.truth.hybrid.Legs`."""
 
     def __init__(self, body: RollingBall, route: Route) -> None:
         self.body, self.route = body, route
-        self._reversals, self._spans = 0, (0.0, 0.0)  # of the last two legs [s]
+        self._reversals, self._spans = 0, (0.0, 0.0)  # durations of the last two legs [s]
 
     def begin(self) -> Transition[Mode]:
         """See the protocol."""
         body, route, state = self.body, self.route, self.route.start()
         if body.gap0:
             return Transition(state, Mode(flight=(body.p0, body.v0, body.w0)), ())
-        # A state does not tell the slip with which a ball starts, by which routes know its velocity.
+        # A route's state lacks an initial slip and the velocity that goes with it; hence ``body.v0``.
         if stands(body, body.v0) and not np.any(body.slip0):
             if stays(body, body.p0):
                 return Transition(state, RESTS, ())
@@ -107,7 +107,7 @@ class SwitchedBall:
         if leg.why is End.LANDED:
             return self._landed(leg)
         if leg.why is End.LIFTOFF:
-            # With the slip that a state does not tell.
+            # ``at_end`` includes the slip, which the state lacks.
             return Transition(route.start(), Mode(flight=leg.at_end()), (("lift_off", ""),))
         if _comes_to_rest(body, route, leg):
             stopped = () if leg.sticking else (("stick", ""),)
@@ -123,25 +123,26 @@ class SwitchedBall:
                 "rolling before friction stops the centre; "
                 "end the run earlier, or take more friction or less resistance"
             )
-        # With |u| = 0 the ball sticks if it can; where the needed force is outside the cone it goes on slipping.
+        # At |u| = 0 the ball sticks if the needed friction is inside the cone; otherwise it goes on slipping.
         slips = leg.why is End.CONE or _must_slip(body, route, state)
         if slips != leg.sticking:
             return Transition(state, Mode() if slips else ROLLS, ())
         return Transition(state, Mode() if slips else ROLLS, (("slip" if slips else "stick", ""),))
 
     def _landed(self, leg: Leg) -> Transition[Mode]:
-        came = landed(self.body, self.route, leg)
-        if came is None:
+        outcome = landed(self.body, self.route, leg)
+        if outcome is None:
             return Transition(leg.state, None, ())
-        if isinstance(came, Bounce):
-            return Transition(leg.state, Mode(flight=came.world), (("bounce", ""),) if came.seen else ())
-        state = self.route.at(*came.world)
-        state = state if came.slip is not None else self.route.nudged(state, came.world[1])
-        after = self._touching(state, came.slip)
-        return Transition(state, after.mode, (("settle", ""), *after.happenings), delay=came.rest, blur=came.blur)
+        if isinstance(outcome, Bounce):
+            return Transition(leg.state, Mode(flight=outcome.world), (("bounce", ""),) if outcome.seen else ())
+        state = self.route.at(*outcome.world)
+        state = state if outcome.slip is not None else self.route.nudged(state, outcome.world[1])
+        after = self._touching(state, outcome.slip)
+        happenings = (("settle", ""), *after.happenings)
+        return Transition(state, after.mode, happenings, delay=outcome.rest, blur=outcome.blur)
 
     def _touching(self, state: FloatArray, slip: FloatArray | None) -> Transition[Mode]:
-        """The mode of a ball that has just begun to touch the wall, its contact point at the velocity ``slip``."""
+        """Mode of a ball that starts to touch the wall with the velocity ``slip`` of its contact point [m/s]."""
         if slip is None and not _must_slip(self.body, self.route, state):
             return Transition(state, ROLLS, ())
         return Transition(state, Mode(slip=slip), (("slip", ""),))
@@ -160,10 +161,11 @@ def _must_slip(body: RollingBall, route: Route, state: FloatArray) -> bool:
 
 
 def _comes_to_rest(body: RollingBall, route: Route, leg: Leg) -> bool:
-    """True if the ball stops at the end of a leg and can rest there: its centre, or all but round-off of a slip.
+    """True if a ball with rolling resistance stops at the end of a leg and can stay there.
 
-    Where resistance slows the rolling faster than friction the centre, the ball slips to a stop, rolls back a part of
-    the way and so on: on a level plane infinitely often in a finite time, each time by the same part.
+    It stops when its centre stops in rolling, or when a slip ends with all but no velocity. Where resistance slows the
+    spin faster than friction slows the centre, the ball slips to a stop, rolls back part of the way, slips again and so
+    on: on a level plane infinitely often in a finite time, each time shorter by the same factor.
     """
     p, v, _ = route.world(leg.state)
     speed = np.sqrt(body.ball.radius * np.linalg.norm(body.gravity)) + np.linalg.norm(body.v0)

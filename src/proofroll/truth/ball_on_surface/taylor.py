@@ -1,4 +1,4 @@
-"""Stick and slip by compiled Taylor series: the fast route, for cylinders and planes, where heyoka is installed."""
+"""Stick and slip by compiled Taylor series (heyoka): the fast first route, for cylinders and planes."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from proofroll.truth.ball_on_surface.route import End
 from proofroll.truth.ball_on_surface.sliding import Sliding
 from proofroll.truth.ball_on_surface.taylor_model import TaylorModel, model
 
-# Stop conditions of the integrators in the order of their events.
+# Reasons for an end, in the order of the integrators' events.
 _STICK_ENDS = (End.LIFTOFF, End.CONE)
 _CREEP_ENDS = (End.GROWN, End.STILL)
 _SLIP_ENDS = (End.STILL, End.TIME, End.LIFTOFF)
-_LARGEST = 1e100  # friction that can still be squared
+_LARGEST = 1e100  # largest friction coefficient; its square is still finite
 _TIME_LIMIT = -(2**32) - 3  # heyoka's taylor_outcome.time_limit
 
 
 def supports(body: RollingBall) -> bool:
-    """True if heyoka is installed, and the compiled equations hold for this scene.
+    """True if heyoka is installed and the compiled equations hold for this scene.
 
-    The direction of the rolling resistance jumps where the centre stands still. A Taylor series does not see the
-    jump, so with resistance only the vertical cylinder is taken, where the centre of a pressed ball always moves.
+    The rolling resistance changes direction where the centre stops, which a Taylor series misses. So with resistance
+    only the vertical cylinder is supported, where the centre of a pressed ball always moves.
     """
     surface = body.surface
     if not library.available():
@@ -67,7 +67,7 @@ class SlidingTaylor(Sliding):
         return np.concatenate([u * self._scales, frame[:, 1:].T @ v_WB, [w_WB @ frame[:, 0]]])
 
     def friction(self, state: FloatArray) -> tuple[float, float]:
-        """See :class:`Route`; times (1 + κ)/κ and over the mass [m/s²]."""
+        """See :class:`Route`; both multiplied by (1 + κ)/κ and divided by the mass [m/s²]."""
         b2, b3, _, N = self._model.drive(state, self._pars)
         return float(np.hypot(b2, b3)), self._A * self._body.contact.mu_static * float(N)
 
@@ -106,7 +106,7 @@ class SlidingTaylor(Sliding):
         mu = self._body.contact.mu_kinetic
         slowing = self._A * mu * N - b2 * cos - b3 * sin
         left = float(np.exp(last[5]) / slowing)
-        # The rates of sticking with one friction exchanged for the other
+        # The rates of sticking, with the friction of sticking replaced by that of slipping
         rates = self.rates(last[:5])
         rates[2] += -mu * N * cos + b2 / self._A
         rates[3] += -mu * N * sin + b3 / self._A
@@ -133,15 +133,15 @@ class SlidingTaylor(Sliding):
 
 
 class _Run:
-    """One run of a compiled integrator to ``until`` or the first event, and again where states between are asked for.
+    """Run of a compiled integrator to ``until`` or the first event; repeated with dense output when first sampled.
 
-    See :class:`.sliding.IntegratedRun`; ``ends`` are the reasons by the integrator's events.
+    Implements :class:`.sliding.IntegratedRun`; ``ends`` gives the reason for each event of the integrator.
     """
 
     def __init__(
         self, integrator: Any, pars: list[float], ends: tuple[End, ...], time: float, state: FloatArray, until: float
     ) -> None:
-        self._given = (integrator, pars, time, state, min(until, 1e300))
+        self._inputs = (integrator, pars, time, state, min(until, 1e300))
         self._series: Any = None
         self.end, self.last, self.why = time, state, End.TIME
         if until > time:
@@ -153,7 +153,7 @@ class _Run:
             self.why = End.TIME if event is None else ends[event]
 
     def _again(self, dense: bool) -> int:
-        integrator, pars, time, state, until = self._given
+        integrator, pars, time, state, until = self._inputs
         integrator.time = time
         integrator.pars[:] = pars[: len(integrator.pars)]
         integrator.state[:] = state
@@ -175,6 +175,6 @@ class _Run:
         return np.array(self._series(np.clip(where, knots[0], knots[-1])), dtype=np.float64)
 
     def _knots(self) -> FloatArray:
-        if self._series is None and self.end > self._given[2]:
-            self._again(dense=True)  # a dense series costs a compilation of its own, a second run nearly nothing
+        if self._series is None and self.end > self._inputs[2]:
+            self._again(dense=True)  # dense output must be compiled separately; a second run costs nearly nothing
         return np.asarray([self.end] if self._series is None else self._series.times)

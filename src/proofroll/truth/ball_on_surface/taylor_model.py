@@ -1,6 +1,6 @@
-"""Stick and slip of a ball on a cylinder or plane as compiled Taylor integrators (heyoka).
+"""Compiled Taylor integrators (heyoka) for stick and slip of a ball on a cylinder or plane.
 
-The equations, their state and their symbols are those of :mod:`proofroll.elements.ball_on_surface.compiled.rolling`.
+Equations, states and symbols are those of :mod:`proofroll.elements.ball_on_surface.compiled.rolling`.
 """
 
 import threading
@@ -11,8 +11,7 @@ from typing import Any
 from proofroll.elements.ball_on_surface.compiled.rolling import PARAMETERS as SHARED
 from proofroll.elements.ball_on_surface.compiled.rolling import Function, expressions
 
-# Order of the run-time parameters of every integrator.
-# Functions and integrators take as many of them as they use; those that few use stand last.
+# Run-time parameters of all integrators and functions, in this order. Each uses a leading part of them.
 PARAMETERS = (*SHARED, "mu_k", "mu_s", "limit", "t_end")
 
 
@@ -21,11 +20,11 @@ class TaylorModel:
     """Compiled integrators; each holds a state and must not be shared between threads.
 
     Attributes:
-        stick: (q, h, v2, v3, ω1) against t; stops where N reaches zero, and where friction is bounded where the needed
+        stick: (q, h, v2, v3, ω1) over t; stops where N reaches zero and, if friction is bounded, where the needed
             friction leaves the static cone.
-        creep: (q, h, v2, v3, ω1, |u|) against t with the direction of slip slaved to the drive; stops where |u|
-            reaches the parameter ``limit`` or comes back to zero.
-        slip: (q, h, v2, v3, ω1, ln |u|, φ, t) against τ with dt = |u| dτ; stops where ln |u| falls to ``limit``, where
+        creep: (q, h, v2, v3, ω1, |u|) over t with the direction of slip slaved to the drive; stops where |u|
+            reaches the parameter ``limit`` or returns to zero.
+        slip: (q, h, v2, v3, ω1, ln |u|, φ, t) over τ with dt = |u| dτ; stops where ln |u| falls to ``limit``, where
             t reaches ``t_end`` and where N reaches zero.
         drive: (q, h, v2, v3, ω1) -> b2, b3, |ḃ| while sticking, N; compiled function.
         rates: (q, h, v2, v3, ω1) -> their rates while sticking; compiled function.
@@ -44,7 +43,10 @@ _local = threading.local()
 
 
 def model(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
-    """The integrators, compiled once per thread; see :func:`expressions`, and whether friction has a bound."""
+    """Integrators, compiled once per thread: with rolling resistance, on a uniform surface, with bounded friction.
+
+    ``resistance`` and ``uniform`` as in :func:`expressions`.
+    """
     if not hasattr(_local, "models"):
         _local.models = cache(_compiled)
     compiled: TaylorModel = _local.models(resistance, uniform, bounded)
@@ -66,17 +68,17 @@ def _compiled(resistance: bool, uniform: bool, bounded: bool) -> TaylorModel:
     up, down = hy.event_direction.positive, hy.event_direction.negative
 
     def integrator(system: list[tuple[Any, Any]], events: list[Any]) -> Any:
-        # optimised, it takes ten times as long to compile, which a run does not earn back
+        # opt_level=0: optimised code takes ten times as long to compile, which no run earns back
         return hy.taylor_adaptive(system, [1.0] * len(system), t_events=events, opt_level=0)
 
-    # Slaved direction: on the slow solution the angle between u and b is δ = -|u| φ̇_b / (|b| + d|u|/dt).
+    # Slaved direction: the angle between u and b is δ = -|u| φ̇_b / (|b| + d|u|/dt).
     strength = hy.sqrt(b2**2 + b3**2)
     c, s = b2 / strength, b3 / strength
     leading = rates(-mu_k * N * c, -mu_k * N * s, size * s)
     turning = (b2 * along(b3, leading) - b3 * along(b2, leading)) / strength**2
     net = strength - A * mu_k * N
     delta = -size * turning / (strength + net)
-    c_slip, s_slip = c - delta * s, s + delta * c  # δ² is below round-off where this is used
+    c_slip, s_slip = c - delta * s, s + delta * c  # δ² is below round-off before the handover
     creeping = [
         *rates(-mu_k * N * c_slip, -mu_k * N * s_slip, size * s_slip),
         (size, strength * hy.cos(delta) - A * mu_k * N),

@@ -1,15 +1,15 @@
-"""Newton's and Euler's equations in the world as compiled Taylor series (heyoka): the second route where it is long.
+"""Newton-Euler equations in the world as compiled Taylor series (heyoka): the second route of long motions.
 
-The nine states (p, v, ω), their equations and their constraints are those of :func:`.rolling.unreduced`;
-of the wall only the direction of its normal and how that turns are used; of a declared surface they are
-derivatives of its distance, which heyoka takes of the formula itself. Differentiating e1·v = 0 and
-v + a ω × e1 = 0 leaves, with Newton's m (v̇ - g) = F and Euler's κ m a² ω̇ = a e1 × F,
+The nine states (p, v, ω), their equations and their constraints are those of :func:`.rolling.unreduced`. Of the wall
+only the direction of its normal and the rate of that direction are used; heyoka derives them from the distance formula
+of a declared surface. Differentiating e1·v = 0 and v + a ω × e1 = 0 gives, with Newton's m (v̇ - g) = F and Euler's κ m
+a² ω̇ = a e1 × F,
 
-    e1·v̇ = -ė1·v,      (1 + κ) v̇ = g - κ a ω × ė1 along the wall,      κ a ω̇ = e1 × (v̇ - g),
+    e1·v̇ = -ė1·v,      (1 + κ) v̇ = g - κ a ω × ė1 along the wall,      κ a ω̇ = e1 × (v̇ - g).
 
-and on a wall that turns along itself, where v + a ω × e1 is the wall's velocity w, the second has κ ẇ more.
+On a wall that turns along itself, v + a ω × e1 is the wall's velocity w, and κ ẇ is added to the second equation.
 
-Nothing holds the state on the constraints, so that errors show.
+No projection keeps the states on the constraints, so errors remain visible.
 """
 
 import copy
@@ -30,52 +30,62 @@ from proofroll.elements.ball_on_surface.surfaces import Cylinder, Declared, Plan
 from proofroll.truth.scalars import cross, dot, minus, plus, scaled
 
 _local = threading.local()
-# Level of optimisation: with the usual 3 the series of a torus compile in 2.9 s of processor time, so in 0.2 s.
-# A run is no slower, since most of its time goes into sampling.
+# Optimisation level of the compiler: with the default 3 the series of a torus compile in 2.9 s of processor time, with
+# 0 in 0.2 s. Runs are no slower, since sampling takes most of their time.
 _LEVEL = 0
 
 
 def available(body: RollingBall) -> bool:
-    """True if heyoka is installed and has these equations: for a surface that does not resist rolling."""
+    """True if heyoka is installed and has the equations.
+
+    They cover cylinders, planes and declared surfaces with a distance formula, without rolling resistance.
+    """
     surface = body.surface
     known = surface.knows_distance if isinstance(surface, Declared) else isinstance(surface, (Cylinder, Plane))
     return known and not body.contact.rolling_resistance and library.available()
 
 
 def unreduced(body: RollingBall, times: FloatArray) -> BallMotion:
-    """The motion at rising times [s]. Raises Diverged if the series could not be continued."""
+    """Motion at rising times [s].
+
+    Raises:
+        Diverged: the series could not be continued.
+    """
     p, v, w = (np.array(part) for part in np.split(states(body, times), 3, axis=1))
     force = np.array([newton_euler(body, *x)[2] for x in zip(p, v, w, strict=True)])
     return BallMotion(p, v, w, force, "unreduced Newton-Euler, Taylor series")
 
 
 def states(body: RollingBall, times: FloatArray) -> FloatArray:
-    """p, v and ω at rising times [s], shape (n, 9); without the forces, which take longer than all of it.
+    """States p, v and ω at rising times [s], shape (n, 9); computing forces would take longer than the series.
 
     Raises:
         Diverged: the series could not be continued.
     """
     series = _integrator(body, bounded=False)
     series.time, series.state[:] = float(times[0]), np.concatenate([body.p0, body.v0, body.w0])
-    found = series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
-    if len(found) < len(times) or not np.all(np.isfinite(found)):
+    samples = (
+        series.propagate_grid(np.asarray(times, dtype=np.float64))[-1] if len(times) > 1 else series.state[None, :]
+    )
+    if len(samples) < len(times) or not np.all(np.isfinite(samples)):
         raise _stopped(series)
-    return np.array(found)
+    return np.array(samples)
 
 
 def until_slip(
     body: RollingBall, time: float, state: FloatArray, until: float
 ) -> tuple[float, bool, Callable[[FloatArray], FloatArray]]:
-    """Rolling under bounded friction, to where more is needed than there is.
+    """Rolling under bounded friction, until the needed friction exceeds the available friction.
 
     Args:
         body: the ball, always pressed against its wall, which is at rest.
-        time: at the start [s].
-        state: p and ω then, shape (6,).
-        until: the last time [s].
+        time: start [s].
+        state: p and ω at the start, shape (6,).
+        until: time limit [s].
 
     Returns:
-        The time of the end [s], whether the friction was used up there, and the states at times in between.
+        Time of the end [s]; True if the friction was used up there; and a function: times in between [s] to p and ω,
+        shape (n, 6).
 
     Raises:
         Diverged: the series could not be continued.
@@ -95,11 +105,11 @@ def _stopped(series: Any) -> Diverged:
 
 
 def _integrator(body: RollingBall, bounded: bool) -> Any:
-    """The integrator with the body's numbers; with bounded friction it ends where the bound is reached."""
+    """Integrator with the parameters of ``body``; with bounded friction it stops where that is used up."""
     surface = body.surface
     if not hasattr(_local, "integrators"):
         _local.integrators = cache(_compiled)  # an integrator holds a state and must not be shared between threads
-    # Cylinders and planes of all sizes share an integrator each.
+    # All cylinders share one integrator, and all planes.
     moves = body.wall_rate is not None
     kind = surface if isinstance(surface, Declared) else type(surface)
     series = copy.copy(_local.integrators(kind, moves, bounded))
@@ -116,13 +126,13 @@ def _integrator(body: RollingBall, bounded: bool) -> Any:
 
 
 def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> Any:
-    """The integrator on a declared surface, or on any cylinder or plane.
+    """Compiled integrator for one declared surface, or for all cylinders or planes.
 
     Args:
-        surface: the wall.
-        moves: whether it turns along itself.
-        bounded: to the end of the friction, in p and ω alone, for rolling on a wall at rest v = a e1 × ω; what then is
-            not a state cannot drift.
+        surface: a declared surface, or the class of the others.
+        moves: True if the wall turns along itself.
+        bounded: True: the integrator stops where friction is used up, and has only the states p and ω: rolling on a
+            wall at rest gives v = a e1 × ω, which then cannot drift.
     """
     import heyoka as hy
 
@@ -150,12 +160,12 @@ def _compiled(surface: Declared | type[Surface], moves: bool, bounded: bool) -> 
     else:
         e1_rate = [0.0, 0.0, 0.0]
     driven = scaled(-a, cross(w, e1_rate))
-    first = 9 if surface is Cylinder else 8 if surface is Plane else 5  # parameter that is not taken yet
+    first = 9 if surface is Cylinder else 8 if surface is Plane else 5  # first free parameter
     if moves:  # the wall's velocity W × (p + a e1) grows at this rate
         driven = plus(driven, cross([hy.par[first + i] for i in range(3)], plus(v, scaled(a, e1_rate))))
     along_wall = across([x / (1 + kappa) for x in plus(g, scaled(kappa, driven))], e1)
     v_rate = plus(along_wall, scaled(-dot(e1_rate, v), e1))
-    force = minus(v_rate, g)  # of the wall, of a unit of mass
+    force = minus(v_rate, g)  # force of the wall per unit mass
     w_rate = [x / (kappa * a) for x in cross(e1, force)]
     if not bounded:
         return hy.taylor_adaptive(

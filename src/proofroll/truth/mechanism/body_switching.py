@@ -1,4 +1,4 @@
-"""Route 2 of a mechanism with dry friction, stops or limits of efforts: maximal coordinates, modes by trial."""
+"""Route 2 for mechanisms with dry friction, stops or effort limits: maximal coordinates, modes by trial."""
 
 import itertools
 from collections.abc import Iterator, Sequence
@@ -16,14 +16,14 @@ from proofroll.truth.mechanism.maximal_coordinates import NumericEquations
 from proofroll.truth.mechanism.maximal_equations import Switched
 from proofroll.truth.mechanism.stretches import StretchLaw
 
-_MOST = 6  # joints at rest together: each has up to three candidates
-SLACK = 1e-9  # of the forces in play: a candidate that breaks its inequality by less is taken to keep it
+_MOST = 6  # largest number of joints at rest at the same time: each has up to three candidate modes
+SLACK = 1e-9  # violation of an inequality, relative to the forces involved, up to which it counts as kept
 
 
 class SwitchedBodies(JointStretches):
-    """The legs of a mechanism as bodies that are each alone; a state ends with the time.
+    """Legs of a mechanism in the coordinates of its separate bodies; the last component of a state is the time.
 
-    See :class:`proofroll.truth.hybrid.HybridRoute`.
+    Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
     def __init__(self, equations: NumericEquations, joints: tuple[SwitchedJoint, ...], tolerance: float) -> None:
@@ -73,7 +73,7 @@ class SwitchedBodies(JointStretches):
         return state, decided, min(margin, after), delay
 
     def switched(self, mode: Mode) -> Switched:
-        """Changes of the equations by a mode."""
+        """Changes of the equations in a mode."""
         pairs = list(zip(self.joints, mode, strict=False))
         held = tuple(joint.number for joint, own in pairs if own in HOLDING)
         stopped = tuple(joint.number for joint, own in pairs if own in STOPPED)
@@ -83,7 +83,7 @@ class SwitchedBodies(JointStretches):
         return Switched(held, stopped, push, clamped)
 
     def holding(self, equations: NumericEquations, state: Array, mode: Mode) -> Array:
-        """Force of what holds or rubs along each switched joint's coordinate, N or N m."""
+        """Force of dry friction or of a stop along each switched joint's coordinate, N or N m."""
         held = [number for number, own in enumerate(mode) if own in HOLDING]
         force = np.array([joint.push(own) for joint, own in zip(self.joints, mode, strict=False)])
         if held:
@@ -100,26 +100,26 @@ class SwitchedBodies(JointStretches):
         return self.equations.along(state[:-1], self._numbers)
 
     def _wanted(self, state: Array) -> list[float]:
-        """Efforts of the motors with a limit before it clamps them."""
+        """Efforts that the motors with a limit would apply without it, N or N m."""
         q, v = self.equations.along(self.equations.normalised(state[:-1]), self._driven)
         return [float(m.wanted(state[-1], *at)) for m, *at in zip(self.motors, q, v, strict=True)]
 
     def _accelerations(self, equations: NumericEquations, state: Array) -> Array:
-        """Accelerations of all switched joints along their coordinates."""
+        """Accelerations of all switched joints along their coordinates, m/s² or rad/s²."""
         acceleration = equations.solve(state[:-1], float(state[-1])).acceleration
         rows = self.equations.equations.rate_rows(state[:-1].tolist(), self._numbers)
         return np.array([sum(c * acceleration[k] for k, c in r.coefficients.items()) + r.bias for r in rows], float)
 
     def _decided(self, state: Array, still: Sequence[bool], turns: int | None = None) -> tuple[Mode, float]:
-        """The candidate that keeps all its inequalities, and how far it is from breaking one, relative.
+        """Mode that satisfies all inequalities, and its margin: relative distance from violating one.
 
         Args:
-            state: with joints at rest where ``still`` says so.
-            still: of each switched joint, besides those that begin at rest.
-            turns: joint that friction has stopped: it is at no stop, however little it has risen from one.
+            state: with velocity zero, within round-off, of the joints at rest.
+            still: True for switched joints at rest; those with velocity zero count too.
+            turns: joint just stopped by friction: it is not at a stop, even if close to one.
 
         Raises:
-            Refused: none does, or there are too many.
+            Refused: no mode does, too many joints are at rest, or friction and joints hold a coordinate twice.
         """
         state = np.append(self.equations.normalised(state[:-1]), state[-1])
         q, v = self._along(state)
@@ -148,14 +148,14 @@ class SwitchedBodies(JointStretches):
         return best[1], max(best[0], 0.0)
 
     def _kept(self, which: int, mode: str, force: float, acceleration: float, state: Array) -> float:
-        """Margin of a joint's inequality, relative to the forces in play; negative: it is broken."""
+        """Margin of a joint's inequality, relative to the forces involved; negative: it is violated."""
         joint = self.joints[which]
         if mode in HOLDING:
             low, high = joint.bounds(mode)
             size = abs(force) + sum(abs(bound) for bound in (low, high) if np.isfinite(bound))
             return min(high - force, force - low) / size if size else np.inf
         q = float(self._along(state)[0][which])
-        away = 1.0 if abs(q - joint.low) < abs(q - joint.high) else -1.0  # from the stop where it is, but for round-off
+        away = 1.0 if abs(q - joint.low) < abs(q - joint.high) else -1.0  # direction away from the nearer stop
         direction = {"forward": 1.0, "backward": -1.0}.get(mode, away)
         stuck = self.equations.switched(state[:-1], Switched((joint.number,)))
         needed = abs(float(stuck.solve(state[:-1], float(state[-1])).multipliers[-1]))
@@ -166,10 +166,13 @@ class SwitchedBodies(JointStretches):
         return direction * acceleration * inertia / size if size else np.inf
 
     def _struck(self, last: Array, before: Mode, which: int, restitution: float) -> tuple[Array, float]:
-        """The state after an impact of one joint on its stop; others at their stops are pressed or set free.
+        """State after an impact of one joint on its stop, and the margin of this outcome.
+
+        Joints that rest on their stops are pressed on, or leave.
 
         Raises:
-            Refused: the outcome hangs on an order.
+            Refused: no outcome satisfies all inequalities.
+            NotUnique: the outcome depends on the order of several impacts.
         """
         state = np.append(self.equations.normalised(last[:-1]), last[-1])
         _, v = self._along(state)

@@ -1,7 +1,7 @@
-"""Motions known in closed form, recognised by what a mechanism is, not by its name.
+"""Motions known in closed form, recognised by the structure of a mechanism, not by its name.
 
-Sources: E. T. Whittaker, Analytical Dynamics, 4th ed., sections 44 (pendulum) and 72 (top); L. D. Landau,
-E. M. Lifshitz, Mechanics, 3rd ed., section 37 (free body).
+Sources: E. T. Whittaker, Analytical Dynamics, 4th ed., sections 44 (pendulum) and 72 (top); L. D. Landau, E. M.
+Lifshitz, Mechanics, 3rd ed., section 37 (free body).
 """
 
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from proofroll.elements.mechanism.record import Record
 from proofroll.elements.mechanism.rotations import Array, from_rpy
 from proofroll.elements.mechanism.signal import varies
 
-_SAME = 1e-12  # relative: quantities that are equal but for round-off
+_SAME = 1e-12  # relative difference up to which quantities are equal within round-off
 
 
 @dataclass(frozen=True)
@@ -28,10 +28,9 @@ class ClosedForm:
 
     Attributes:
         title: name of the motion.
-        motion: coordinates (times, nq) and velocities (times, nv) of the tree at times, s; None where only a part of
-            the motion is known.
-        part: the known part at times, s.
-        same: the same part of a recorded motion.
+        motion: times, s -> coordinates (times, nq) and velocities (times, nv) of the tree; None: only a part is known.
+        part: times, s -> the known quantities.
+        same: these quantities from a recorded motion.
     """
 
     title: str
@@ -41,21 +40,21 @@ class ClosedForm:
 
 
 def closed_form(mechanism: Mechanism) -> ClosedForm | None:
-    """The closed form of a mechanism's motion, or None where none is known here."""
+    """Closed form of a mechanism's motion, or None if none is known here."""
     switched = any(joint.friction or joint.armature or joint.limits for joint in mechanism.joints)
     driven = mechanism.actuators or mechanism.couplings or any(map(varies, mechanism.signals))
     plain = not switched and not mechanism.springs and not driven
     if not plain:
         return None
     for recognised in (_oscillators, _swinging, _free_body, _heavy_top):
-        found = recognised(mechanism)
-        if found is not None:
-            return found
+        form = recognised(mechanism)
+        if form is not None:
+            return form
     return None
 
 
 def swing(angle: float, speed: float, w2: float, times: Array) -> tuple[Array, Array] | None:
-    """Angle and angular velocity of φ̈ = −w2 sin φ; None on the separatrix, which takes for ever.
+    """Angle [rad] and angular velocity [rad/s] of φ̈ = −w2 sin φ; None at rest or on the separatrix.
 
     Args:
         angle: φ at time 0, rad.
@@ -78,7 +77,7 @@ def swing(angle: float, speed: float, w2: float, times: Array) -> tuple[Array, A
 
 
 def _swinging(mechanism: Mechanism) -> ClosedForm | None:  # noqa: PLR0911 -- each is a way not to be a pendulum
-    """A mechanism whose joints all turn alike, with constant inertia, under gravity: a pendulum, a row of windows."""
+    """Pendulum: all joints turn by ± the same angle or not at all, with constant inertia, under gravity."""
     laws = ("stiffness", "damping", "torque")
     if any(joint.kind != "revolute" or any(getattr(joint, law) for law in laws) for joint in mechanism.joints):
         return None
@@ -94,7 +93,7 @@ def _swinging(mechanism: Mechanism) -> ClosedForm | None:  # noqa: PLR0911 -- ea
         return None
     direction = np.round(direction)
     speed = float(v0 @ direction / (direction @ direction))
-    # over a whole turn: does the line q0 + s·direction keep the loops closed, and is the inertia constant?
+    # Over a whole turn: are the loops closed along q0 + s·direction, and is the inertia constant?
     turn = np.linspace(0, 2 * np.pi, 17)[:-1]
     inertia, force = [], []
     for s in turn:
@@ -115,15 +114,15 @@ def _swinging(mechanism: Mechanism) -> ClosedForm | None:  # noqa: PLR0911 -- ea
         return None
 
     def motion(times: Array) -> tuple[Array, Array]:
-        found = swing(shift, speed, w2, times)
-        assert found is not None
-        return q0 + np.outer(found[0] - shift, direction), np.outer(found[1], direction)
+        pendulum = swing(shift, speed, w2, times)
+        assert pendulum is not None
+        return q0 + np.outer(pendulum[0] - shift, direction), np.outer(pendulum[1], direction)
 
     return ClosedForm("pendulum, Jacobi elliptic functions", motion, lambda t: motion(t)[0], lambda r: r.q)
 
 
 def _oscillators(mechanism: Mechanism) -> ClosedForm | None:
-    """Joints on the ground that do not feel each other, along each a linear spring and damper."""
+    """Uncoupled oscillators: joints on the ground with linear springs and dampers."""
     if mechanism.loops or any(joint.parent != WORLD or joint.nv > 1 for joint in mechanism.joints):
         return None
     bodies = {body.name: body for body in mechanism.bodies}
@@ -155,13 +154,13 @@ def _oscillators(mechanism: Mechanism) -> ClosedForm | None:
 
 
 def _alone(mechanism: Mechanism, kind: str) -> Joint | None:
-    """The joint of a mechanism of one body on the ground, if it is of that kind."""
+    """Joint of a mechanism of one body, if it is of this kind and undamped; else None."""
     joint = mechanism.joints[0]
     return joint if len(mechanism.bodies) == 1 and joint.kind == kind and not joint.damping else None
 
 
 def _free_body(mechanism: Mechanism) -> ClosedForm | None:
-    """Angular velocity, in body axes, of a body that nothing turns; I1 < I2 < I3 in some order of its axes."""
+    """Angular velocity, in body axes, of a torque-free body with three different moments of inertia."""
     joint = _alone(mechanism, "free")
     if joint is None:
         return None
@@ -170,7 +169,7 @@ def _free_body(mechanism: Mechanism) -> ClosedForm | None:
     w = axes.T @ joint.v0[3:]
     if np.min(np.diff(moments)) < _SAME * moments[2]:
         return None
-    # I3·2E − L² and L² − I1·2E as sums of squares; in the other case the first and third axis exchange roles
+    # I3·2E − L² and L² − I1·2E as sums of squares; if the first is larger, the first and third axes are exchanged
     order = [0, 1, 2]
     if moments[2] * (moments[2] - moments[1]) * w[2] ** 2 < moments[0] * (moments[1] - moments[0]) * w[0] ** 2:
         order = [2, 1, 0]  # the equations keep their form
@@ -186,16 +185,16 @@ def _free_body(mechanism: Mechanism) -> ClosedForm | None:
 
     def part(times: Array) -> Array:
         sn, cn, dn, _ = ellipj(rate * times + start, m)
-        found = np.zeros((len(times), 3))
-        found[:, order] = np.column_stack([a1 * cn, a2 * sn, np.sign(w3) * a3 * dn])
-        turned: Array = found @ axes.T
+        w_B = np.zeros((len(times), 3))
+        w_B[:, order] = np.column_stack([a1 * cn, a2 * sn, np.sign(w3) * a3 * dn])
+        turned: Array = w_B @ axes.T
         return turned
 
     return ClosedForm("free body, Jacobi elliptic functions (angular velocity)", None, part, lambda r: r.v[:, 3:])
 
 
 def _heavy_top(mechanism: Mechanism) -> ClosedForm | None:
-    """Cosine of the tilt of a symmetric top on a fixed point."""
+    """Cosine of the tilt of a symmetric top about a fixed point."""
     joint, body = _alone(mechanism, "spherical"), mechanism.bodies[0]
     gravity = np.array(mechanism.gravity)
     if joint is None or not gravity.any():
@@ -217,13 +216,14 @@ def _heavy_top(mechanism: Mechanism) -> ClosedForm | None:
     rate0 = float(np.cross(w, height) @ up)
     beta = 2 * body.mass * float(np.linalg.norm(gravity)) * length / across
     a = axial * spin / across
-    b = float(w @ up) + (axial / across - 1) * spin * u0  # angular momentum about the vertical over the moment across
-    squared = float(w @ w) - spin**2  # of the angular velocity across the axis
+    # b: angular momentum about the vertical over the transverse moment of inertia
+    b = float(w @ up) + (axial / across - 1) * spin * u0
+    squared = float(w @ w) - spin**2  # square of the transverse angular velocity
     alpha = squared + beta * u0
     # u̇² = β u³ − (α + a²) u² + (2ab − β) u + α − b²
     if abs(rate0) <= _SAME * np.sqrt(squared + beta):
         linear, constant = beta * u0 - (alpha + a * a), beta * u0**2 - (alpha + a * a) * u0 + 2 * a * b - beta
-        roots = np.append(np.roots([beta, linear, constant]), u0)  # the start is one of them; the others keep digits
+        roots = np.append(np.roots([beta, linear, constant]), u0)  # the start is a root; the others keep their digits
     else:
         roots = np.roots([beta, -(alpha + a * a), 2 * a * b - beta, alpha - b * b])
     if np.abs(np.imag(roots)).max() > 0:

@@ -16,7 +16,7 @@ _Wrench = tuple[Sequence[Scalar], Sequence[Scalar]]
 
 @dataclass(frozen=True)
 class Connection:
-    """A joint or loop of two bodies: places from the centres of mass, frames by rows, in body axes."""
+    """A joint or loop between bodies a and b: its places from the centres of mass and frames (rows), in body axes."""
 
     kind: str
     a: int
@@ -29,9 +29,15 @@ class Connection:
 
 @dataclass
 class ConstraintRow:
-    """One constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0, and what it applies to body b.
+    """One scalar constraint: Φ = 0, Σ coefficient·u = 0, Σ coefficient·u̇ + bias = 0.
 
-    ``besides``: what a coupling's row applies through its other joint: number, force, torque.
+    Attributes:
+        residual: Φ.
+        coefficients: by the index of the velocity in u.
+        bias: velocity terms of Φ̈.
+        connection: index of the joint or loop.
+        force, torque: applied to body b at the joint by a unit multiplier, in world axes.
+        besides: the other joint of a coupling: index, force, torque; None: no coupling.
     """
 
     residual: Scalar
@@ -43,7 +49,7 @@ class ConstraintRow:
     besides: tuple[int, Sequence[Scalar], Sequence[Scalar]] | None = None
 
     def less(self, ratio: float, other: ConstraintRow) -> ConstraintRow:
-        """This row minus another one times a ratio, as a row on rates."""
+        """Row of a coupling: this row minus ``ratio`` times another; on rates only, without a residual."""
         coefficients = dict(self.coefficients)
         for place, value in other.coefficients.items():
             coefficients[place] = sub(coefficients.get(place, 0.0), mul(ratio, value))
@@ -53,9 +59,13 @@ class ConstraintRow:
 
 
 class ConstraintRows:
-    """Makes the rows for one state: what connects the bodies, and the views of these, the ground's last.
+    """Constraint rows of all connections in one state.
 
-    ``u_slices`` say where the velocities of each body lie among all.
+    Args:
+        bodies: the bodies.
+        u_slices: slice of each body's velocities in u.
+        connections: joints and loops.
+        views: poses and velocities of the bodies in scalars, the ground last.
     """
 
     def __init__(
@@ -79,8 +89,9 @@ class ConstraintRows:
                 continue
             n: Sequence[Scalar] = AXES[k]  # along the world's axes
             on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
-            given = ((n, on_b), (scaled(-1.0, n), on_a), (n, NONE))
-            rows.append(self.row(number, dot(n, d), dot(n, towards), *given))
+            on_b, on_a = cross(arm_b, n), scaled(-1.0, cross(arm_a, n))
+            wrenches = ((n, on_b), (scaled(-1.0, n), on_a), (n, NONE))
+            rows.append(self.row(number, dot(n, d), dot(n, towards), *wrenches))
         for k, m in facts.rotations:
             x, y = A[k], B[m]
             t = cross(y, x)
@@ -91,7 +102,7 @@ class ConstraintRows:
         return rows
 
     def of_rate(self, number: int, kind: str) -> ConstraintRow:
-        """The rate of a revolute or prismatic joint's coordinate as a row; its wrench acts along the coordinate."""
+        """Rate of a revolute or prismatic joint's coordinate as a row; its wrench acts along the coordinate."""
         c = self._connections[number]
         a, b = self._views[c.a], self._views[c.b]
         axis = columns(product(a.R, c.frame_a))[2]
@@ -102,7 +113,7 @@ class ConstraintRows:
         return self._sliding(number, axis)
 
     def _apart(self, number: int) -> tuple[Any, ...]:
-        """A connection, its bodies, the arms to its points, the way between these, and its second rate at u̇ = 0."""
+        """Connection, bodies, arms to its two points, vector d between these points, and d̈ at u̇ = 0."""
         c = self._connections[number]
         a, b = self._views[c.a], self._views[c.b]
         arm_a, arm_b = turned(a.R, c.place_a), turned(b.R, c.place_b)
@@ -110,7 +121,7 @@ class ConstraintRows:
         return c, a, b, arm_a, arm_b, d, minus(cross(b.w, cross(b.w, arm_b)), cross(a.w, cross(a.w, arm_a)))
 
     def _sliding(self, number: int, n: Sequence[Scalar]) -> ConstraintRow:
-        """Row for the distance of two points along an axis that turns with body a."""
+        """Row of the distance between two points along an axis that turns with body a."""
         _, a, b, arm_a, arm_b, d, towards = self._apart(number)
         slide = minus(speed_at(b, arm_b), speed_at(a, arm_a))
         n_rate = cross(a.w, n)
@@ -125,9 +136,9 @@ class ConstraintRows:
         bias: Scalar,
         on_b: _Wrench,
         on_a: _Wrench,
-        given: _Wrench,
+        at_joint: _Wrench,
     ) -> ConstraintRow:
-        """A row from what its unit multiplier applies to each body, and what that is at the joint on b."""
+        """Row from the wrenches of a unit multiplier: on each body, at its centre of mass; and on b, at the joint."""
         c = self._connections[number]
         coefficients: dict[int, Scalar] = {}
         for body, (push, moment) in ((c.b, on_b), (c.a, on_a)):
@@ -136,11 +147,11 @@ class ConstraintRows:
                 for place, entry in enumerate(entries, self._u_slices[body].start):
                     if not is_zero(entry):
                         coefficients[place] = entry
-        return ConstraintRow(residual, coefficients, bias, number, *given)
+        return ConstraintRow(residual, coefficients, bias, number, *at_joint)
 
 
 def speed_at(view: BodyInScalars, arm: Sequence[Scalar]) -> list[Scalar]:
-    """Velocity of a point of a body, in world axes; ``arm`` leads there from the centre of mass."""
+    """Velocity of a point of a body in world axes, m/s; ``arm`` leads there from the centre of mass."""
     return plus(view.v, cross(view.w, arm))
 
 

@@ -1,4 +1,4 @@
-"""Route 2 of a mechanism whose bodies touch: each body alone, modes by trial of all that contacts may do."""
+"""Route 2 of a mechanism whose bodies touch: separate bodies, contact modes found by trial."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -17,14 +17,17 @@ from proofroll.truth.mechanism.contact_guards import AT_REST, STOPPED, striking
 from proofroll.truth.mechanism.contact_stretches import ContactStretches, SolvedContacts, held
 from proofroll.truth.mechanism.maximal_coordinates import RANK
 
-_MOST = 6  # contacts that are closed at once: each has up to four candidates
-_SAME = 1e-6  # of the largest speed: outcomes of an impact that differ by less are one
-_SIDES = 180  # of the pyramid inside a cone of friction, by which balance at rest is tried
+_MOST = 6  # largest number of contacts closed at the same time: each has up to four candidate modes
+_SAME = 1e-6  # velocity difference, relative to the largest speed, below which two outcomes of an impact are the same
+_SIDES = 180  # sides of a pyramid inside each friction cone, for the test of balance at rest
 Trial = Callable[[ContactMode, Sequence[Array | None]], BodiesSolution]
 
 
 class ContactBodies(ContactStretches):
-    """The stretches of a mechanism as bodies that are each alone. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+    """Stretches of a mechanism in the coordinates of its separate bodies.
+
+    Implements :class:`proofroll.truth.hybrid.HybridRoute`.
+    """
 
     def __init__(self, equations: ContactEquations, tolerance: float, size: float) -> None:
         super().__init__(equations, len(equations.equations.equations.start()), tolerance, size)
@@ -43,28 +46,28 @@ class ContactBodies(ContactStretches):
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
         line = mode[k].along
-        assert line is not None  # others are refused
+        assert line is not None  # other contacts are refused before
         pulls = self.equations.accelerated(self.equations.at(state), mode).force[k]
         x, y, z = (float(component) * (-1.0 if np.dot(line, pulls) > 0 else 1.0) for component in line)
         return Acting("slip", (x, y, z), (x, y, z))
 
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         state, law = leg.last, self.contacts[hit].restitution
-        found = self.equations.at(state)
-        speed = -float(found.touching[hit].normal @ found.touching[hit].slide)
-        hits = striking(leg.mode, found.touching, hit, leg.end)
-        rubs = self.equations.bounds > 0  # dry friction of joints is no impulse
+        bodies = self.equations.at(state)
+        speed = -float(bodies.touching[hit].normal @ bodies.touching[hit].slide)
+        hits = striking(leg.mode, bodies.touching, hit, leg.end)
+        rubs = self.equations.bounds > 0  # dry friction of joints gives no impulse
         closed = [(own.kind != "open" or k in hits) and not rubs[k] for k, own in enumerate(leg.mode)]
         laws = [self.contacts[k].restitution if k in hits else 0.0 for k in range(len(closed))]
         delay = 0.0
-        after, solution, margin = self._struck(state, found, closed, laws)
+        after, solution, margin = self._struck(state, bodies, closed, laws)
         if self._settles(hit, speed, law):
             free = self.equations.at(after)
             pull = -float(free.touching[hit].normal @ self.equations.accelerated(free, leg.mode).slide[hit])
             delay = self._bouncing(speed * law, pull, law)
-            after, solution, margin = self._struck(state, found, closed, [0.0] * len(closed))
+            after, solution, margin = self._struck(state, bodies, closed, [0.0] * len(closed))
         stays = []
-        for k, (shut, each) in enumerate(zip(closed, found.touching, strict=True)):
+        for k, (shut, each) in enumerate(zip(closed, bodies.touching, strict=True)):
             parts = float(each.normal @ solution.slide[k]) > STOPPED
             stays.append(shut and not parts)
         stays = [stay or bool(rub) for stay, rub in zip(stays, rubs, strict=True)]
@@ -72,114 +75,117 @@ class ContactBodies(ContactStretches):
         return self._after(leg, after, stays, (first,), margin, delay)
 
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
-        found = self.equations.at(state)
+        bodies = self.equations.at(state)
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
-            given = [
+            directed = [
                 own if heading is None or own.along is not None else Acting("slip", None, _direction(heading))
                 for own, heading in zip(mode, headings, strict=True)
             ]
-            return self.equations.accelerated(found, tuple(given))
+            return self.equations.accelerated(bodies, tuple(directed))
 
-        if any(closed) and list(still) == list(closed) and self._balanced(found, closed):
+        if any(closed) and list(still) == list(closed) and self._balanced(bodies, closed):
             rubs = self.equations.friction + self.equations.bounds > 0
-            own = zip(self._own(found, closed), rubs, strict=True)
+            own = zip(self._own(bodies, closed), rubs, strict=True)
             return tuple(
                 each if rub or each.kind == "open" else each._replace(kind="slip") for each, rub in own
             ), np.inf
-        kept, _, mode = self._tried(found, closed, still, trial)[0]
+        kept, _, mode = self._tried(bodies, closed, still, trial)[0]
         return mode, kept
 
-    def _balanced(self, found: BodiesState, closed: Sequence[bool]) -> bool:
-        """True if nothing moves and forces within the cones and bounds of friction hold everything in place."""
+    def _balanced(self, bodies: BodiesState, closed: Sequence[bool]) -> bool:
+        """True if nothing moves and forces within the cones and bounds of friction balance all loads."""
         from scipy.optimize import nnls
 
-        if np.abs(found.u).max() > AT_REST:
+        if np.abs(bodies.u).max() > AT_REST:
             return False
         angles = np.linspace(0, 2 * np.pi, _SIDES, endpoint=False)
-        columns, bounds = [found.C.T, -found.C.T], self.equations.bounds
-        for each, J, mu, shut in zip(found.touching, found.J, self.equations.friction, closed, strict=True):
+        columns, bounds = [bodies.C.T, -bodies.C.T], self.equations.bounds
+        for each, J, mu, shut in zip(bodies.touching, bodies.J, self.equations.friction, closed, strict=True):
             if not shut:
                 continue
             frame = frame_of_axis(each.normal)
             sides = np.outer(np.cos(angles), frame[:, 0]) + np.outer(np.sin(angles), frame[:, 1])
             columns.append(J.T @ (each.normal + mu * sides).T)
-        size, count = float(np.linalg.norm(found.force)), sum(each.shape[1] for each in columns)
-        rubs = found.J[bounds > 0].sum(axis=1)  # their slide has one component
-        # a friction with a bound of its own has a part each way, and what is left of the bound: their sum is the bound
+        size, count = float(np.linalg.norm(bodies.force)), sum(each.shape[1] for each in columns)
+        rubs = bodies.J[bounds > 0].sum(axis=1)  # the slide of these has one component
+        # A bounded friction has a part in each direction and a remainder; the three sum to the bound.
         parts = np.kron([1.0, 1.0, 1.0], np.eye(len(rubs))) * size
         matrix = np.block([[*columns, rubs.T, -rubs.T, 0 * rubs.T], [np.zeros((len(rubs), count)), parts]])
-        aims = np.concatenate([-found.force, size * bounds[bounds > 0]])
+        aims = np.concatenate([-bodies.force, size * bounds[bounds > 0]])
         return bool(nnls(matrix, aims, maxiter=100 * matrix.shape[1])[1] <= SLACK * size)
 
     def _struck(
-        self, state: Array, found: BodiesState, closed: Sequence[bool], laws: Sequence[float]
+        self, state: Array, bodies: BodiesState, closed: Sequence[bool], laws: Sequence[float]
     ) -> tuple[Array, BodiesSolution, float]:
-        """The state after an impact, by the restitution of each contact; those that are closed press, slide or open."""
-        speeds = [float(each.normal @ each.slide) for each in found.touching]
+        """State, velocities and margin after an impact, by the restitution law of each contact.
+
+        Closed contacts press, slide or open. Margin 0: several outcomes satisfy all inequalities.
+        """
+        speeds = [float(each.normal @ each.slide) for each in bodies.touching]
         after = np.array([-law * min(speed, 0.0) for law, speed in zip(laws, speeds, strict=True)])
 
         def trial(mode: ContactMode, headings: Sequence[Array | None]) -> BodiesSolution:
-            return self.equations.struck(found, mode, headings, after.tolist())
+            return self.equations.struck(bodies, mode, headings, after.tolist())
 
-        (_, solution, _), *others = self._tried(found, closed, [True] * len(closed), trial)
+        (_, solution, _), *others = self._tried(bodies, closed, [True] * len(closed), trial)
         e = self.equations.equations.equations
         state = state.copy()
         state[e.nx : e.nx + e.nu] = solution.moved
         apart = max((float(np.abs(other.moved - solution.moved).max()) for _, other, _ in others), default=0.0)
-        return state, solution, 0.0 if apart > _SAME * float(np.abs(found.u).max()) else np.inf
+        return state, solution, 0.0 if apart > _SAME * float(np.abs(bodies.u).max()) else np.inf
 
-    def _own(self, found: BodiesState, closed: Sequence[bool]) -> list[Acting]:
-        """Mode of each contact, closed ones with their line if they can slide along a line only."""
-        made = []
-        root = np.linalg.cholesky(found.mass)
-        joints = np.linalg.solve(root, found.C.T)
-        for each, J, shut in zip(found.touching, found.J, closed, strict=True):
+    def _own(self, bodies: BodiesState, closed: Sequence[bool]) -> list[Acting]:
+        """Provisional mode of each contact: open, or stick, with its line if it can slide along a line only."""
+        modes = []
+        root = np.linalg.cholesky(bodies.mass)
+        joints = np.linalg.solve(root, bodies.C.T)
+        for each, J, shut in zip(bodies.touching, bodies.J, closed, strict=True):
             frame = frame_of_axis(each.normal)[:, [2, 0, 1]]
             ways = np.linalg.solve(root, J.T @ frame)
             if joints.size:
                 ways = ways - joints @ np.linalg.lstsq(joints, ways, rcond=RANK)[0]
-            made.append(acting("stick", frame, np.zeros(2), ways.T @ ways) if shut else OPEN)
-        return made
+            modes.append(acting("stick", frame, np.zeros(2), ways.T @ ways) if shut else OPEN)
+        return modes
 
     def _tried(
         self,
-        found: BodiesState,
+        bodies: BodiesState,
         closed: Sequence[bool],
         still: Sequence[bool],
         trial: Trial,
     ) -> list[tuple[float, BodiesSolution, ContactMode]]:
-        """Candidates that break no inequality, the best first: how far from one, relative; solution, and mode.
+        """Candidate modes that violate no inequality, best first: relative margin, solution, mode.
 
         Raises:
-            Refused: there is none, or there are too many.
+            Refused: there is none, or too many contacts are closed.
         """
         count = sum(closed)
         if count > _MOST:
             raise Refused(f"{count} contacts are closed at once; at most {_MOST} are tried")
-        choices = [list(self._candidates(k, own, still[k], found)) for k, own in enumerate(self._own(found, closed))]
+        choices = [list(self._candidates(k, own, still[k], bodies)) for k, own in enumerate(self._own(bodies, closed))]
         kept: list[tuple[float, BodiesSolution, ContactMode]] = []
         for mode in itertools.product(*choices):
-            made = self._headed(found, mode, trial)
-            if made is None or made[0].loose:
+            attempt = self._headed(bodies, mode, trial)
+            if attempt is None or attempt[0].loose:
                 continue
-            solution, headed = made
-            apart = (self._kept(k, headed[k], still[k], found, solution) for k in range(len(mode)) if closed[k])
+            solution, headed = attempt
+            apart = (self._kept(k, headed[k], still[k], bodies, solution) for k in range(len(mode)) if closed[k])
             if (least := min(apart, default=np.inf)) >= -SLACK:
                 kept.insert(0, (max(least, 0.0), solution, headed))
         if not kept:
             raise Refused("nothing that the contacts can do keeps all inequalities of contact")
         return sorted(kept, key=lambda one: -one[0])
 
-    def _candidates(self, k: int, own: Acting, still: bool, found: BodiesState) -> Iterator[Acting]:
-        """Modes that a contact may have next."""
+    def _candidates(self, k: int, own: Acting, still: bool, bodies: BodiesState) -> Iterator[Acting]:
+        """Candidate modes of a contact."""
         mu, bound = self.equations.friction[k], self.equations.bounds[k]
         if own.kind == "open" or not bound:
             yield OPEN
         if own.kind == "open":
             return
         if not still or not (mu or bound):
-            u = across(found.touching[k])
+            u = across(bodies.touching[k])
             x, y, z = (u / (float(np.linalg.norm(u)) or 1.0)).tolist()
             yield Acting("slip", None if own.along is None else (x, y, z), (x, y, z))
             return
@@ -191,11 +197,13 @@ class ContactBodies(ContactStretches):
             yield Acting("slip", (x, y, z), (x, y, z))
             yield Acting("slip", (-x, -y, -z), (-x, -y, -z))
 
-    def _headed(self, found: BodiesState, mode: ContactMode, trial: Trial) -> tuple[BodiesSolution, ContactMode] | None:
-        """A candidate with directions of slip along which it slips; None: there are none."""
+    def _headed(
+        self, bodies: BodiesState, mode: ContactMode, trial: Trial
+    ) -> tuple[BodiesSolution, ContactMode] | None:
+        """Solution and mode of a candidate, with unknown slip directions solved for; None: none is consistent."""
         from scipy.optimize import root
 
-        frames = [frame_of_axis(each.normal) for each in found.touching]
+        frames = [frame_of_axis(each.normal) for each in bodies.touching]
         unknown = [k for k, own in enumerate(mode) if own.kind == "slip" and own.heading is None]
 
         def directions(angles: Array) -> list[Array]:
@@ -215,7 +223,7 @@ class ContactBodies(ContactStretches):
         def sideways(angles: Array) -> Array:
             slides = tried(angles).slide
             across_slide = zip(unknown, directions(angles), strict=True)
-            return np.array([float(cross(way, slides[k]) @ found.touching[k].normal) for k, way in across_slide])
+            return np.array([float(cross(way, slides[k]) @ bodies.touching[k].normal) for k, way in across_slide])
 
         still = np.zeros(len(unknown))
         if not unknown:
@@ -232,9 +240,9 @@ class ContactBodies(ContactStretches):
                 return solution, tuple(headed)
         return None
 
-    def _kept(self, k: int, own: Acting, still: bool, found: BodiesState, solution: BodiesSolution) -> float:
-        """Relative margin of a contact's inequalities; negative: one is broken."""
-        each, mu, bound = found.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
+    def _kept(self, k: int, own: Acting, still: bool, bodies: BodiesState, solution: BodiesSolution) -> float:
+        """Margin of a contact's inequalities, relative to forces or speeds; negative: one is violated."""
+        each, mu, bound = bodies.touching[k], float(self.equations.friction[k]), float(self.equations.bounds[k])
         size_f, size_s = float(np.abs(solution.force).max()), float(np.abs(solution.slide).max()) or 1.0
         if own.kind == "open":
             return float(solution.parting[k]) / size_s
@@ -247,21 +255,23 @@ class ContactBodies(ContactStretches):
             return min(normal, (bound or mu * normal) - held) / size_f
         if not still or not (mu or bound):
             return normal / size_f
-        assert own.heading is not None  # it is found by now
+        assert own.heading is not None  # known by now
         return min(normal / size_f, float(np.dot(own.heading, solution.slide[k])) / size_s)
 
     def forces(self, state: Array, mode: ContactMode) -> tuple[Array, Array]:
-        """Forces of contact, (contacts, 3), and what they do to the bodies about their centres of mass, (bodies, 6)."""
-        found = self.equations.at(self.equations.equations.normalised(state))
-        return self.equations.applied(found, self.equations.accelerated(found, mode).force)
+        """Contact forces [N], (contacts, 3), and wrenches on the bodies about their centres of mass, (bodies, 6)."""
+        bodies = self.equations.at(self.equations.equations.normalised(state))
+        return self.equations.applied(bodies, self.equations.accelerated(bodies, mode).force)
 
     def _touching(self, state: Array) -> Sequence[Touching]:
         return self.equations.at(state).touching
 
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
-        found = self.equations.at(self.equations.equations.normalised(state))
-        made = self.equations.accelerated(found, mode)
-        return SolvedContacts(found.touching, found.u, made.moved, made.slide, made.force, made.response)
+        bodies = self.equations.at(self.equations.equations.normalised(state))
+        solution = self.equations.accelerated(bodies, mode)
+        return SolvedContacts(
+            bodies.touching, bodies.u, solution.moved, solution.slide, solution.force, solution.response
+        )
 
 
 def _direction(vector: Array) -> Direction:

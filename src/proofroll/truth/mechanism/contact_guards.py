@@ -1,4 +1,4 @@
-"""Guards that end a stretch of contacts, for both routes: values that are negative while a mode lasts."""
+"""Guards that end a stretch with contacts, for both routes: values that are negative while a mode lasts."""
 
 from collections.abc import Sequence
 from typing import Literal, NamedTuple
@@ -14,25 +14,25 @@ from proofroll.elements.mechanism.contacts.touching import Touching
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.two_paths import moment
 
-# In natural units (natural_units.py): speeds below which nothing moves, and accelerations below which nothing will.
-# Both routes stop there, so that they integrate no round-off of a state at rest.
+# In natural units (natural_units.py): speeds that count as rest, and accelerations too small to start a motion. Both
+# routes stop there, so that they do not integrate the round-off of a state at rest.
 AT_REST, STANDS = 1e-13, 1e-9
-STOPPED = 1e-11  # what is left of a slip that has come to rest
-# Part of a normal force's answer without friction below which Painlevé's measure is taken to come to zero.
+STOPPED = 1e-11  # slip speed that remains when a slip below FAINT is extrapolated to rest
+# Value of Painlevé's measure (1 without friction) that counts as zero.
 _LEAST_RESPONSE = 1e-3
-_DIGITS = 1e-14  # of the size of the mechanism: round-off of a gap that has just opened
+_DIGITS = 1e-14  # relative to the mechanism's size: round-off of a gap that has just opened
 
 
 Touchable = BodyContact | JointContact
 
 
 class ContactGuard(NamedTuple):
-    """One way in which a stretch can end.
+    """A condition that ends a stretch.
 
     Attributes:
-        contact: its number; -1: of all.
-        kind: ``close``: a gap closes; ``lift``: a normal force comes to zero; ``still``: a slip does; ``break``: the
-            friction of a contact that sticks reaches its bound; ``tear``: Painlevé's measure comes to zero.
+        contact: index of the contact; -1: all contacts.
+        kind: ``close``: a gap closes; ``lift``: a normal force reaches zero; ``still``: a slip stops; ``break``: the
+            friction of a sticking contact reaches its bound; ``tear``: Painlevé's measure reaches zero.
     """
 
     contact: int
@@ -40,19 +40,19 @@ class ContactGuard(NamedTuple):
 
 
 def guards_of(contacts: Sequence[Touchable], mode: ContactMode) -> list[ContactGuard]:
-    """The guards of a mode, in an order that both routes keep."""
-    found: list[ContactGuard] = []
+    """Guards of a mode, in an order that both routes share."""
+    guards: list[ContactGuard] = []
     for k, (contact, own) in enumerate(zip(contacts, mode, strict=True)):
         if own.kind == "open":
-            found.append(ContactGuard(k, "close"))
+            guards.append(ContactGuard(k, "close"))
             continue
         if not contact.bound:
-            found.append(ContactGuard(k, "lift"))
+            guards.append(ContactGuard(k, "lift"))
         if contact.friction or contact.bound:
-            found.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
+            guards.append(ContactGuard(k, "still" if own.kind == "slip" else "break"))
     if any(own.kind == "slip" and contact.friction for contact, own in zip(contacts, mode, strict=True)):
-        found.append(ContactGuard(-1, "tear"))
-    return found
+        guards.append(ContactGuard(-1, "tear"))
+    return guards
 
 
 def guard_value(
@@ -63,59 +63,59 @@ def guard_value(
     force: Array,
     response: float,
 ) -> float:
-    """The value of a guard; ``force`` on body a of each contact [N], ``response`` as in Painlevé's measure."""
+    """Value of a guard; ``force``: on body a of each contact [N]; ``response``: Painlevé's measure."""
     if guard.kind == "tear":
         return _LEAST_RESPONSE - response
-    own, found = mode[guard.contact], touching[guard.contact]
-    normal = float(found.normal @ force[guard.contact])
+    own, touch = mode[guard.contact], touching[guard.contact]
+    normal = float(touch.normal @ force[guard.contact])
     if guard.kind == "close":
-        return -float(found.gap)
+        return -float(touch.gap)
     if guard.kind == "lift":
         return -normal
     if guard.kind == "still":
-        return _stopping(own, found)
-    held = float(np.linalg.norm(force[guard.contact] - normal * found.normal))
+        return _stopping(own, touch)
+    held = float(np.linalg.norm(force[guard.contact] - normal * touch.normal))
     contact = contacts[guard.contact]
     return held - (contact.bound or contact.friction * normal)
 
 
-def _stopping(own: Acting, found: Touching) -> float:
-    """Along a line the slip itself, less than nothing; in two dimensions how much it is above what is faint."""
+def _stopping(own: Acting, touch: Touching) -> float:
+    """Guard of the end of a slip [m/s]: minus the speed along a known line; in the plane, FAINT minus the speed."""
     if own.along is None:
-        return FAINT - float(np.linalg.norm(across(found)))
-    return -float(heading_of(own, found) @ found.slide)
+        return FAINT - float(np.linalg.norm(across(touch)))
+    return -float(heading_of(own, touch) @ touch.slide)
 
 
 def striking(mode: ContactMode, touching: Sequence[Touching], hit: int, time: float) -> list[int]:
-    """Contacts that close at the same time as one does, or nearer to it than times are known, with it."""
+    """Contacts that close at the same time [s] as the contact ``hit``, within the accuracy of times, and ``hit``."""
 
-    def closes(found: Touching) -> bool:
-        closing = -float(found.normal @ found.slide)
-        return closing > 0 and found.gap <= closing * moment(time)
+    def closes(touch: Touching) -> bool:
+        closing = -float(touch.normal @ touch.slide)
+        return closing > 0 and touch.gap <= closing * moment(time)
 
     return [
         k
-        for k, (own, found) in enumerate(zip(mode, touching, strict=True))
-        if k == hit or (own.kind == "open" and closes(found))
+        for k, (own, touch) in enumerate(zip(mode, touching, strict=True))
+        if k == hit or (own.kind == "open" and closes(touch))
     ]
 
 
 def noise_of(guards: Sequence[ContactGuard], size: float) -> FloatArray:
-    """Round-off of the guards: a gap that has just opened is still at zero, a slip that has just begun too."""
+    """Round-off of the guards: a gap that just opened and a slip that just began are still zero."""
     return np.array([_DIGITS * size if guard.kind in {"close", "still"} else 0.0 for guard in guards])
 
 
-def faint_time(found: Touching, slide_rate: Array) -> float:
-    """Time after which a slip is over, in a straight line."""
-    u = across(found)
+def faint_time(touch: Touching, slide_rate: Array) -> float:
+    """Time until a slip stops at its present rate [s]."""
+    u = across(touch)
     return max(0.0, -float(u @ slide_rate) / float(slide_rate @ slide_rate))
 
 
 def refuse_turning_onset(contact: Touchable, own: Acting) -> None:
-    """Refuses a slip that begins from rest in two dimensions, at the bound of friction.
+    """Refuses a slip in the plane that starts from rest at the bound of friction.
 
     Raises:
-        Refused: its direction is not known at first, and equations that find it are as stiff as it is slow.
+        Refused: its initial direction is unknown, and its equations get stiffer the slower it is.
     """
     if own.along is None:
         raise Refused(

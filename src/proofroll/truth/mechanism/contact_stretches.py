@@ -1,4 +1,4 @@
-"""Stretches of a mechanism whose bodies touch: what its two routes share, which is no equation and no decision."""
+"""Stretches of a mechanism whose bodies touch: what both routes share, without equations and decisions."""
 
 from abc import abstractmethod
 from collections.abc import Sequence
@@ -28,9 +28,9 @@ from proofroll.truth.mechanism.contact_guards import (
 )
 from proofroll.truth.mechanism.stretches import Stretches, StretchLaw
 
-_AHEAD = 1e-9  # of the natural time: after a stretch has begun, whether an effort is at its limit
-_CLAMPED = 1e-9  # of a limit: an effort as near to it comes from it
-# A slip that comes to rest: part by which its logarithm falls in a step, the most steps, and what is left at their end.
+_AHEAD = 1e-9  # time step, relative to the natural time, after which an effort is compared with its limit
+_CLAMPED = 1e-9  # difference of an effort from its limit, relative to the limit, up to which it starts at the limit
+# Integration of a slip to rest: decrease of its logarithm per step, steps at most, and slip speed at the end.
 _DECAY, _MOST_DECAYS, _NOTHING = 0.25, 120, 1e-12
 
 
@@ -38,9 +38,9 @@ class SolvedContacts(NamedTuple):
     """Motion and forces at a state in a mode.
 
     Attributes:
-        touching: of each contact.
-        velocity, acceleration: of the route's own coordinates.
-        slide_rate: rate of each slide, (contacts, 3).
+        touching: geometry and sliding velocity of each contact.
+        velocity, acceleration: in the route's own coordinates.
+        slide_rate: rate of each sliding velocity, (contacts, 3).
         force: on body a of each contact, (contacts, 3).
         response: Painlevé's measure, 1 without friction.
     """
@@ -65,15 +65,15 @@ class _Equations(Protocol):
 
 
 class ContactStretches(Stretches[ContactMode]):
-    """Stretches, ends of them, and what follows; a state ends with the time.
+    """Stretches of a mechanism with contacts, and transitions; the last component of a state is the time.
 
-    See :class:`proofroll.truth.hybrid.HybridRoute`.
+    Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
     def __init__(self, equations: _Equations, length: int, tolerance: float, size: float) -> None:
         """Takes the length of a state without time, the tolerance of each step, the mechanism's size."""
         super().__init__(length + 1, tolerance)
-        self._given, self.contacts, self._size = equations, equations.contacts, size
+        self._equations, self.contacts, self._size = equations, equations.contacts, size
         self._timed = any(map(varies, equations.mechanism.signals))
 
     @abstractmethod
@@ -82,27 +82,27 @@ class ContactStretches(Stretches[ContactMode]):
 
     @abstractmethod
     def _touching(self, state: Array) -> Sequence[Touching]:
-        """Each contact at a state."""
+        """Geometry and sliding velocity of each contact at a state."""
 
     @abstractmethod
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:
-        """Mode that follows from the forces, and how far it is from another one, relative."""
+        """Mode that follows from the forces, and its relative margin from another mode."""
 
     @abstractmethod
     def _torn(self, leg: Stretch[ContactMode]) -> Exception:
-        """Refusal of a motion that is not unique from the end of a stretch on."""
+        """Refusal of a motion that is not unique after the end of a stretch."""
 
     @abstractmethod
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        """A slip that begins at the bound of friction, against the force that held."""
+        """Slip that starts at the bound of friction, opposite to the friction that held."""
 
     @abstractmethod
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
-        """Transition of the motion by an impact."""
+        """Transition at an impact."""
 
     def _law(self, state: Array, mode: ContactMode) -> StretchLaw:
-        guards, equations = guards_of(self.contacts, mode), self._given
-        # an effort comes to its limit, or back from it
+        guards, equations = guards_of(self.contacts, mode), self._equations
+        # sign of the guard of an effort: it reaches its limit, or comes back from it
         side = np.where(equations.excess(state + _AHEAD * equations.rate(state, mode)) > 0, 1.0, -1.0)
         noise = np.where(np.abs(excess := equations.excess(state)) < _CLAMPED, 2 * np.abs(excess), 0.0)
         return StretchLaw(
@@ -113,9 +113,9 @@ class ContactStretches(Stretches[ContactMode]):
         )
 
     def _guards(self, state: Array, mode: ContactMode, guards: Sequence[ContactGuard]) -> FloatArray:
-        found, contacts = self._solved(state, mode), self.contacts
+        solved, contacts = self._solved(state, mode), self.contacts
         return np.array(
-            [guard_value(one, mode, contacts, found.touching, found.force, found.response) for one in guards]
+            [guard_value(guard, mode, contacts, solved.touching, solved.force, solved.response) for guard in guards]
         )
 
     def walk(self, time: float, state: Array, mode: ContactMode, until: float) -> Stretch[ContactMode]:
@@ -134,18 +134,18 @@ class ContactStretches(Stretches[ContactMode]):
         return replace(leg, start=time, first=state, end=end, last=last)
 
     def _spent(self, state: Array, mode: ContactMode, k: int) -> Array:
-        """The state where a faint slip has ended, by the method of Runge and Kutta in the logarithm of what is left.
+        """State at the end of a slip below FAINT, by a Runge-Kutta method in the logarithm of the slip speed.
 
-        A slip turns the faster the slower it is: its equations are smooth in the logarithm, and stiff in time.
+        The slower a slip, the faster it turns: its equations are stiff in time, and smooth in that logarithm.
         """
         if mode[k].along is not None:
             return state
 
         def decay(y: Array) -> Array:
-            """Change of a state in the time that a straight line to rest takes."""
-            found = self._touching(y)
-            now = tuple(_headed(own, each) for own, each in zip(mode, found, strict=True))
-            return faint_time(found[k], self._solved(y, now).slide_rate[k]) * self._given.rate(y, now)
+            """Change of the state until the slip would stop at its present rate."""
+            touching = self._touching(y)
+            now = tuple(_headed(own, each) for own, each in zip(mode, touching, strict=True))
+            return faint_time(touching[k], self._solved(y, now).slide_rate[k]) * self._equations.rate(y, now)
 
         for _ in range(_MOST_DECAYS):
             if np.linalg.norm(across(self._touching(state)[k])) < _NOTHING:
@@ -157,13 +157,13 @@ class ContactStretches(Stretches[ContactMode]):
         return np.asarray(state + decay(state))
 
     def _kicked(self, time: float, state: Array, mode: ContactMode) -> tuple[Array, float]:
-        """The state and time a moment later where a slip begins from rest in two dimensions: with a direction."""
-        found, wait = self._solved(state, mode), 0.0
+        """State and time shortly after a slip in the plane starts from rest, when it has a direction."""
+        solved, wait = self._solved(state, mode), 0.0
         for k, own in enumerate(mode):
             begins = own.kind == "slip" and own.along is None and self.contacts[k].friction
-            if begins and np.linalg.norm(across(found.touching[k])) < FAINT:
-                wait = max(wait, 2 * FAINT / float(np.linalg.norm(found.slide_rate[k])))
-        return (state, time) if not wait else (state + wait * self._given.rate(state, mode), time + wait)
+            if begins and np.linalg.norm(across(solved.touching[k])) < FAINT:
+                wait = max(wait, 2 * FAINT / float(np.linalg.norm(solved.slide_rate[k])))
+        return (state, time) if not wait else (state + wait * self._equations.rate(state, mode), time + wait)
 
     def within(self, leg: Stretch[ContactMode], times: FloatArray) -> FloatArray:
         """See the protocol."""
@@ -175,7 +175,7 @@ class ContactStretches(Stretches[ContactMode]):
     def change(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
         """See the protocol."""
         guards = guards_of(self.contacts, leg.mode)
-        if leg.guard is None or leg.guard >= len(guards):  # a break, or the limit of an effort
+        if leg.guard is None or leg.guard >= len(guards):  # a break of the rates, or the limit of an effort
             return Transition(leg.last, leg.mode, ())
         k, kind = guards[leg.guard]
         mode, name = list(leg.mode), self.contacts[k].name
@@ -191,14 +191,17 @@ class ContactStretches(Stretches[ContactMode]):
         return self._stopped(leg) if kind == "still" else self._impact(leg, k)
 
     def _stopped(self, leg: Stretch[ContactMode]) -> Transition[ContactMode]:
-        """Transition where a slip comes to rest: alone, or with all others; what slides while it turns ends at once."""
-        closed, found = [own.kind != "open" for own in leg.mode], self._solved(leg.last, leg.mode)
+        """Transition where a slip stops: alone, or with all others.
+
+        Bodies that turn while they slide stop all their slips at once: then all slips below FAINT count as stopped.
+        """
+        closed, solved = [own.kind != "open" for own in leg.mode], self._solved(leg.last, leg.mode)
         slides = [k for k, own in enumerate(leg.mode) if own.kind == "slip"]
-        slips = np.linalg.norm([across(found.touching[k]) for k in slides], axis=1)
+        slips = np.linalg.norm([across(solved.touching[k]) for k in slides], axis=1)
         if slips.max() <= FAINT:
             ended = self._after(leg, leg.last, closed, (), stopped=FAINT)
             if ended.mode is not None and self._stands(ended.state, ended.mode):
-                return replace(ended, blur=float((slips / np.linalg.norm(found.slide_rate[slides], axis=1)).max()))
+                return replace(ended, blur=float((slips / np.linalg.norm(solved.slide_rate[slides], axis=1)).max()))
         return self._after(leg, leg.last, closed, ())
 
     def _after(
@@ -211,27 +214,27 @@ class ContactStretches(Stretches[ContactMode]):
         delay: float = 0.0,
         stopped: float = STOPPED,
     ) -> Transition[ContactMode]:
-        """The mode that follows from the forces; what slips no faster than ``stopped`` is taken to stand."""
+        """Transition to the mode that follows from the forces; contacts not faster than ``stopped`` are at rest."""
         slips = [float(np.linalg.norm(across(each))) for each in self._touching(state)]
         still = [shut and slip <= stopped for shut, slip in zip(closed, slips, strict=True)]
-        state = self._given.eliminated(state, held(closed, still))
+        state = self._equations.eliminated(state, held(closed, still))
         mode, sure = self._decided(state, closed, still)
         changed = changes(self.contacts, leg.mode, mode, self._stands(state, mode))
         struck = {name for _, name in happened}
-        said = (*happened, *(item for item in changed if item[1] not in struck))
-        return Transition(state, mode, said, np.inf if delay else min(margin, sure), delay)
+        happenings = (*happened, *(item for item in changed if item[1] not in struck))
+        return Transition(state, mode, happenings, np.inf if delay else min(margin, sure), delay)
 
     def _stands(self, state: Array, mode: ContactMode) -> bool:
-        """True if nothing moves, and nothing will."""
+        """True if nothing moves or is about to move."""
         if self._timed or any(own.kind == "slip" for own in mode):
             return False
-        found = self._solved(state, mode)
-        return float(np.abs(found.velocity).max()) <= AT_REST and float(np.abs(found.acceleration).max()) <= STANDS
+        solved = self._solved(state, mode)
+        return float(np.abs(solved.velocity).max()) <= AT_REST and float(np.abs(solved.acceleration).max()) <= STANDS
 
 
-def _headed(own: Acting, found: Touching) -> Acting:
-    """A slip that may be faint with its direction now."""
-    slip = across(found)
+def _headed(own: Acting, touch: Touching) -> Acting:
+    """Mode of a contact with the present direction of its slip in the plane, however slow."""
+    slip = across(touch)
     if own.kind != "slip" or own.along is not None or not slip.any():
         return own
     x, y, z = (slip / np.linalg.norm(slip)).tolist()
@@ -239,7 +242,7 @@ def _headed(own: Acting, found: Touching) -> Acting:
 
 
 def held(closed: Sequence[bool], still: Sequence[bool]) -> ContactMode:
-    """Modes of closed contacts: stick for those that stand, slip for the others."""
+    """Modes of contacts: stick if closed and still, slip if only closed, else open."""
     return tuple(
         Acting("stick" if stands else "slip" if shut else "open") for shut, stands in zip(closed, still, strict=True)
     )

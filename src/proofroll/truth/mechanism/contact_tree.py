@@ -1,4 +1,4 @@
-"""Route 1 of a mechanism whose bodies touch: joint coordinates, modes by Coulomb's law at all contacts at once."""
+"""Route 1 of a mechanism whose bodies touch: joint coordinates, Coulomb's law solved for all contacts at once."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,10 @@ from proofroll.truth.mechanism.contact_stretches import ContactStretches, Solved
 
 
 class ContactTree(ContactStretches):
-    """The stretches of a mechanism in the coordinates of its tree. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+    """Stretches of a mechanism in the coordinates of its tree.
+
+    Implements :class:`proofroll.truth.hybrid.HybridRoute`.
+    """
 
     def __init__(self, dynamics: ContactDynamics, tolerance: float, size: float) -> None:
         self.dynamics = dynamics
@@ -33,27 +36,27 @@ class ContactTree(ContactStretches):
         return NotUnique(f"from t = {leg.end:.6g} s on " + PAINLEVE.format(name=slipping))
 
     def _leaving(self, state: Array, mode: ContactMode, k: int) -> Acting:
-        found = self._forces(state, mode)
+        solution = self._forces(state, mode)
         own = mode[k]
-        assert own.along is not None  # others are refused
-        sign = -float(np.sign(np.dot(own.along, found.force[k])))
+        assert own.along is not None  # other contacts are refused before
+        sign = -float(np.sign(np.dot(own.along, solution.force[k])))
         x, y, z = (sign * np.array(own.along)).tolist()
         return Acting("slip", (x, y, z), (x, y, z))
 
     def _impact(self, leg: Stretch[ContactMode], hit: int) -> Transition[ContactMode]:
         contacts, dynamics = self.contacts, self.dynamics
         q, v, time = dynamics.parts(leg.last)
-        found = dynamics.at(q, v).touching
-        hits = striking(leg.mode, found, hit, leg.end)
-        # dry friction of joints is no impulse
+        touching = dynamics.at(q, v).touching
+        hits = striking(leg.mode, touching, hit, leg.end)
+        # dry friction of joints gives no impulse
         closed = [k for k, own in enumerate(leg.mode) if (own.kind != "open" or k in hits) and not contacts[k].bound]
-        speed = -float(found[hit].normal @ found[hit].slide)
+        speed = -float(touching[hit].normal @ touching[hit].slide)
         law = np.array([contacts[k].restitution if k in hits else 0.0 for k in closed])
         after, impulse, margin = dynamics.struck(q, v, closed, law)
         delay = 0.0
         if self._settles(hit, speed, contacts[hit].restitution):
             free = dynamics.solve(q, after, leg.mode, time)
-            pull = -float(found[hit].normal @ free.slide_rate[hit])
+            pull = -float(touching[hit].normal @ free.slide_rate[hit])
             delay = self._bouncing(speed * contacts[hit].restitution, pull, contacts[hit].restitution)
             after, impulse, margin = dynamics.struck(q, v, closed, np.zeros(len(closed)))
         state = np.concatenate([q, after, [time]])
@@ -62,7 +65,7 @@ class ContactTree(ContactStretches):
             e = contacts[k].restitution if k in hits and not delay else 0.0
             stays[k] = impulse[place, 0] > 0 and not e
             if k not in hits and not impulse[place, 0] > 0:
-                stays[k] = float(found[k].normal @ dynamics.at(q, after).touching[k].slide) <= STOPPED
+                stays[k] = float(touching[k].normal @ dynamics.at(q, after).touching[k].slide) <= STOPPED
         first = ("settle" if delay else "impact", contacts[hit].name)
         return self._after(leg, state, stays, (first,), margin, delay)
 
@@ -74,9 +77,9 @@ class ContactTree(ContactStretches):
         return self.dynamics.at(*self.dynamics.parts(state)).touching
 
     def _solved(self, state: Array, mode: ContactMode) -> SolvedContacts:
-        found, v = self._forces(state, mode), self.dynamics.parts(state)[1]
+        solution, v = self._forces(state, mode), self.dynamics.parts(state)[1]
         return SolvedContacts(
-            found.state.touching, v, found.acceleration, found.slide_rate, found.force, found.response
+            solution.state.touching, v, solution.acceleration, solution.slide_rate, solution.force, solution.response
         )
 
     def _decided(self, state: Array, closed: Sequence[bool], still: Sequence[bool]) -> tuple[ContactMode, float]:

@@ -1,4 +1,4 @@
-"""The truth of a mechanism whose bodies touch, by two routes that share the finder of guards and the shapes."""
+"""Truth of a mechanism whose bodies touch, by two routes that share the root finder of guards and the shapes."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, ma
 
 
 def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
-    """The truth at growing times [s].
+    """Truth at rising times [s].
 
     Raises:
         NotUnique: the laws of contact leave more than one motion, or none.
@@ -33,7 +33,7 @@ def contact_truth(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 
 
 def _in_units(mechanism: Mechanism, units: Units, times: Array) -> TwoRouteMotion:
-    """The truth at times in natural units, by routes that are in these units."""
+    """Truth at times in natural units, by routes in these units."""
     own = units.mechanism(mechanism)
     dynamics, second = ContactDynamics(own), MaximalCoordinates(own)
     check_start(dynamics.equations, second, units.length)

@@ -1,6 +1,6 @@
-"""Stretches of a mechanism with dry friction, stops or limits of efforts: ends and events, which its two routes share.
+"""Stretches of a mechanism with dry friction, stops or effort limits: ends and events, which both routes share.
 
-What they share is no equation and no decision.
+The routes share no equation and no decision.
 """
 
 import math
@@ -18,14 +18,14 @@ from proofroll.truth.mechanism.stretches import Stretches
 from proofroll.truth.mechanism.two_paths import CLOSE, moment
 
 Motors = tuple[Actuator, ...]
-_NEAR = 1e-12  # relative: a coordinate this close to a stop is at it
-_DIGITS = 8  # last digits of a coordinate that are round-off
+_NEAR = 1e-12  # relative difference from a stop below which a coordinate is at it
+_DIGITS = 8  # round-off of a coordinate, in units of its last digit
 
 
 class JointStretches(Stretches[Mode]):
-    """Stretches, ends of them, and what follows; a state ends with the time.
+    """Stretches of a mechanism with switched joints, and transitions; the last component of a state is the time.
 
-    See :class:`proofroll.truth.hybrid.HybridRoute`.
+    Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
     joints: tuple[SwitchedJoint, ...]
@@ -33,11 +33,11 @@ class JointStretches(Stretches[Mode]):
 
     @abstractmethod
     def _at_rest(self, leg: Stretch[Mode], state: Array, which: int) -> tuple[Array, Mode, float]:
-        """State, mode and margin after a joint that moved against friction has come to rest."""
+        """State, mode and margin after a joint that moved against friction has stopped."""
 
     @abstractmethod
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
-        """State, mode, margin, and time until rebounds are over [s], after a joint has hit a stop."""
+        """State, mode, margin, and time until the rebounds are over [s], after a joint has hit a stop."""
 
     @abstractmethod
     def _along(self, state: Array) -> tuple[Array, Array]:
@@ -45,7 +45,7 @@ class JointStretches(Stretches[Mode]):
 
     def change(self, leg: Stretch[Mode]) -> Transition[Mode]:
         """See the protocol."""
-        if leg.guard is None:  # at a break
+        if leg.guard is None:  # at a break of the rates
             return Transition(leg.last, leg.mode, ())
         which, kind = guards_of(self.joints, leg.mode)[leg.guard]
         state, mode = np.append(leg.last[:-1], leg.end), list(leg.mode)
@@ -54,7 +54,7 @@ class JointStretches(Stretches[Mode]):
             return Transition(state, tuple(mode), (effort_event(self.motors[which - len(self.joints)], kind),))
         joint = self.joints[which]
         if kind in {"up", "down"}:
-            # The force that holds has reached its bound: the joint leaves, and nothing else feels it yet.
+            # The force that held the joint has reached its bound: only this joint starts to move.
             was, mode[which] = mode[which], joint.moving(1.0 if kind == "up" else -1.0)
             return Transition(state, tuple(mode), ((left_by(was), joint.name),))
         if kind == "still":
@@ -71,33 +71,33 @@ class JointStretches(Stretches[Mode]):
 
 
 def turned(mode: Mode, which: int) -> Mode:
-    """The mode with one joint on its way back."""
+    """Mode with the direction of one joint reversed."""
     back = {"forward": "backward", "backward": "forward"}
     return tuple(back.get(own, own) if k == which else own for k, own in enumerate(mode))
 
 
 def guards_of(joints: tuple[SwitchedJoint, ...], mode: Mode) -> list[tuple[int, str]]:
-    """Ends that a leg in this mode may have: number of the joint, or after these of the motor, and kind.
+    """Guards of a leg in this mode: index of the joint (motors are numbered after all joints), and kind.
 
-    ``up``, ``down``: the force that holds reaches its bound and the joint moves so; ``still``: a joint that moves
-    against friction comes to rest; ``low``, ``high``: it reaches a stop; ``least``, ``linear``, ``greatest``: an effort
-    comes to be so.
+    ``up``, ``down``: the holding force reaches its bound and the joint moves in this direction; ``still``: a joint that
+    moves against friction stops; ``low``, ``high``: a joint reaches a stop; ``least``, ``greatest``: an effort reaches
+    its limit; ``linear``: it leaves the limit.
     """
-    found = []
+    guards = []
     for number, (joint, own) in enumerate(zip(joints, mode, strict=False)):
         low, high = joint.bounds(own)
         if own in HOLDING:
-            found += [(number, "up")] * math.isfinite(low) + [(number, "down")] * math.isfinite(high)
+            guards += [(number, "up")] * math.isfinite(low) + [(number, "down")] * math.isfinite(high)
             continue
         if own != "free":
-            found.append((number, "still"))
+            guards.append((number, "still"))
         if math.isfinite(joint.low) and own != "forward":
-            found.append((number, "low"))
+            guards.append((number, "low"))
         if math.isfinite(joint.high) and own != "backward":
-            found.append((number, "high"))
+            guards.append((number, "high"))
     for number, own in enumerate(mode[len(joints) :], len(joints)):
-        found += [(number, other) for other in (("least", "greatest") if own == "linear" else ("linear",))]
-    return found
+        guards += [(number, other) for other in (("least", "greatest") if own == "linear" else ("linear",))]
+    return guards
 
 
 def guard_values(
@@ -109,30 +109,30 @@ def guard_values(
     force: Array,
     wanted: Sequence[float],
 ) -> FloatArray:
-    """The guards of :func:`guards_of`, from the coordinates, rates and forces of the joints and the efforts wanted."""
-    found = []
+    """Values of :func:`guards_of`, from coordinates, rates and forces of the joints and efforts before clamping."""
+    values = []
     for k, kind in guards_of(joints, mode):
         if k < len(joints):
-            found.append(_guard_value(joints[k], mode[k], kind, float(q[k]), float(v[k]), float(force[k])))
+            values.append(_guard_value(joints[k], mode[k], kind, float(q[k]), float(v[k]), float(force[k])))
         else:
-            found.append(_beyond(wanted[k - len(joints)], motors[k - len(joints)].bound, mode[k], kind))
-    return np.array(found)
+            values.append(_beyond(wanted[k - len(joints)], motors[k - len(joints)].bound, mode[k], kind))
+    return np.array(values)
 
 
 def _beyond(wanted: float, bound: float, mode: str, kind: str) -> float:
-    """Effort beyond its bound, or back from it."""
+    """Effort beyond its bound; for kind ``linear``, back within it."""
     if kind == "linear":
         return bound - wanted if mode == "greatest" else bound + wanted
     return wanted - bound if kind == "greatest" else -bound - wanted
 
 
 def effort_event(motor: Actuator, kind: str) -> tuple[str, str]:
-    """The event of an effort that reaches its limit or leaves it."""
+    """Event of an effort that reaches or leaves its limit."""
     return ("release" if kind == "linear" else "saturate", motor.name)
 
 
 def _guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float, force: float) -> float:
-    """The value of a guard, negative while the mode lasts."""
+    """Value of a joint's guard, negative while the mode lasts."""
     low, high = joint.bounds(mode)
     if kind == "up":
         return low - force
@@ -146,10 +146,10 @@ def _guard_value(joint: SwitchedJoint, mode: str, kind: str, q: float, v: float,
 def order_decides(
     joints: tuple[SwitchedJoint, ...], leg: Stretch[Mode], q: Array, before: Array, after: Array, hit: int
 ) -> bool:
-    """True if less than parameters are known to decides which of two stops is hit first, and it matters.
+    """True if the order of two impacts on stops matters and cannot be resolved.
 
-    Another joint would come to its stop nearer in time than times are known to, and the impact moves it.
-    ``q`` are coordinates at the impact, ``before`` and ``after`` rates beside it, of the switched joints.
+    Another joint would reach its stop within the accuracy of times, and the impact changes its rate. ``q``: coordinates
+    of the switched joints at the impact; ``before``, ``after``: their rates.
     """
     speed, within = abs(float(before[hit])), moment(leg.end)
     for k, kind in guards_of(joints, leg.mode):
@@ -165,15 +165,15 @@ def order_decides(
 def noise_of(
     joints: tuple[SwitchedJoint, ...], motors: Motors, mode: Mode, q: Array, wanted: Sequence[float]
 ) -> FloatArray:
-    """Round-off of the guards of a leg that begins at coordinates q of its joints: one that leaves a stop is at it."""
-    found = []
+    """Round-off of the guards of a leg that starts at joint coordinates q; zero away from stops and limits."""
+    noise = []
     for number, kind in guards_of(joints, mode):
         if number >= len(joints):
             motor = motors[number - len(joints)]
             apart = abs(abs(wanted[number - len(joints)]) - motor.bound)
-            found.append(_DIGITS * float(np.spacing(motor.bound)) if apart <= _NEAR * motor.bound else 0.0)
+            noise.append(_DIGITS * float(np.spacing(motor.bound)) if apart <= _NEAR * motor.bound else 0.0)
             continue
         at = {"low": joints[number].low, "high": joints[number].high}.get(kind)
         leaves = at is not None and abs(q[number] - at) <= _NEAR * max(1.0, abs(at))
-        found.append(_DIGITS * float(np.spacing(max(1.0, abs(at)))) if leaves and at is not None else 0.0)
-    return np.array(found)
+        noise.append(_DIGITS * float(np.spacing(max(1.0, abs(at)))) if leaves and at is not None else 0.0)
+    return np.array(noise)

@@ -1,4 +1,4 @@
-"""Route 1 of a mechanism with dry friction, stops or limits of efforts: joint coordinates, modes by complementarity."""
+"""Route 1 for mechanisms with dry friction, stops or effort limits: joint coordinates, modes by complementarity."""
 
 import numpy as np
 
@@ -12,9 +12,9 @@ from proofroll.truth.mechanism.stretches import StretchLaw
 
 
 class SwitchedTree(JointStretches):
-    """The legs of a mechanism in the coordinates of its tree; a state ends with the time.
+    """Legs of a mechanism in the coordinates of its tree; the last component of a state is the time.
 
-    See :class:`proofroll.truth.hybrid.HybridRoute`.
+    Implements :class:`proofroll.truth.hybrid.HybridRoute`.
     """
 
     def __init__(self, equations: JointCoordinates, tolerance: float) -> None:
@@ -47,7 +47,7 @@ class SwitchedTree(JointStretches):
 
     def _hit(self, leg: Stretch[Mode], state: Array, which: int, stop: float) -> tuple[Array, Mode, float, float]:
         joint, (q, v) = self.joints[which], self._parts(state)
-        for other, own in zip(self.joints, leg.mode, strict=False):  # what is held stands, but for round-off
+        for other, own in zip(self.joints, leg.mode, strict=False):  # held joints are at rest; this removes round-off
             if own in HOLDING:
                 v[other.velocity] = 0.0
             if own in STOPPED:
@@ -67,10 +67,10 @@ class SwitchedTree(JointStretches):
         return state, decided, min(margin, after), delay
 
     def holding(self, state: Array, mode: Mode) -> Array:
-        """Force of what holds or rubs along each switched joint's coordinate, N or N m."""
-        found = self.equations.solve(*self._parts(state), mode, time=float(state[-1])).holding
+        """Force of dry friction or of a stop along each switched joint's coordinate, N or N m."""
+        holding = self.equations.solve(*self._parts(state), mode, time=float(state[-1])).holding
         force = np.array([joint.push(own) for joint, own in zip(self.joints, mode, strict=False)])
-        force[held_by(mode)] = found
+        force[held_by(mode)] = holding
         return force
 
     def _parts(self, state: Array) -> tuple[Array, Array]:

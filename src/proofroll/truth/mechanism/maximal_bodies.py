@@ -1,6 +1,6 @@
-"""Bodies of route 2: each alone in space, with a position of its centre of mass and an attitude.
+"""Bodies of route 2: each separate in space, with the position of its centre of mass and an attitude.
 
-A body that can only move in a plane has three coordinates, any other seven; nothing here knows joint coordinates.
+A body that can only move in a plane has three coordinates, any other seven; joint coordinates do not occur.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,13 +17,14 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array, frame_of_axis
 from proofroll.truth.scalars import Scalar, add, cross, dot, mul, plus, scaled, turned, turned_back
 
-_PARALLEL = 1e-12  # how far axes of a plane mechanism may be from parallel: round-off
-_LIGHT = 1e-9  # of the largest moment of a body: a smaller one is a rod's or a point's, written with a file's digits
+_PARALLEL = 1e-12  # cross product of axes of a planar mechanism up to which they are parallel
+# Smallest over largest moment of inertia up to which a body is a rod or a point, given with the digits of a file.
+_LIGHT = 1e-9
 
 
 @dataclass(frozen=True)
 class BodyStart:
-    """Start of one body: origin and velocity of its frame, rotation, angular velocity, world axes."""
+    """Initial state of a body: origin and velocity of its frame, rotation, angular velocity, all in world axes."""
 
     p: Array
     R: Rotation
@@ -33,7 +34,7 @@ class BodyStart:
 
 @dataclass(frozen=True)
 class BodyInScalars:
-    """A body at one instant, of scalars: centre of mass, rotation by rows, velocity, angular velocity, world axes."""
+    """A body at one instant, in scalars: centre of mass, rotation (rows), velocity, angular velocity; world axes."""
 
     r: Sequence[Scalar]
     R: Sequence[Sequence[Scalar]]
@@ -46,11 +47,11 @@ GROUND = BodyInScalars((0.0,) * 3, AXES, (0.0,) * 3, (0.0,) * 3)
 
 
 class GeneralBody:
-    """A body that can move anyhow: r, quaternion | v, ω in body axes.
+    """A body in space: coordinates (r, quaternion), velocities (v, ω in body axes).
 
     Attributes:
-        mass_matrix: along its velocities.
-        heavy: whether that has an inverse: no body without mass, no point, no rod.
+        mass_matrix: for its velocities, (6, 6).
+        heavy: True if that is invertible: the body has a mass and is neither a point nor a rod.
     """
 
     nx, nu = 7, 6
@@ -62,14 +63,14 @@ class GeneralBody:
         self.mass_matrix = block_diag(mass * np.eye(3), inertia)
 
     def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:
-        """Coordinates and velocities of a placed body."""
+        """Coordinates and velocities of a body from its initial state."""
         arm = placed.R.apply(com)
         attitude = placed.R.as_quat(scalar_first=True)
         velocity = placed.v + np.cross(placed.w, arm)
         return [*(placed.p + arm), *attitude], [*velocity, *placed.R.inv().apply(placed.w)]
 
     def view(self, x: Sequence[Scalar], u: Sequence[Scalar], _: Mapping[str, Any]) -> BodyInScalars:
-        """The body for coordinates x, of a unit quaternion, and velocities u."""
+        """Pose and velocities for coordinates x, with a unit quaternion, and velocities u."""
         a, b, c, d = x[3:]
         R = (
             (1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c - a * d), 2.0 * (b * d + a * c)),
@@ -79,15 +80,15 @@ class GeneralBody:
         return BodyInScalars(x[:3], R, u[:3], turned(R, u[3:]))
 
     def projected(self, view: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
-        """Generalised force along the velocities u of a force and a moment about the centre of mass, world axes."""
+        """Generalised force along u, from a force and a moment about the centre of mass in world axes."""
         return [*force, *turned_back(view.R, moment)]
 
     def gyroscopic(self, u: Sequence[Scalar]) -> list[Scalar]:
-        """Inertial force along the velocities at u̇ = 0."""
+        """Gyroscopic force along u: inertial force at u̇ = 0."""
         return [0.0, 0.0, 0.0, *scaled(-1.0, cross(u[3:], turned(self.inertia, u[3:])))]
 
     def rate(self, x: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
-        """ẋ."""
+        """Rates ẋ of the coordinates."""
         (a, b, c, d), (p, q, r) = x[3:], u[3:]
         return [
             *u[:3],
@@ -103,9 +104,9 @@ class Planar:
 
     Args:
         mass, inertia: kg, kg m² about the centre of mass in body axes.
-        plane: columns e1, e2 of the plane and its normal, world axes.
-        com: a place of the centre of mass, m.
-        R: its rotation where the angle is zero.
+        plane: directions e1, e2 in the plane and its normal, as columns in world axes.
+        com: a position of the centre of mass, m.
+        R: rotation of the body at angle zero.
     """
 
     nx, nu = 3, 3
@@ -126,7 +127,7 @@ class Planar:
         ]
 
     def start(self, placed: BodyStart, com: Array) -> tuple[list[float], list[float]]:
-        """Coordinates and velocities of a placed body."""
+        """Coordinates and velocities of a body from its initial state."""
         arm = placed.R.apply(com)
         angle = float((placed.R * self.zero.inv()).as_rotvec() @ self.plane[:, 2])
         velocity = placed.v + np.cross(placed.w, arm)
@@ -134,7 +135,7 @@ class Planar:
         return [(placed.p + arm) @ e1, (placed.p + arm) @ e2, angle], [velocity @ e1, velocity @ e2, placed.w @ normal]
 
     def view(self, x: Sequence[Scalar], u: Sequence[Scalar], functions: Mapping[str, Any]) -> BodyInScalars:
-        """The body for coordinates x and velocities u."""
+        """Pose and velocities for coordinates x and velocities u."""
         c, s = functions["cos"](x[2]), functions["sin"](x[2])
         R = [
             [add(mul(c, a), mul(s, b), d) for a, b, d in zip(*rows, strict=True)]
@@ -145,39 +146,40 @@ class Planar:
         return BodyInScalars(r, R, plus(scaled(u[0], e1), scaled(u[1], e2)), scaled(u[2], normal))
 
     def projected(self, _: BodyInScalars, force: Sequence[Scalar], moment: Sequence[Scalar]) -> list[Scalar]:
-        """Generalised force along the velocities u of a force and a moment about the centre of mass, world axes."""
+        """Generalised force along u, from a force and a moment about the centre of mass in world axes."""
         e1, e2, normal = self._columns
         return [dot(force, e1), dot(force, e2), dot(moment, normal)]
 
     def gyroscopic(self, _: Sequence[Scalar]) -> list[Scalar]:
-        """Inertial force along the velocities at u̇ = 0."""
+        """Gyroscopic force along u: zero in a plane."""
         return [0.0, 0.0, 0.0]
 
     def rate(self, _: Sequence[Scalar], u: Sequence[Scalar]) -> list[Scalar]:
-        """ẋ."""
+        """Rates ẋ of the coordinates."""
         return list(u)
 
 
 def placed_bodies(mechanism: Mechanism, at_zero: bool = False) -> dict[str, BodyStart]:
-    """Poses and velocities of all bodies at the start, from the joints' own definition; at_zero: at q = 0, v = 0."""
-    found = {WORLD: BodyStart(np.zeros(3), Rotation.identity(), np.zeros(3), np.zeros(3))}
+    """Initial states of all bodies, from the definition of the joints; ``at_zero``: at q = 0, v = 0."""
+    placed = {WORLD: BodyStart(np.zeros(3), Rotation.identity(), np.zeros(3), np.zeros(3))}
     for joint in mechanism.joints:
-        parent = found[joint.parent]
+        parent = placed[joint.parent]
         frame = parent.R * Rotation.from_euler("xyz", joint.orientation)
         q = np.zeros(joint.nq) if at_zero else np.array(joint.q0)
         v = np.zeros(joint.nv) if at_zero else np.array(joint.v0)
-        shift, turn, slide, spin = _moved(joint, q, v)  # shift in A's axes turned to the child's at q = 0; others there
+        # in the axes of A turned to the child's at q = 0
+        shift, turn, slide, spin = _moved(joint, q, v)
         at = parent.R.apply(joint.position) + frame.apply(shift)
         R = frame * turn
         w = parent.w + frame.apply(spin)
         arm = -R.apply(joint.child_position)
         v_joint = parent.v + np.cross(parent.w, at) + frame.apply(slide)
-        found[joint.child] = BodyStart(parent.p + at + arm, R, v_joint + np.cross(w, arm), w)
-    return found
+        placed[joint.child] = BodyStart(parent.p + at + arm, R, v_joint + np.cross(w, arm), w)
+    return placed
 
 
 def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Array]:
-    """Shift, turn and their rates of the child, in the axes that it has at q = 0."""
+    """Shift, rotation, velocity and angular velocity of the child, in the axes that it has at q = 0."""
     none, still = np.zeros(3), Rotation.identity()
     e1, e2, e3 = joint.child_frame.copy().T
     if joint.kind == "revolute":
@@ -197,7 +199,7 @@ def _moved(joint: Joint, q: Array, v: Array) -> tuple[Array, Rotation, Array, Ar
 
 
 def made_bodies(mechanism: Mechanism, allow_planar: bool) -> list[GeneralBody | Planar]:
-    """The bodies, plane ones with three coordinates where that is allowed."""
+    """Bodies of route 2; with ``allow_planar``, those of a planar mechanism have three coordinates."""
     plane = _plane(mechanism) if allow_planar else None
     if plane is None:
         return [GeneralBody(body.mass, np.array(body.inertia)) for body in mechanism.bodies]
@@ -215,7 +217,7 @@ def made_bodies(mechanism: Mechanism, allow_planar: bool) -> list[GeneralBody | 
 
 
 def _plane(mechanism: Mechanism) -> Array | None:
-    """Frame of the plane in which all bodies move, its normal last; None where they do not."""
+    """Frame of the plane in which all bodies move, as columns with the normal last; None: they do not."""
     placed = placed_bodies(mechanism)
     axes = [(joint, placed[joint.child].R.apply(joint.child_frame[:, 2].copy())) for joint in mechanism.joints]
     normals = [axis for joint, axis in axes if joint.kind in {"revolute", "planar"}]
@@ -230,5 +232,5 @@ def _plane(mechanism: Mechanism) -> Array | None:
 
 
 def clean(vector: Any) -> list[float]:
-    """Plain floats, with the round-off of a rotation removed from zeros and ones, so that they fold."""
+    """Plain floats, with round-off removed from zeros and ones so that they fold."""
     return [float(round(x)) if abs(x - round(x)) < 1e-15 else float(x) for x in vector]

@@ -1,8 +1,7 @@
-"""Route 2 of the truth: every body alone in space, held by constraint rows; no joint coordinate, no tree.
+"""Route 2 of the truth: separate bodies held by constraint rows, without joint coordinates and tree.
 
-It shares no kinematics with route 1. Taylor series (heyoka) integrate it where they can; DOP853 with projection, its
-rank fixed at the start and violations eliminated after each step, where rows are needed that depend on each other or
-heyoka is absent.
+It shares no kinematics with route 1. Taylor series (heyoka) integrate it; without heyoka, or with dependent rows,
+DOP853 with projection: the rank is fixed at the start, and violations are eliminated after each step.
 """
 
 from __future__ import annotations
@@ -27,13 +26,23 @@ from proofroll.truth.mechanism.maximal_bodies import BodyInScalars
 from proofroll.truth.mechanism.maximal_equations import ConstrainedEquations, MaximalEquations, Switched
 from proofroll.truth.mechanism.maximal_taylor import MaximalTaylor
 
-BESIDE = 1e-9  # m, rad, and part of velocities: between round-off and what a growth of 1e7 makes large
-RANK = 1e-8  # see analysis.RANK; this route finds its own rank
+# Initial displacement for growth, m, rad and relative to velocities: far above round-off, small if grown by 1e7.
+BESIDE = 1e-9
+RANK = 1e-8  # see analysis.RANK; this route determines its own rank
 
 
 @dataclass(frozen=True)
 class Solved:
-    """Accelerations u̇ and multipliers at one state, with what eliminates violations."""
+    """Accelerations u̇ and multipliers at one state, with matrices that eliminate violations.
+
+    Attributes:
+        equations: rows and loads at this state.
+        acceleration: u̇, (nu).
+        multipliers: one for each row.
+        C: all rows, (rows, nu).
+        residual: Φ of the rows.
+        into, back: −into @ back @ r is the change along u that removes a violation r of the rows.
+    """
 
     equations: ConstrainedEquations
     acceleration: Array
@@ -45,22 +54,22 @@ class Solved:
 
 
 class NumericEquations:
-    """The equations of :class:`MaximalEquations` in numbers, solved by projection with a fixed rank."""
+    """Equations of :class:`MaximalEquations` in numbers, solved by projection with a fixed rank."""
 
     def __init__(self, equations: MaximalEquations) -> None:
         self.equations = equations
         self._switched: Switched | None = None
         mass = equations.mass_matrix.copy()
-        mass[equations.light, equations.light] += max(equations.usual)  # only the scale of rows hangs on it
+        mass[equations.light, equations.light] += max(equations.usual)  # only the scale of the rows depends on it
         self._inverse_root = np.linalg.inv(np.linalg.cholesky(mass)).T
         self.rank = self._rank(self.equations.start())
 
     def switched(self, state: Array, switched: Switched) -> NumericEquations:
-        """The same equations while joints hold or push so; their rank is that at ``state``."""
-        found = copy(self)
-        found._switched = switched
-        found.rank = found._rank(state)
-        return found
+        """Copy of the equations with joints held or pushed; their rank is that at ``state``."""
+        other = copy(self)
+        other._switched = switched
+        other.rank = other._rank(state)
+        return other
 
     def _rank(self, state: Array) -> int:
         C = self._matrix(self.equations.at(state.tolist(), switched=self._switched).rows)
@@ -68,47 +77,47 @@ class NumericEquations:
         return int((values > RANK * values.max(initial=0.0)).sum())
 
     def independent_rows(self) -> list[int]:
-        """Numbers of as many rows as the rank, the most independent ones at the start."""
+        """Indices of linearly independent rows, as many as the rank, chosen by pivoting at the start."""
         C = self._matrix(self.equations.at(self.equations.start().tolist()).rows) @ self._inverse_root
         if not C.size:
             return []
         return sorted(qr(C.T, mode="r", pivoting=True)[1][: self.rank].tolist())
 
     def solve(self, state: Array, time: float = 0.0, applied: Array | None = None) -> Solved:
-        """Accelerations and multipliers at a time [s], the smallest where rows depend on each other.
+        """Accelerations and multipliers at a time [s]; of dependent rows, the multipliers of least norm.
 
         ``applied``: further forces and moments about the centres of mass, world axes, (bodies, 6).
         """
-        found = self.equations.at(state.tolist(), switched=self._switched, time=time)
-        C, (half, force) = self._matrix(found.rows), self._driven(found)
+        constrained = self.equations.at(state.tolist(), switched=self._switched, time=time)
+        C, (half, force) = self._matrix(constrained.rows), self._driven(constrained)
         if applied is not None:
-            force = force + self.equations.projected(found.views, applied)
+            force = force + self.equations.projected(constrained.views, applied)
         free = half.T @ force
-        residual = np.array([row.residual for row in found.rows], dtype=float)
+        residual = np.array([row.residual for row in constrained.rows], dtype=float)
         if self._switched is not None and self._switched.held:
-            residual[-len(self._switched.held) :] = 0.0  # joints are held where they are, not at zero
+            residual[-len(self._switched.held) :] = 0.0  # held where they are, not at zero
         if not self.rank:
             return Solved(
-                found, half @ free, np.zeros(len(C)), C, residual, np.zeros((len(half), 0)), np.zeros((0, len(C)))
+                constrained, half @ free, np.zeros(len(C)), C, residual, np.zeros((len(half), 0)), np.zeros((0, len(C)))
             )
         U, S, Vt = np.linalg.svd(C @ half, full_matrices=False)
         locked, back = Vt[: self.rank], U[:, : self.rank].T / S[: self.rank, None]
-        normal = -back @ np.array([row.bias for row in found.rows], dtype=float) - locked @ free
+        normal = -back @ np.array([row.bias for row in constrained.rows], dtype=float) - locked @ free
         into = half @ locked.T
-        return Solved(found, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
+        return Solved(constrained, half @ free + into @ normal, back.T @ normal, C, residual, into, back)
 
     def loaded(
         self, state: Array, time: float = 0.0, switched: Switched | None = None
     ) -> tuple[ConstrainedEquations, Array, Array, Array, Array]:
-        """Equations at a state and a time [s]: their rows C and biases, H with M⁻¹ = H Hᵀ, and the forces."""
-        found = self.equations.at(state.tolist(), switched=switched, time=time)
-        bias = np.array([row.bias for row in found.rows], dtype=float)
-        return found, self._matrix(found.rows), bias, *self._driven(found)
+        """Equations at a state and a time [s], their rows C and biases, H with M⁻¹ = H Hᵀ, and the loads."""
+        constrained = self.equations.at(state.tolist(), switched=switched, time=time)
+        bias = np.array([row.bias for row in constrained.rows], dtype=float)
+        return constrained, self._matrix(constrained.rows), bias, *self._driven(constrained)
 
-    def _driven(self, found: ConstrainedEquations) -> tuple[Array, Array]:
-        """H with M⁻¹ = H Hᵀ, and the forces, with the armature of joints in both."""
-        half, force = self._inverse_root, np.array(found.force, dtype=float)
-        if added := [*found.drives, *found.holders]:
+    def _driven(self, constrained: ConstrainedEquations) -> tuple[Array, Array]:
+        """H with M⁻¹ = H Hᵀ, and loads; both include the armature of joints."""
+        half, force = self._inverse_root, np.array(constrained.force, dtype=float)
+        if added := [*constrained.drives, *constrained.holders]:
             G = self._matrix([drive.row for drive in added])
             inertia = np.array([drive.inertia for drive in added])
             half = np.linalg.inv(np.linalg.cholesky(self.equations.mass_matrix + (G.T * inertia) @ G)).T
@@ -116,15 +125,15 @@ class NumericEquations:
         return half, force
 
     def struck(self, state: Array, held: Sequence[int], after: Sequence[float]) -> tuple[Array, Array]:
-        """Velocities u after an impact that gives joints these speeds along their coordinates, and its impulses there.
+        """Velocities u after an impact that gives joints prescribed speeds, and its impulses along their coordinates.
 
         Args:
-            state: before it.
-            held: numbers of the joints.
-            after: m/s or rad/s.
+            state: before the impact.
+            held: indices of the joints.
+            after: their speeds after the impact, m/s or rad/s.
         """
-        found = self.equations.at(state.tolist(), switched=Switched(tuple(held)))
-        A, (half, _) = self._matrix(found.rows), self._driven(found)
+        constrained = self.equations.at(state.tolist(), switched=Switched(tuple(held)))
+        A, (half, _) = self._matrix(constrained.rows), self._driven(constrained)
         e = self.equations
         u = state[e.nx : e.nx + e.nu]
         target = np.append(np.zeros(len(A) - len(held)), after)
@@ -133,7 +142,10 @@ class NumericEquations:
         return u + half @ change, (inverse.T @ change)[len(A) - len(held) :]
 
     def along(self, state: Array, joints: Sequence[int]) -> tuple[Array, Array]:
-        """Coordinates and rates of joints with one coordinate, rad or m and per s; angles are those that are kept."""
+        """Coordinates and rates of joints with one coordinate, rad or m and per s.
+
+        Angles that are integrated count whole turns.
+        """
         e = self.equations
         rows = e.rate_rows(state.tolist(), joints)
         rates = self._matrix(rows) @ state[e.nx : e.nx + e.nu]
@@ -142,7 +154,7 @@ class NumericEquations:
         return np.array(places, dtype=float), np.asarray(rates, dtype=float)
 
     def normalised(self, state: Array) -> Array:
-        """The state with quaternions of unit length."""
+        """State with quaternions of unit length."""
         state = state.copy()
         for body, at in zip(self.equations.bodies, self.equations.x_slices, strict=True):
             if body.nx == 7:
@@ -150,36 +162,37 @@ class NumericEquations:
         return state
 
     def rate(self, time: float, state: Array) -> Array:
-        """Right-hand side."""
+        """Time derivative of a state."""
         e, unit = self.equations, self.normalised(state)
-        found = self.solve(unit, time)
+        solved = self.solve(unit, time)
         x, u = state[: e.nx], unit[e.nx : e.nx + e.nu]
         moving = [
             value
             for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True)
             for value in body.rate(x[at_x].tolist(), u[at_u].tolist())
         ]
-        return np.array([*moving, *found.acceleration, *found.equations.angle_rate], dtype=float)
+        return np.array([*moving, *solved.acceleration, *solved.equations.angle_rate], dtype=float)
 
     def eliminated(self, state: Array) -> Array:
-        """The state with violations of rows and of unit quaternions removed."""
+        """State without violations of rows and of unit quaternions."""
         e, state = self.equations, self.normalised(state)
-        found = self.solve(state)
+        solved = self.solve(state)
         u = state[e.nx : e.nx + e.nu]
-        back = -found.into @ (found.back @ found.residual)
+        back = -solved.into @ (solved.back @ solved.residual)
         for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True):
             state[at_x] += np.array(body.rate(state[at_x].tolist(), back[at_u].tolist()), dtype=float)
-        u -= found.into @ (found.back @ (found.C @ u))
+        u -= solved.into @ (solved.back @ (solved.C @ u))
         return self.normalised(state)
 
     def beside(self, state: Array, by: float) -> Array:
-        """A state moved by so much, m and rad, with velocities changed by as much of themselves, as the rows allow."""
+        """State displaced by about ``by``, m and rad, with velocities changed by that fraction, as the rows allow."""
         e, state = self.equations, state.copy()
-        ways = by * (1.0 + np.modf(np.arange(1, e.nu + 1) * 0.6180339887498949)[0])  # golden ratio: no two alike
+        # all different, by the golden ratio
+        ways = by * (1.0 + np.modf(np.arange(1, e.nu + 1) * 0.6180339887498949)[0])
         for body, at_x, at_u in zip(e.bodies, e.x_slices, e.u_slices, strict=True):
             state[at_x] += np.array(body.rate(state[at_x].tolist(), ways[at_u].tolist()), dtype=float)
         state[e.nx : e.nx + e.nu] *= 1.0 + ways
-        for _ in range(3):  # Newton's method doubles the digits
+        for _ in range(3):  # Newton's method doubles the number of digits
             state = self.eliminated(state)
         return state
 
@@ -192,11 +205,11 @@ class NumericEquations:
 
 
 class MaximalCoordinates:
-    """Route 2 for one mechanism.
+    """Route 2 of one mechanism.
 
     Args:
-        mechanism: see :class:`~proofroll.truth.mechanism.maximal_equations.MaximalEquations` for what is refused.
-        equations: of it.
+        mechanism: any mechanism.
+        equations: class of its equations.
     """
 
     def __init__(self, mechanism: Mechanism, equations: type[MaximalEquations] = MaximalEquations) -> None:
@@ -206,13 +219,17 @@ class MaximalCoordinates:
         self._compiled: dict[bool, MaximalTaylor] = {}
 
     def taylor(self, long_double: bool = False) -> MaximalTaylor:
-        """The compiled integrator; the first call compiles, seconds. Raises Missing if heyoka is not installed."""
+        """Compiled integrator; the first call compiles it, which takes seconds.
+
+        Raises:
+            Missing: heyoka is not installed.
+        """
         if long_double not in self._compiled:
             self._compiled[long_double] = MaximalTaylor(self.lean.equations, self.lean.independent_rows(), long_double)
         return self._compiled[long_double]
 
     def run_taylor(self, times: Array, long_double: bool = False) -> Record:
-        """The motion at the given times, s, by Taylor series.
+        """Motion at the given times, s, by Taylor series.
 
         Raises:
             Refused: the mechanism has dry friction, which switches.
@@ -223,7 +240,7 @@ class MaximalCoordinates:
         return self.recorded(times, np.asarray(self.taylor(long_double).run(times), dtype=float))
 
     def run_dop853(self, times: Array, tolerance: float = 1e-14) -> Record:
-        """The motion at the given times, s, by DOP853 with projection.
+        """Motion at the given times, s, by DOP853 with projection.
 
         Raises:
             Refused: the mechanism has dry friction, which switches.
@@ -233,9 +250,9 @@ class MaximalCoordinates:
         return self.recorded(times, self._dop853(self.lean.equations.start(), times, tolerance))
 
     def growth(self, times: Array) -> Array:
-        """Growth of the distance from a motion that starts beside this one, at the given times, s.
+        """Growth of the distance to a neighbouring motion at the given times, s: multiple of the initial distance.
 
-        The start is moved in all ways that the rows allow, by far more than round-off, so that this hangs on none.
+        The start is perturbed in all directions that the rows allow, by far more than round-off.
 
         Raises:
             Diverged: an integration stops.
@@ -264,16 +281,16 @@ class MaximalCoordinates:
         switched: Sequence[Switched] | None = None,
         applied: Sequence[Array] | None = None,
     ) -> Record:
-        """Record of the states, with the modes of switched joints; reactions come from the complete rows.
+        """Record of the states, with the modes of switched joints; reactions follow from the rows in space.
 
-        ``applied``: forces and moments about the centres of mass, world axes, (bodies, 6), besides the mechanism's own.
+        ``applied``: additional forces and moments about the centres of mass, world axes, (bodies, 6).
         """
         modes = [None] * len(states) if switched is None else switched
         more = [None] * len(states) if applied is None else applied
         each = zip(times, states, modes, more, strict=True)
-        found = gathered(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in each])
-        q, v = found.placed(self.mechanism).of_tree()
-        return replace(found, q=q, v=v)
+        record = gathered(times, [self._sample(float(t), self.lean.normalised(y), mode, w) for t, y, mode, w in each])
+        q, v = record.placed(self.mechanism).of_tree()
+        return replace(record, q=q, v=v)
 
     def _sample(
         self, time: float, state: Array, switched: Switched | None = None, applied: Array | None = None
@@ -282,7 +299,7 @@ class MaximalCoordinates:
         views = lean.at(state.tolist()).views
         whole = self._complete(views, state[lean.nx + lean.nu :])
         equations = self._whole if switched is None else self._whole.switched(whole, switched)
-        found = equations.solve(whole, time, applied)
+        solved = equations.solve(whole, time, applied)
         u = whole[self._whole.equations.nx :][: self._whole.equations.nu]
         n = len(self.mechanism.bodies)
         arms = [np.array(view.R) @ body.com for view, body in zip(views, self.mechanism.bodies, strict=False)]
@@ -291,15 +308,15 @@ class MaximalCoordinates:
             "v_WB": np.array([np.array(views[i].v) - np.cross(views[i].w, arms[i]) for i in range(n)]),
             "q_WB": whole[: 7 * n].reshape(n, 7)[:, 3:],
             "w_WB": np.array([views[i].w for i in range(n)], dtype=float),
-            "q": [],  # they follow from the poses of all times
+            "q": [],  # set later, from the poses at all times
             "v": [],
-            "wrench": self._wrenches(found),
-            "named": self._named(found, switched or Switched()),
-            "residual": np.array([np.abs(found.residual).max(initial=0.0), np.abs(found.C @ u).max(initial=0.0)]),
+            "wrench": self._wrenches(solved),
+            "named": self._named(solved, switched or Switched()),
+            "residual": np.array([np.abs(solved.residual).max(initial=0.0), np.abs(solved.C @ u).max(initial=0.0)]),
         }
 
     def _complete(self, views: list[BodyInScalars], angles: Array) -> Array:
-        """The state of bodies with all their coordinates."""
+        """State with seven coordinates for each body, also for planar ones."""
         x: list[float] = []
         u: list[float] = []
         for view in views[:-1]:
@@ -308,25 +325,25 @@ class MaximalCoordinates:
             u += [*view.v, *R.inv().apply(np.array(view.w, dtype=float))]
         return np.array([*x, *u, *angles])
 
-    def _wrenches(self, found: Solved) -> Array:
+    def _wrenches(self, solved: Solved) -> Array:
         wrenches = np.zeros((len(self._whole.equations.connections), 6))
-        for row, multiplier in zip(found.equations.rows, found.multipliers, strict=True):
+        for row, multiplier in zip(solved.equations.rows, solved.multipliers, strict=True):
             wrenches[row.connection] += multiplier * np.array([*row.force, *row.torque])
             if row.besides is not None:
                 wrenches[row.besides[0]] += multiplier * np.array([*row.besides[1], *row.besides[2]])
-        for row, inertia in found.equations.drives:
-            rate = sum(value * found.acceleration[k] for k, value in row.coefficients.items()) + row.bias
+        for row, inertia in solved.equations.drives:
+            rate = sum(value * solved.acceleration[k] for k, value in row.coefficients.items()) + row.bias
             wrenches[row.connection] -= inertia * rate * np.array([*row.force, *row.torque])
-        for number, (force, moment) in enumerate(found.equations.laws):
+        for number, (force, moment) in enumerate(solved.equations.laws):
             wrenches[number] += np.array([*force, *moment])
         return wrenches
 
-    def _named(self, found: Solved, switched: Switched) -> Array:
+    def _named(self, solved: Solved, switched: Switched) -> Array:
         fields = {name: np.zeros(count) for name, count in lengths(self.mechanism).items()}
-        fields["effort"][:] = found.equations.efforts
-        held = len(found.multipliers) - len(switched.held)
-        fields["coupling"][:] = found.multipliers[held - len(fields["coupling"]) : held]
-        holding = dict(zip(switched.held, found.multipliers[held:], strict=True))
+        fields["effort"][:] = solved.equations.efforts
+        held = len(solved.multipliers) - len(switched.held)
+        fields["coupling"][:] = solved.multipliers[held - len(fields["coupling"]) : held]
+        holding = dict(zip(switched.held, solved.multipliers[held:], strict=True))
         for number, joint in enumerate(self.mechanism.joints):
             force = holding.get(number, switched.push.get(number, 0.0))
             on = on_joint(number in switched.stopped, joint.friction, force)

@@ -1,6 +1,6 @@
-"""Equations of route 2: forces and constraint rows of bodies that are each alone in space.
+"""Equations of route 2: loads and constraint rows of separate bodies.
 
-They are written once in plain additions and multiplications, so that numbers, long doubles and symbols pass through.
+They are written once in plain additions and multiplications, for numbers, long doubles and symbols.
 """
 
 import math
@@ -26,20 +26,20 @@ FUNCTIONS: Mapping[str, Callable[[Any], Any]] = {name: getattr(math, name) for n
 
 
 class Drive(NamedTuple):
-    """The armature of a joint whose rate is Σ coefficient·u of the row: λ = −inertia·(Σ coefficient·u̇ + bias)."""
+    """Armature of a joint with the rate Σ coefficient·u of the row: λ = −inertia·(Σ coefficient·u̇ + bias)."""
 
     row: ConstraintRow
     inertia: float
 
 
 class Switched(NamedTuple):
-    """Present state of joints and efforts that switch.
+    """Present state of switched joints and efforts.
 
     Attributes:
-        held: numbers of the joints whose coordinates do not move.
+        held: indices of the joints whose coordinates do not move.
         stopped: those of them that a stop holds.
-        push: number of a joint -> further force along its coordinate, N or N m.
-        clamped: number of an actuator -> its effort, which is at its limit.
+        push: index of a joint -> additional force along its coordinate, N or N m.
+        clamped: index of an actuator at its limit -> its effort, N or N m.
     """
 
     held: tuple[int, ...] = ()
@@ -50,11 +50,20 @@ class Switched(NamedTuple):
 
 @dataclass(frozen=True)
 class ConstrainedEquations:
-    """M u̇ = force + Cᵀλ, C u̇ + bias = 0, and the rates of coordinates and of angles that springs remember.
+    """Equations M u̇ = force + Cᵀλ, C u̇ + bias = 0 at one state, with the rates of all coordinates.
 
-    ``drives``: the armature of joints. ``holders``: rows that hold a body without inertia, each as a drive; rows are
-    obeyed, so that it changes nothing but M, which alone has no inverse. ``laws``: force and moment of each joint's own
-    spring, damper, drive and actuators on its child, at the joint, world axes. ``efforts``: of each actuator.
+    Attributes:
+        rows: C, with residuals and biases.
+        force: loads along u, with gyroscopic forces.
+        rate: rates of the coordinates.
+        angle_rate: rates of the angles that are integrated to count turns.
+        views: poses and velocities of the bodies, the ground last.
+        laws: force and moment of each joint's spring, damper, drive and actuators on its child, at the joint, world
+            axes.
+        efforts: of each actuator, N or N m.
+        drives: armature of joints.
+        holders: the rows of bodies without inertia, as drives: as all rows are satisfied, they change only M, and make
+            it invertible.
     """
 
     rows: list[ConstraintRow]
@@ -69,14 +78,11 @@ class ConstrainedEquations:
 
 
 class MaximalEquations:
-    """The mechanism as bodies, connections and springs.
+    """Equations of a mechanism as separate bodies, connections and springs.
 
     Args:
-        mechanism: any.
-        allow_planar: give bodies of plane mechanisms three coordinates; their rows are those within the plane.
-
-    Raises:
-        Refused: the mechanism has something of that.
+        mechanism: any mechanism.
+        allow_planar: give the bodies of a planar mechanism three coordinates; its rows are those within the plane.
     """
 
     def __init__(self, mechanism: Mechanism, allow_planar: bool) -> None:
@@ -88,7 +94,7 @@ class MaximalEquations:
         self._light = {number for number, body in enumerate(self.bodies) if not body.heavy}
         self.light = [k for number in sorted(self._light) for k in range(self.nu)[self.u_slices[number]]]
         heavy = [body for number, body in enumerate(mechanism.bodies) if number not in self._light]
-        # kg and kg m² of the holders: any will do, those of the mechanism cost the fewest digits
+        # mass and inertia of the holders, kg and kg m²: any values will do; typical ones lose the fewest digits
         self.usual = (
             float(np.median([body.mass for body in heavy] or [1.0])),
             float(np.median([np.trace(body.inertia) / 3 for body in heavy] or [1.0])),
@@ -107,7 +113,7 @@ class MaximalEquations:
         for number, actuator in enumerate(mechanism.actuators):
             self._motors.setdefault(mechanism.joint_index[actuator.joint], []).append(number)
         held = {mechanism.joint_index[actuator.joint] for actuator in mechanism.actuators if actuator.kp}
-        # a spring on an angle needs its turns, which no attitude remembers
+        # a spring on an angle counts whole turns, which an attitude does not
         self.angles = [
             (k, n)
             for k, joint in enumerate(mechanism.joints)
@@ -116,7 +122,7 @@ class MaximalEquations:
         ]
 
     def start(self) -> Array:
-        """Coordinates, velocities, remembered angles at the start, one after the other."""
+        """Coordinates, velocities and integrated angles at the start, one after the other."""
         placed = placed_bodies(self.mechanism)
         starts = [
             body.start(placed[data.name], np.array(data.com))
@@ -132,9 +138,9 @@ class MaximalEquations:
         switched: Switched | None = None,
         time: Scalar = 0.0,
     ) -> ConstrainedEquations:
-        """The equations for a state as :meth:`start` gives it, of any scalars; quaternions of unit length.
+        """Equations for a state as of :meth:`start`, of any scalars, with unit quaternions.
 
-        Rows of couplings come after those of connections, rows of ``switched`` joints that hold last.
+        Rows of couplings come after those of connections; rows of held ``switched`` joints come last.
         """
         switched = switched or Switched()
         x, u, angles = state[: self.nx], state[self.nx : self.nx + self.nu], state[self.nx + self.nu :]
@@ -151,7 +157,7 @@ class MaximalEquations:
         efforts: list[Scalar] = [0.0] * len(self.mechanism.actuators)
 
         def effort(number: int, q: Scalar, speed: Scalar) -> Scalar:
-            """Force along a joint's coordinate besides its spring and damper."""
+            """Force of drive and actuators along a joint's coordinate, without its spring and damper."""
             for motor in self._motors.get(number, ()):
                 actuator = self.mechanism.actuators[motor]
                 clamped = switched.clamped.get(motor)
@@ -193,14 +199,14 @@ class MaximalEquations:
         return ConstrainedEquations(rows, force, rate, angle_rate, views, laws, efforts, drives, holders)
 
     def projected(self, views: Sequence[BodyInScalars], applied: Array) -> Array:
-        """Forces and moments about the centres of mass, world axes, (bodies, 6), as forces along the velocities."""
+        """Generalised forces along u of forces and moments about the centres of mass, world axes, (bodies, 6)."""
         bodies = zip(self.bodies, views, applied.tolist(), strict=False)
         return np.array(
             [entry for body, view, one in bodies for entry in body.projected(view, one[:3], one[3:])], float
         )
 
     def rate_rows(self, state: Sequence[Scalar], joints: Sequence[int]) -> list[ConstraintRow]:
-        """Rates of revolute and prismatic joints as rows; of a prismatic one the residual is the coordinate."""
+        """Rates of revolute and prismatic joints as rows; the residual of a prismatic one is the coordinate."""
         made = self._rows(self._views(state, FUNCTIONS))
         return [made.of_rate(number, self.mechanism.joints[number].kind) for number in joints]
 
@@ -208,13 +214,13 @@ class MaximalEquations:
         return ConstraintRows(self.bodies, self.u_slices, self.connections, views)
 
     def _coupled(self, made: ConstraintRows, coupling: Coupling) -> ConstraintRow:
-        """A coupling as a row on rates; that it holds between coordinates follows from the start."""
+        """Row of a coupling, on rates; between the coordinates it holds because it does at the start."""
         a, b = (self.mechanism.joint_index[name] for name in (coupling.joint_a, coupling.joint_b))
         one, two = (made.of_rate(number, self.mechanism.joints[number].kind) for number in (a, b))
         return two.less(coupling.ratio, one)
 
     def _views(self, state: Sequence[Scalar], functions: Mapping[str, Any]) -> list[BodyInScalars]:
-        """All bodies, the ground last."""
+        """Poses and velocities of all bodies, the ground last."""
         x, u = state[: self.nx], state[self.nx : self.nx + self.nu]
         views = [
             body.view(x[at_x], u[at_u], functions)
@@ -225,7 +231,7 @@ class MaximalEquations:
     def connection(
         self, kind: str, a: str, b: str, at_a: Sequence[float], at_b: Sequence[float], frame_a: Array, frame_b: Array
     ) -> Connection:
-        """A connection of two bodies, by their names, with its places and axes in them."""
+        """Connection of two named bodies, from its places and axes in their frames."""
         index = self.mechanism.body_index
         places = (self._place(a, at_a), self._place(b, at_b))
         frames = ([clean(row) for row in frame] for frame in (frame_a, frame_b))
@@ -243,7 +249,7 @@ class MaximalEquations:
         arm: Sequence[Scalar],
         moment: Sequence[Scalar] = NONE,
     ) -> None:
-        """Adds a force at an arm from the centre of mass, and a moment, to the forces along the velocities."""
+        """Adds a force at an arm from the centre of mass, and a moment, to the loads along u."""
         if body < 0:
             return
         entries = self.bodies[body].projected(views[body], push, plus(cross(arm, push), moment))
@@ -260,9 +266,13 @@ class MaximalEquations:
         effort: Callable[[int, Scalar, Scalar], Scalar],
         acts: bool,
     ) -> tuple[tuple[list[Scalar], list[Scalar]], list[Scalar]]:
-        """Force and moment of a joint's own laws and its actuators on its child, added to the forces; angle rates.
+        """Adds the spring, damper and actuators of a joint to the loads.
 
-        ``effort`` says what acts along a coordinate besides spring and damper, ``acts`` whether more than a drive does.
+        ``effort``: force along a coordinate from drive and actuators. ``acts``: True if it is not zero and not the
+        drive alone.
+
+        Returns:
+            Force and moment on the child at the joint, and rates of the integrated angles.
         """
         joint, a, b = self.mechanism.joints[number], views[c.a], views[c.b]
         push: list[Scalar] = [0.0, 0.0, 0.0]

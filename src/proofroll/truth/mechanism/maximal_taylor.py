@@ -1,7 +1,7 @@
-"""The equations of route 2 as symbols, integrated by Taylor series (heyoka, an extra).
+"""Equations of route 2 as symbols, integrated by Taylor series (heyoka, an extra).
 
-The multipliers are solved for in symbols: C M⁻¹ Cᵀ = L D Lᵀ, sparse, eliminated in an order of little fill. That needs
-rows that do not depend on each other; they are chosen once, at the start.
+The multipliers are eliminated symbolically: C M⁻¹ Cᵀ = L D Lᵀ, sparse, in an order of little fill. That needs linearly
+independent rows; they are chosen once, at the start.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,11 +22,11 @@ except ImportError:  # no wheel for this platform
 
 
 class MaximalTaylor:
-    """A compiled integrator of a mechanism; it starts anew on every run.
+    """Compiled integrator of a mechanism; every run starts anew.
 
     Args:
-        equations: the mechanism's.
-        rows: numbers of constraint rows that do not depend on each other and imply all others.
+        equations: of the mechanism.
+        rows: indices of linearly independent constraint rows that imply all others.
         long_double: compute in long doubles.
 
     Raises:
@@ -44,19 +44,19 @@ class MaximalTaylor:
             self._start,
             fp_type=self._number,
             compact_mode=True,
-            opt_level=0,  # optimised, it takes two to ten times as long to compile, which a run does not earn back
+            opt_level=0,  # optimised code takes two to ten times as long to compile, which no run earns back
         )
 
     def run(self, times: Array, start: Array | None = None) -> Array:
         """States at the given times, s, (times, state), from the mechanism's own start or another.
 
         Raises:
-            Diverged: the integration stops before the last.
+            Diverged: the integration stops before the last time.
         """
         integrator = self._integrator
         integrator.state[:] = self._start if start is None else start
         integrator.time = self._number(0)
-        grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka begins its grid where it stands
+        grid = np.array([self._number(time) for time in [0.0, *times]])  # heyoka's grid starts at its present time
         grid, first = (grid[1:], 0) if times[0] == 0 else (grid, 1)
         outcome, *_, states = integrator.propagate_grid(grid)
         states = states[first:]
@@ -66,7 +66,7 @@ class MaximalTaylor:
 
 
 def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable[[Array], Array]:
-    """Rates of many states at once, each with its time behind it, (states, n + 1) -> (states, n).
+    """Compiled rates of many states at once; the last column is the time [s]: (states, n + 1) -> (states, n).
 
     Raises:
         Missing: heyoka is not installed.
@@ -80,24 +80,25 @@ def compiled_rates(equations: MaximalEquations, rows: Sequence[int]) -> Callable
 
 
 def _in_symbols(equations: MaximalEquations, rows: Sequence[int], time: Any) -> tuple[list[Any], list[Scalar]]:
-    """Variables of a state, and its rates as expressions of them."""
+    """Variables of a state, and its rates as expressions in them."""
     state = [heyoka.make_vars(f"s{place}") for place in range(len(equations.start()))]
-    found = equations.at(state, {name: getattr(heyoka, name) for name in FUNCTIONS}, time=time)
-    return state, [*found.rate, *accelerations(equations, found, [found.rows[k] for k in rows]), *found.angle_rate]
+    at_state = equations.at(state, {name: getattr(heyoka, name) for name in FUNCTIONS}, time=time)
+    u_rate = accelerations(equations, at_state, [at_state.rows[k] for k in rows])
+    return state, [*at_state.rate, *u_rate, *at_state.angle_rate]
 
 
 def accelerations(
-    equations: MaximalEquations, found: ConstrainedEquations, rows: Sequence[ConstraintRow]
+    equations: MaximalEquations, constrained: ConstrainedEquations, rows: Sequence[ConstraintRow]
 ) -> list[Scalar]:
-    """u̇ = M⁻¹(force + Cᵀλ), λ from (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force, solved sparsely in the scalars themselves.
+    """Accelerations u̇ = M⁻¹(force + Cᵀλ), with (C M⁻¹ Cᵀ) λ = −bias − C M⁻¹ force solved sparsely in scalars.
 
-    A drive is one row more, which yields by λ/inertia. Accelerations of bodies without inertia, whose M has no inverse,
-    are unknowns beside λ: C₀ᵀλ − M₀u̇₀ = −force₀.
+    A drive is an additional row with compliance 1/inertia. Accelerations u̇₀ of bodies without inertia, whose M is
+    singular, are additional unknowns: C₀ᵀλ − M₀u̇₀ = −force₀.
     """
-    held, drives = len(rows), [*found.drives, *found.holders]
+    held, drives = len(rows), [*constrained.drives, *constrained.holders]
     rows = [*rows, *(drive.row for drive in drives)]
     blocks = _inverse_blocks(equations)
-    free = [add(*(mul(value, found.force[k]) for k, value in block)) for block in blocks]
+    free = [add(*(mul(value, constrained.force[k]) for k, value in block)) for block in blocks]
     weighted = [_times(row.coefficients, blocks) for row in rows]  # rows of C M⁻¹
     m = len(rows)
     touching = [set(weight) for weight in weighted]
@@ -113,7 +114,7 @@ def accelerations(
     right = [
         sub(sub(0.0, row.bias), add(*(mul(value, free[k]) for k, value in row.coefficients.items()))) for row in rows
     ]
-    right += [sub(0.0, found.force[k]) for k in equations.light]
+    right += [sub(0.0, constrained.force[k]) for k in equations.light]
     unknowns = _solved(A, right, after)
     result = list(free)
     for weight, multiplier in zip(weighted, unknowns, strict=False):
@@ -127,10 +128,10 @@ def accelerations(
 def _of_light_bodies(
     A: dict[tuple[int, int], Scalar], equations: MaximalEquations, rows: Sequence[ConstraintRow], held: int
 ) -> dict[int, set[int]]:
-    """Adds the columns of u̇₀ to A; which unknown comes after which others, for no pivot to be zero.
+    """Adds the columns of u̇₀ to A; returns the unknowns that must be eliminated before each unknown.
 
-    Drives go before the accelerations that they hold, and these before the multipliers of the first ``held`` rows: M
-    plus the drives is positive definite.
+    Drives come before the accelerations that they hold, and these before the multipliers of the first ``held`` rows.
+    Then no pivot is zero, as M plus the drives is positive definite.
     """
     after: dict[int, set[int]] = {}
     for p, k in enumerate(equations.light, len(rows)):
@@ -145,7 +146,7 @@ def _of_light_bodies(
 
 
 def _inverse_blocks(equations: MaximalEquations) -> list[list[tuple[int, float]]]:
-    """Rows of M⁻¹ by what is not zero; of bodies without inertia they are empty."""
+    """Rows of M⁻¹ by their nonzero entries; empty for bodies without inertia."""
     blocks: list[list[tuple[int, float]]] = [[] for _ in range(equations.nu)]
     for body, at in zip(equations.bodies, equations.u_slices, strict=True):
         if body.heavy:
@@ -164,9 +165,9 @@ def _times(coefficients: dict[int, Scalar], blocks: list[list[tuple[int, float]]
 
 
 def _solved(A: dict[tuple[int, int], Scalar], right: list[Scalar], after: Mapping[int, set[int]]) -> list[Scalar]:
-    """X of the symmetric A x = right; A holds its lower triangle.
+    """Solution x of the symmetric A x = right; A holds the lower triangle.
 
-    Pivots are those with the fewest neighbours; each of ``after`` comes after all that it names.
+    Pivots have the fewest neighbours; ``after``: unknown -> unknowns that must be eliminated before it.
     """
     entries = {frozenset(pair): value for pair, value in A.items() if not is_zero(value)}
     neighbours: dict[int, set[int]] = {i: set() for i in range(len(right))}

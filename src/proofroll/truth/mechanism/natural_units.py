@@ -1,6 +1,6 @@
-"""Natural units of a mechanism, in which routes that switch decide: every threshold there is of the scene's own size.
+"""Natural units of a mechanism: in these, the thresholds of switching routes are relative to the scene's own scale.
 
-Units are powers of two, so that nothing is rounded on the way to them and back.
+Units are powers of two, so conversions do not round.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from proofroll.elements.mechanism.signal import FUNCTIONS, Formula, Signal, Tabl
 
 _COORDINATES = {"planar": (1, 1, 0), "free": (1, 1, 1, 0, 0, 0, 0), "prismatic": (1,)}  # powers of the length
 _VELOCITIES = _COORDINATES | {"free": (1, 1, 1, 0, 0, 0)}
-_TIME = re.compile(r"(?<=\bt = )[\d.e+-]+(?= s\b)")  # in messages of routes
+_TIME = re.compile(r"(?<=\bt = )[\d.e+-]+(?= s\b)")  # times in messages of routes
 
 
 @dataclass(frozen=True)
 class _InUnits(Formula):
-    """A formula whose time and value are in other units."""
+    """A formula with time and value in other units."""
 
     second: float = 1.0
     factor: float = 1.0
@@ -49,9 +49,9 @@ class Units(NamedTuple):
         """Unit of force [N]."""
         return self.mass * self.length / self.time**2
 
-    def mechanism(self, given: Mechanism) -> Mechanism:
-        """The mechanism in these units."""
-        to, joints = Units(1 / self.length, 1 / self.mass, 1 / self.time), {j.name: j for j in given.joints}
+    def mechanism(self, si: Mechanism) -> Mechanism:
+        """Mechanism in these units, from one in SI units."""
+        to, joints = Units(1 / self.length, 1 / self.mass, 1 / self.time), {j.name: j for j in si.joints}
         length, stiffness = to.length, to.force / to.length
 
         def placed(item: Any, *names: str) -> Any:
@@ -63,7 +63,7 @@ class Units(NamedTuple):
                 mass=body.mass * to.mass,
                 inertia=tuple(_times(row, to.mass * length**2) for row in body.inertia),
             )
-            for body in given.bodies
+            for body in si.bodies
         ]
         springs = [
             replace(
@@ -71,10 +71,10 @@ class Units(NamedTuple):
                 stiffness=spring.stiffness * stiffness,
                 damping=spring.damping * stiffness * to.time,
             )
-            for spring in given.springs
+            for spring in si.springs
         ]
         actuators = []
-        for item in given.actuators:
+        for item in si.actuators:
             way, effort = to._along(joints[item.joint])
             target = {"torque": effort, "velocity": way / to.time, "position": way}[item.kind]
             actuators.append(
@@ -87,24 +87,24 @@ class Units(NamedTuple):
                 )
             )
         couplings = []
-        for coupling in given.couplings:
+        for coupling in si.couplings:
             (a, _), (b, _) = (to._along(joints[name]) for name in (coupling.joint_a, coupling.joint_b))
             couplings.append(replace(coupling, ratio=coupling.ratio * b / a, offset=coupling.offset * b))
         return replace(
-            given,
+            si,
             bodies=tuple(bodies),
-            joints=tuple(self._joint(to, placed(joint, "position", "child_position")) for joint in given.joints),
-            loops=tuple(placed(loop, "position_a", "position_b") for loop in given.loops),
+            joints=tuple(self._joint(to, placed(joint, "position", "child_position")) for joint in si.joints),
+            loops=tuple(placed(loop, "position_a", "position_b") for loop in si.loops),
             springs=tuple(springs),
-            points=tuple(placed(point, "position") for point in given.points),
-            geometries=tuple(placed(item, "position", "radius", "axes", "size") for item in given.geometries),
+            points=tuple(placed(point, "position") for point in si.points),
+            geometries=tuple(placed(item, "position", "radius", "axes", "size") for item in si.geometries),
             actuators=tuple(actuators),
             couplings=tuple(couplings),
-            gravity=_times(given.gravity, length / to.time**2),
+            gravity=_times(si.gravity, length / to.time**2),
         )
 
-    def record(self, mechanism: Mechanism, found: Record) -> Record:
-        """The record of a mechanism (in SI units) that was made in these units."""
+    def record(self, mechanism: Mechanism, own: Record) -> Record:
+        """Record in SI units, from one in these units; ``mechanism`` is in SI units."""
         speed, moment = self.length / self.time, self.force * self.length
         q = [
             self.length**power for joint in mechanism.joints for power in _COORDINATES.get(joint.kind, (0,) * joint.nq)
@@ -112,26 +112,26 @@ class Units(NamedTuple):
         v = [self.length**power for joint in mechanism.joints for power in _VELOCITIES.get(joint.kind, (0,) * joint.nv)]
         named = [self.force if item.unit == "N" else moment for item in named_forces(mechanism)]
         return Record(
-            time=found.time * self.time,
-            p_WB=found.p_WB * self.length,
-            v_WB=found.v_WB * speed,
-            q_WB=found.q_WB,
-            w_WB=found.w_WB / self.time,
-            q=found.q * np.array(q[: found.q.shape[1]]),
-            v=found.v * (np.array(v[: found.v.shape[1]]) / self.time),
-            wrench=found.wrench * np.repeat([self.force, moment], 3),
-            named=found.named * np.array(named[: found.named.shape[1]]),
-            residual=found.residual,
+            time=own.time * self.time,
+            p_WB=own.p_WB * self.length,
+            v_WB=own.v_WB * speed,
+            q_WB=own.q_WB,
+            w_WB=own.w_WB / self.time,
+            q=own.q * np.array(q[: own.q.shape[1]]),
+            v=own.v * (np.array(v[: own.v.shape[1]]) / self.time),
+            wrench=own.wrench * np.repeat([self.force, moment], 3),
+            named=own.named * np.array(named[: own.named.shape[1]]),
+            residual=own.residual,
         )
 
     @contextmanager
     def said_in_seconds(self) -> Iterator[None]:
-        """Context in which times in messages are in these units; outside they are in seconds."""
+        """Context that converts the times in error messages from these units to seconds."""
         try:
             yield
         except (Refused, Diverged) as error:
-            said = _TIME.sub(lambda found: f"{float(found[0]) * self.time:.6g}", str(error))
-            raise type(error)(said) from None
+            message = _TIME.sub(lambda match: f"{float(match[0]) * self.time:.6g}", str(error))
+            raise type(error)(message) from None
 
     def _along(self, joint: Joint) -> tuple[float, float]:
         """Units of a joint's coordinate and of an effort along it."""
@@ -153,14 +153,14 @@ class Units(NamedTuple):
             limits=_times(joint.limits, way),
         )
 
-    def _signal(self, given: Signal, factor: float) -> Signal:
-        if isinstance(given, _InUnits):
-            return replace(given, second=given.second * self.time, factor=given.factor * factor)
-        if isinstance(given, Formula):
-            return _InUnits(given.text, given.numbers, self.time, factor)
-        if isinstance(given, Table):
-            return Table(_times(given.times, 1 / self.time), _times(given.values, factor))
-        return given * factor
+    def _signal(self, signal: Signal, factor: float) -> Signal:
+        if isinstance(signal, _InUnits):
+            return replace(signal, second=signal.second * self.time, factor=signal.factor * factor)
+        if isinstance(signal, Formula):
+            return _InUnits(signal.text, signal.numbers, self.time, factor)
+        if isinstance(signal, Table):
+            return Table(_times(signal.times, 1 / self.time), _times(signal.values, factor))
+        return signal * factor
 
 
 def natural_units(mechanism: Mechanism) -> Units:
@@ -171,7 +171,7 @@ def natural_units(mechanism: Mechanism) -> Units:
 
 
 def _times(value: Any, factor: float) -> Any:
-    """A number, several, or none of them, times a factor."""
+    """Product of a number, or of each number of a tuple, with a factor; None stays None."""
     if value is None or isinstance(value, float | int):
         return value if value is None else value * factor
     return tuple(item * factor for item in value)

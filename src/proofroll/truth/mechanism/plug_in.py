@@ -1,4 +1,4 @@
-"""The truth of a mechanism, as the harness asks for it."""
+"""Plug-in for the truth of mechanisms: dataset and error bars."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from proofroll.elements.mechanism.placed import Placed
 if TYPE_CHECKING:
     import xarray as xr
 
-# Which error bar of the routes belongs to a variable; that of energy and of rates is by what they are made from.
+# Error bar of the routes that a variable gets.
 _BARS = {
     "p_WB": "p_WB", "v_WB": "v_WB", "w_WB": "w_WB", "q_WB": "q_WB", "attitudes": "q_WB", "positions": "points",
     "forces": "wrench", "torques": "wrench", "energy": "energy", "energy_error": "energy",
@@ -35,28 +35,28 @@ _PREFIXES |= dict.fromkeys((f"{field}." for field in FIELDS), "named")
 
 
 class MechanismTruth:
-    """See :class:`proofroll.core.truth.ElementTruth`."""
+    """Plug-in; see :class:`proofroll.core.truth.ElementTruth`."""
 
     @staticmethod
     def covers(element: Element) -> bool:
-        """Every mechanism; what two routes do not cover is refused with the reason."""
+        """True for every mechanism; those that two routes do not cover are refused later, with the reason."""
         return isinstance(element, MechanismElement)
 
     @staticmethod
     def truth(element: Element, times: FloatArray, asks: Sequence[str]) -> xr.Dataset:  # noqa: ARG004 -- nothing can be asked for
-        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`; where none is unique, laws alone."""
-        # a third of a second, which no ball needs
+        """See :func:`proofroll.truth.mechanism.switched_truth.truth_of`; of motions that are not unique, laws alone."""
+        # imports of a third of a second, which no ball needs
         from proofroll.truth.mechanism.singular_poses import branching
         from proofroll.truth.mechanism.switched_truth import truth_of
 
-        assert isinstance(element, MechanismElement)  # it covers it
+        assert isinstance(element, MechanismElement)  # by ``covers``
         try:
-            found = truth_of(element.mechanism, times)
+            motion = truth_of(element.mechanism, times)
         except NotUnique as error:
             return _laws_alone(element, times, str(error))
-        record = found.record
+        record = motion.record
         wrench = np.stack([record.wrench[..., :3], record.wrench[..., 3:]], axis=1)
-        pressed = np.zeros((len(times), 0, 3)) if found.pressed is None else found.pressed
+        pressed = np.zeros((len(times), 0, 3)) if motion.pressed is None else motion.pressed
         dataset = columns(element, record.placed(element.mechanism), wrench, pressed, record.named).dataset()
         points = [point.name for point in element.mechanism.points]
         of_contacts = {
@@ -78,25 +78,25 @@ class MechanismTruth:
             if field is None and str(name).rpartition(".")[0] in points:
                 field = "points"
             size = float(np.nanmax(np.abs(variable.to_numpy()), initial=0.0))
-            bar = _bar_of_a_law(str(name), element, found.bars)
+            bar = _bar_of_a_law(str(name), element, motion.bars)
             if field is not None:
-                bar = float(found.bars[field][-1])
+                bar = float(motion.bars[field][-1])
             variable.attrs["error_bar"] = 4 * np.finfo(float).eps * size if bar is None else bar
-        dataset.attrs["route"], *others = found.routes
+        dataset.attrs["route"], *others = motion.routes
         dataset.attrs["second_route"] = ", ".join(others)
-        if found.checked_by is not None:
-            dataset.attrs["second_route"] += f", {found.checked_by[0]}"
-        said = [branching(found.branches)]
-        if np.isfinite(found.horizon):
-            dataset.attrs["horizon"] = found.horizon
-            said.append(f"from {found.horizon:.4g} s on {found.reason}")
-        if any(said):
-            dataset.attrs["ill_posed"] = "; ".join(filter(None, said))
-        return with_events(dataset, found.events) if found.events or element.mechanism.contacts else dataset
+        if motion.checked_by is not None:
+            dataset.attrs["second_route"] += f", {motion.checked_by[0]}"
+        notes = [branching(motion.branches)]
+        if np.isfinite(motion.horizon):
+            dataset.attrs["horizon"] = motion.horizon
+            notes.append(f"from {motion.horizon:.4g} s on {motion.reason}")
+        if any(notes):
+            dataset.attrs["ill_posed"] = "; ".join(filter(None, notes))
+        return with_events(dataset, motion.events) if motion.events or element.mechanism.contacts else dataset
 
 
 def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr.Dataset:
-    """Truth of a motion that is not unique: zero for what breaks no law, and nothing else is known."""
+    """Dataset for a motion that is not unique: zero for residuals of the laws, NaN for everything else."""
     mechanism, count = element.mechanism, len(times)
     resting = Placed(mechanism, times, *(np.repeat(getattr(element.start, name), count, axis=0) for name in _POSES))
     wrench, pressed = np.zeros((count, 2, len(mechanism.connections), 3)), np.zeros((count, len(mechanism.contacts), 3))
@@ -111,11 +111,11 @@ def _laws_alone(element: MechanismElement, times: FloatArray, reason: str) -> xr
 
 
 def _bar_of_a_law(name: str, element: MechanismElement, bars: Mapping[str, FloatArray]) -> float | None:
-    """Error bar of a residual that is made of several fields; None: of any other variable."""
+    """Error bar of a residual that combines several fields; None for any other variable."""
     mass = sum(body.mass for body in element.mechanism.bodies)
     place, velocity, force = (float(bars[field][-1]) if field in bars else 0.0 for field in ("p_WB", "v_WB", "pressed"))
     match name:
-        case "friction_direction":  # of what hardly presses and hardly slides
+        case "friction_direction":  # large for contacts that hardly press or slide
             return force / (PRESSES * element.force) + velocity / (SLIDES * element.speed)
         case "natural_map":
             return force + velocity * element.force / element.speed

@@ -1,4 +1,4 @@
-"""Poses on the way at which the rows of loops lose rank: there the motion may branch, and no error control passes."""
+"""Singular poses along a motion: the rows of loops lose rank, and the motion may branch, unseen by error control."""
 
 from collections.abc import Iterable
 
@@ -10,14 +10,14 @@ from proofroll.elements.mechanism.model import Mechanism
 from proofroll.elements.mechanism.rotations import Array
 from proofroll.truth.mechanism.closed_forms import ClosedForm
 
-_TURN = 0.02  # rad or m of the fastest coordinate between two poses of a closed form
-_FEW, _MOST = 50, 20_000  # poses
+_TURN = 0.02  # step between poses of a closed form, rad or m of the fastest coordinate
+_FEW, _MOST = 50, 20_000  # limits of the number of poses
 
 
 def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> list[float]:
-    """Times, s, good to a fraction of the step, at which the rows of the loops lose rank.
+    """Times, s, at which the rows of the loops lose rank, accurate to a fraction of the step, s.
 
-    The motion until then, s, goes in steps of Runge-Kutta 4 with a fixed rank, which pass such poses.
+    The motion until ``until``, s, is integrated by Runge-Kutta 4 with a fixed rank, which passes singular poses.
     """
     if not mechanism.loops:
         return []
@@ -27,7 +27,7 @@ def singular_poses(mechanism: Mechanism, until: float, step: float = 5e-3) -> li
 
 
 def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: float) -> list[float]:
-    """The same along a motion in closed form until a time, s."""
+    """Times, s, of singular poses along a motion in closed form until ``until``, s."""
     if not equations.mechanism.loops or form.motion is None or not until:
         return []
     fastest = float(np.abs(form.motion(np.linspace(0.0, until, _FEW))[1]).max())
@@ -36,18 +36,18 @@ def singular_poses_of(form: ClosedForm, equations: JointCoordinates, until: floa
 
 
 def branching(times: list[float]) -> str:
-    """A clause about singular poses; empty where there are none."""
+    """Clause about the times of singular poses, s; empty without any."""
     where = ", ".join(f"{time:.4g}" for time in times[:3]) + (", …" if len(times) > 3 else "")
     at = f"near t = {where} s the rows of the loops lose rank, where the motion may branch: lengths that differ by "
     return at + "any amount lead elsewhere" if times else ""
 
 
 def _passed(equations: JointCoordinates, times: Array, poses: Iterable[Array]) -> list[float]:
-    sign, found, before = RowSign(equations.rank), [], 0.0
+    sign, times_passed, before = RowSign(equations.rank), [], 0.0
     for k, q in enumerate(poses):
         C = equations.rows(q).C
         smallest = float(singular_values(C)[equations.rank - 1])
-        if sign.changes(C):  # a line through both values, of which one has the other sign
-            found.append(float(times[k - 1] + (times[k] - times[k - 1]) * before / (before + smallest)))
+        if sign.changes(C):  # zero of the line through both values, with opposite signs
+            times_passed.append(float(times[k - 1] + (times[k] - times[k - 1]) * before / (before + smallest)))
         before = smallest
-    return found
+    return times_passed

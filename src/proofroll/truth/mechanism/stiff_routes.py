@@ -1,7 +1,8 @@
-"""Both routes by implicit collocation, where dampers settle so fast that explicit steps only keep them stable.
+"""Both routes by implicit collocation, for dampers so stiff that stability limits explicit steps.
 
 Stiffness is measured at the start, see :func:`stiff`. Route 1 has the equations in joint coordinates, route 2 those of
-:mod:`.maximal_equations`, compiled where heyoka is. Their steps have different tolerances, so that errors differ too.
+:mod:`.maximal_equations`, compiled if heyoka is installed. Their steps have different tolerances, so that their errors
+differ too.
 """
 
 from collections.abc import Callable
@@ -20,21 +21,22 @@ from proofroll.truth.mechanism.maximal_coordinates import BESIDE, MaximalCoordin
 from proofroll.truth.mechanism.maximal_taylor import compiled_rates
 from proofroll.truth.mechanism.natural_units import natural_units
 
-# Time constants of a damper in a run: DOP853, stable to six of them in a step, makes a hundred steps and more for
-# stability alone, and the noise of accelerations makes them shorter still.
+# Time constants of a damper per run above which it may be stiff. DOP853 is stable up to six of them per step, so it
+# makes at least a hundred steps for stability alone, and more due to the noise of accelerations.
 _CONSTANTS = 600
-_FASTER = 30.0  # than the fastest swing, which any method has to follow
-_NEAR = 1e-7  # m, 1, and per s, in natural units: what columns of Jacobians are differences of
-_FURTHER = 1.5  # the last step's polynomial guesses a step at most this much longer
+_FASTER = 30.0  # ratio to the fastest swing, which any method has to resolve
+_NEAR = 1e-7  # step of finite differences for Jacobians: m, 1, and per s, in natural units
+_FURTHER = 1.5  # how much longer a step may be for the last step's polynomial to be its first guess
 _TOLERANCES = 1e-14, 1e-11, 3e-14  # of two runs of route 1, and of route 2
 
 
 class StiffRuns(NamedTuple):
-    """Motions at the same times: of route 2, and of route 1 with two tolerances, the better one last.
+    """Motions at the same times: route 2, and route 1 with two tolerances.
 
     Attributes:
-        other, coarse, precise: records.
-        growth: of the distance from a motion that starts beside this one, at each time.
+        other: record of route 2.
+        coarse, precise: records of route 1 with the larger and the smaller tolerance.
+        growth: growth of the distance to a neighbouring motion at each time [1].
     """
 
     other: Record
@@ -57,7 +59,7 @@ def stiff(equations: JointCoordinates, until: float) -> bool:
 
 
 def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
-    """Both routes at growing times [s], in natural units on the way.
+    """Motions by both routes at rising times [s], computed in natural units.
 
     Raises:
         Diverged: no step is small enough, or one passes a singular pose.
@@ -85,7 +87,7 @@ def run_stiff(mechanism: Mechanism, rank: int, times: Array) -> StiffRuns:
 
 
 def _rates(lean: NumericEquations) -> Callable[[Array], Array]:
-    """Rates of route 2 for states with their time behind them, compiled where that can be."""
+    """Rates of route 2 for states with the time as last column, compiled if heyoka is installed."""
     try:
         return compiled_rates(lean.equations, lean.independent_rows())
     except Missing:
@@ -93,7 +95,7 @@ def _rates(lean: NumericEquations) -> Callable[[Array], Array]:
 
 
 def _jacobian(rates: Callable[[Array], Array], states: Array) -> Array:
-    """Derivatives of rates of states, (stages, n) -> (stages, n, n); seven digits are many for Newton's method."""
+    """Jacobians of the rates, (stages, n) -> (stages, n, n): seven digits suffice for Newton's method."""
     stages, n = states.shape
     near = (states[:, None] + _NEAR * np.concatenate([np.zeros((1, n)), np.eye(n)])).reshape(-1, n)
     found = rates(near).reshape(stages, n + 1, -1)
@@ -107,7 +109,7 @@ def _collocated(
     tolerance: float,
     corrected: Callable[[Array], Array],
 ) -> Array:
-    """States at growing times from a state at time 0; ``rates`` are those of states with the time behind them."""
+    """States at rising times from a state at time 0; ``rates`` takes states with the time as last column."""
 
     def with_time(y: Array) -> Array:
         return np.column_stack([rates(y), np.ones(len(y))])
@@ -136,7 +138,7 @@ def _collocated(
 
 
 def _guess(system: System, last: Step | None, now: float, state: Array, length: float) -> Array:
-    """States at the nodes of a step: the last step's polynomial, or a tangent."""
+    """Guess of the states at the nodes of a step: the last step's polynomial, or a tangent."""
     if last is None or length > _FURTHER * last.length:
         return np.asarray(state + nodes(length)[:, None] * system.rates(state[None]))
     return last(now + nodes(length))

@@ -1,4 +1,4 @@
-"""Stretches of a mechanism in one mode, as all of its routes integrate them: by DOP853 to the first guard."""
+"""Stretches of a mechanism in one mode, integrated by DOP853 to the first guard in all routes."""
 
 import math
 from abc import ABC, abstractmethod
@@ -23,7 +23,7 @@ class StretchLaw(NamedTuple):
     Attributes:
         rates: right-hand side.
         guards: values that are negative while the mode lasts, shape (guards,).
-        corrected: puts a state back on its constraints.
+        corrected: projects a state onto its constraints.
         noise: round-off of the guards at the start, shape (guards,).
     """
 
@@ -34,7 +34,7 @@ class StretchLaw(NamedTuple):
 
 
 class Stretches(ABC, Generic[ModeT]):
-    """Integration that routes share, without equations. See :class:`proofroll.truth.hybrid.HybridRoute`."""
+    """Integration that routes share, without equations; see :class:`proofroll.truth.hybrid.HybridRoute`."""
 
     def __init__(self, size: int, tolerance: float) -> None:
         """Takes the length of a state, and the tolerance of each step."""
@@ -44,18 +44,20 @@ class Stretches(ABC, Generic[ModeT]):
 
     @abstractmethod
     def _law(self, state: Array, mode: ModeT) -> StretchLaw:
-        """Equations of a stretch that begins at a state."""
+        """Equations of a stretch that starts at a state."""
 
     @staticmethod
     def _bouncing(rebound: float, pull: float, restitution: float, falling: float | None = None) -> float:
-        """Time until the rebounds after one of this speed are over; friction makes ``falling`` less than the ``pull``.
+        """Time until the rebounds are over [s], from the speed ``rebound`` of the first and the decelerations.
+
+        ``pull``: on the way out; ``falling``: on the way back, less by friction (None: the same).
 
         Raises:
-            Refused: nothing pulls back.
+            Refused: nothing pulls the body back.
         """
         if not pull > 0:
             raise Refused("a rebound is slower than routes follow, and nothing pulls it back")
-        slower = 1.0 if falling is None else math.sqrt(falling / pull)  # speed of the next impact over the rebound's
+        slower = 1.0 if falling is None else math.sqrt(falling / pull)  # impact speed over rebound speed
         return (1 + (1 / slower if slower else 0.0)) * rebound / (pull * (1 - restitution * slower))
 
     def walk(self, time: float, state: Array, mode: ModeT, until: float) -> Stretch[ModeT]:

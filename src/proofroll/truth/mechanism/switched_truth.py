@@ -1,4 +1,4 @@
-"""The truth of a mechanism that switches (friction, stops, limits), by two routes that share the finder of guards."""
+"""Truth of a mechanism with friction, stops or effort limits, by two routes that share the root finder of guards."""
 
 from dataclasses import replace
 
@@ -19,17 +19,18 @@ from proofroll.truth.mechanism.natural_units import Units, natural_units
 from proofroll.truth.mechanism.two_paths import CLOSE, TOLERANCES, refuse_uncovered, two_route_motion
 from proofroll.truth.mechanism.two_routes import TwoRouteMotion, check_start, find_truth, matched
 
-# rad, natural lengths, or part of a limit by which a stop or a limit must be passed to act; more than the look ahead is
-# wrong by
+# rad, natural lengths, or part of a limit: how far a stop or a limit must be exceeded to act; more than the error of
+# the scouting run
 _GRAZED = 1e-8
-_SCOUT = 1e-9  # of a look ahead: whether any stop is reached
+_SCOUT = 1e-9  # tolerance of a scouting run, which finds out if any stop is reached
 
 
 def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
-    """The truth at growing times [s], whatever switches on the way.
+    """Truth at rising times [s] of any mechanism, switching or not.
 
     Raises:
         Refused: fewer than two routes cover the mechanism; the text says why.
+        NotUnique: the laws of contact leave more than one motion, or none.
     """
     times = np.asarray(times, dtype=float)
     try:
@@ -39,7 +40,7 @@ def truth_of(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 
 
 def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
-    """Simplest truth that follows what switches on the way, if anything does."""
+    """Truth of a mechanism without contacts, by the simplest method that covers its switching."""
     equations, kinks = JointCoordinates(mechanism), breaks(mechanism.signals)
     if not (equations.switches or kinks) or mechanism.unmodelled:
         return find_truth(mechanism, times)
@@ -48,7 +49,7 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
     if not kinks and not any(joint.friction for joint in equations.switched):
         scout = SwitchedTree(JointCoordinates(_wider(own)), _SCOUT)
         begun = scout.begin()
-        assert begun.mode is not None  # every start has one
+        assert begun.mode is not None  # every start has a mode
         with units.said_in_seconds():
             look = scout.walk(0.0, begun.state, begun.mode, float(times[-1]) / units.time)
         if look.guard is None and not any(own in {"least", "greatest"} for own in look.mode):
@@ -59,12 +60,12 @@ def _without_contacts(mechanism: Mechanism, times: Array) -> TwoRouteMotion:
 
 
 def _unlimited(mechanism: Mechanism) -> Mechanism:
-    """The mechanism without limits of efforts."""
+    """Mechanism without effort limits."""
     return replace(mechanism, actuators=tuple(replace(actuator, limit=None) for actuator in mechanism.actuators))
 
 
 def _wider(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with its stops and limits a little further off: what just comes to one does not pass it."""
+    """Mechanism with its stops and limits a little wider, so that merely touching one does not pass it."""
     joints = (
         replace(joint, limits=(joint.limits[0] - _GRAZED, joint.limits[1] + _GRAZED)) if joint.limits else joint
         for joint in mechanism.joints
@@ -77,7 +78,7 @@ def _wider(mechanism: Mechanism) -> Mechanism:
 
 
 def _switched(mechanism: Mechanism, units: Units, own: Mechanism, times: Array) -> TwoRouteMotion:
-    """The truth at times in natural units, by routes of the mechanism in these units, its ``own``."""
+    """Truth at times in natural units; ``own`` is the mechanism in these units."""
     equations, second = JointCoordinates(own), MaximalCoordinates(own)
     check_start(equations, second, units.length)
     tree, bodies = (

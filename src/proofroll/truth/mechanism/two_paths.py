@@ -1,4 +1,4 @@
-"""The truth of a mechanism that switches, from the paths of two routes: where they part, events, error bars."""
+"""Truth of a mechanism that switches, from the paths of two routes: horizon, events, error bars."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -17,20 +17,20 @@ from proofroll.truth.hybrid import HybridPath, Stretch, first_close
 from proofroll.truth.mechanism.natural_units import Units
 from proofroll.truth.mechanism.two_routes import JUDGED, ROUND_OFF, TwoRouteMotion, judged, largest, round_off
 
-# Of each step of the two routes, in natural units. With one tolerance their steps, and errors with them, are nearly
-# the same, which a difference does not show: three free bodies of twelve were 1.7 times their bars off.
+# Tolerances of each step of the two routes, in natural units. With equal tolerances their steps, and so their errors,
+# are nearly equal, and the difference hides them: three free bodies of twelve were 1.7 times their bars off.
 TOLERANCES = 1e-14, 3e-14
-# Of the forces in play: nearer to another outcome, a decision hangs on less than parameters are known to.
+# Relative margin of a decision below which uncertainties of the parameters may change it.
 CLOSE = 1e-9
 
 Path = HybridPath[Stretch[Any]]
 
 
 def refuse_uncovered(mechanism: Mechanism) -> None:
-    """Refuses what no route follows from its start on.
+    """Refuses mechanisms that no route follows from the start.
 
     Raises:
-        Refused: the mechanism has parts that no route has, or starts in a singular pose.
+        Refused: the mechanism has parts that no route models, or starts in a singular pose.
     """
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
@@ -50,18 +50,18 @@ def two_route_motion(
     kinds: Callable[[Any], Any] = lambda mode: mode,
     pressed: tuple[Array, Array] | None = None,
 ) -> TwoRouteMotion:
-    """The motion with its error bars.
+    """Motion with error bars, from the paths and records of two routes.
 
     Args:
-        mechanism: bodies and joints.
-        paths: of both routes, in their own units.
-        one: record of the first, which is taken to be true, in SI units as all that follows.
-        two: of the second, matched to it.
+        mechanism: bodies and joints, in SI units.
+        paths: of both routes, in natural units.
+        one: record of the first route, taken as the truth, in SI units.
+        two: record of the second, matched to the first, in SI units.
         routes: their names.
-        reason: cause for which the question is ill-posed from the horizon on; empty: it is not.
-        units: those of the paths.
-        kinds: part of a mode that both routes agree on.
-        pressed: forces of contacts by both routes, (times, contacts, 3).
+        reason: cause why the question is ill-posed from the horizon on.
+        units: natural units of the paths.
+        kinds: part of a mode in which both routes must agree.
+        pressed: contact forces by both routes [N], (times, contacts, 3).
     """
     parted, determinate = _parted(*paths, kinds) * units.time, analysed(mechanism).determinate
     masked = replace(one, wrench=np.where(determinate, one.wrench, np.nan))
@@ -83,7 +83,7 @@ def two_route_motion(
 
 
 def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, float]:
-    """Error that the tolerance of one step allows in each field: routes agree to less than that by chance alone."""
+    """Error in each field that the tolerance of one step allows: closer agreement of the routes is chance."""
     ones = {name: np.ones_like(getattr(record, name)[:1]) for name in JUDGED}
     natural = units.record(mechanism, replace(record, time=record.time[:1], residual=record.residual[:1], **ones))
     sizes = {name: float(largest(getattr(natural, name))[0]) for name in ones}
@@ -94,7 +94,7 @@ def _of_a_step(mechanism: Mechanism, record: Record, units: Units) -> dict[str, 
 def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
     """Start of the first leg in which the two routes are in different modes [s]; inf: there is none.
 
-    What happens at one instant may come in either order; where that matters, the margin of a decision says it.
+    Changes at the same instant may come in either order; if that order matters, the margin of a decision is small.
     """
     left = [list(path.legs) for path in (one, two)]
     while all(left):
@@ -109,19 +109,19 @@ def _parted(one: Path, two: Path, kinds: Callable[[Any], Any]) -> float:
 
 
 def _instant(leg: Stretch[Any]) -> bool:
-    """True if a leg is shorter than times are known to."""
+    """True if a leg is shorter than the accuracy of times."""
     return bool(leg.end - leg.start <= moment(leg.end))
 
 
 def moment(time: float) -> float:
-    """Part of the time that has passed which is less than times are known to; at the start of the unit of time."""
+    """Accuracy of event times, in natural units: relative to the time, at least to the unit of time."""
     return CLOSE * max(1.0, time)
 
 
 def _events(one: Path, two: Path, unit: float) -> Sequence[Event]:
-    """The changes of both routes, each with a bracket that holds both times, round-off and blur; ``unit`` [s]."""
-    found = []
-    for a, b in zip(one.happenings, two.happenings, strict=False):  # beyond where they part there may be more of one
+    """Events of both routes, each with a bracket that contains both times, round-off and blur; ``unit`` [s]."""
+    events = []
+    for a, b in zip(one.happenings, two.happenings, strict=False):  # one route may have more events after they part
         time, wide = unit * float(a.time), unit * (SAFETY * abs(a.time - b.time) + ROUND_OFF * a.time + a.blur)
-        found.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
-    return tuple(found)
+        events.append(Event(a.kind, time, float(time - wide), float(time + wide), a.name))
+    return tuple(events)

@@ -1,9 +1,9 @@
-"""The truth of a mechanism's motion: two routes that share no kinematics, their difference as an error bar.
+"""Truth of a mechanism's motion: two routes that share no kinematics, with their difference as an error bar.
 
 Routes: joint coordinates (DOP853 with projection), maximal coordinates (Taylor series in doubles and in long doubles;
-DOP853 without heyoka), both by implicit collocation where dampers are stiff, and closed forms where there are any. The
-best of them is the truth, the others are its error bar. Where a start moved by :data:`NUDGE` leads farther away than
-:data:`CHAOS`, the question is ill-posed; that time is the horizon.
+DOP853 without heyoka), both by implicit collocation if dampers are stiff, and closed forms if known. The best of them
+is the truth, the others give its error bar. If a start displaced by :data:`NUDGE` leads farther away than
+:data:`CHAOS`, the question is ill-posed; the time of that is the horizon.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,33 +27,33 @@ from proofroll.truth.mechanism.maximal_coordinates import MaximalCoordinates
 from proofroll.truth.mechanism.singular_poses import branching, singular_poses, singular_poses_of
 from proofroll.truth.mechanism.stiff_routes import run_stiff, stiff
 
-CHAOS = 1e-9  # m, 1 (of quaternions): where motions that nobody can tell apart at the start differ by more
-NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: no scene file can say less
-BRANCH = 1e-3  # m, 1: chaos brings DOP853 this far only long after the horizon
-SAME_START = 1e-9  # m, 1: round-off of places leaves 1e-15 of them, a wrong formula much more
-AT_LIMIT = 1e-9  # rad, m: a joint that swings to its very limit passes it by round-off, 1e-14
-ROUND_OFF = 16 * float(np.finfo(float).eps)  # of a number that passed through some ten operations
+CHAOS = 1e-9  # m, 1 (quaternions): a larger distance between motions with indistinguishable starts is chaos
+NUDGE = float(np.finfo(float).eps)  # m, rad, part of velocities: the smallest difference that a scene file can express
+BRANCH = 1e-3  # m, 1: distance between routes that chaos causes only long after the horizon
+SAME_START = 1e-9  # m, 1: round-off of positions is 1e-15 of them, the error of a wrong formula far larger
+AT_LIMIT = 1e-9  # rad, m: a joint that swings exactly to its limit exceeds it by round-off, 1e-14
+ROUND_OFF = 16 * float(np.finfo(float).eps)  # relative round-off after some ten operations
 JUDGED = ("p_WB", "v_WB", "q_WB", "w_WB", "q", "v", "wrench", "named")
 
 
 @dataclass(frozen=True)
 class TwoRouteMotion:
-    """The motion that is taken to be true, and how well it is known.
+    """Motion taken as the truth, with its accuracy.
 
     Attributes:
-        record: the motion; from the first time at which the question is ill-posed on, its bars say so.
-        bars: error bar of each field of the record, of ``points``, ``energy`` and ``drift`` at each time, the largest
-            over bodies and components so far, in the field's unit, (times).
+        record: the motion; after the horizon its error bars are large.
+        bars: error bar of each field of the record, of ``points``, ``energy`` and ``drift`` at each time: the
+            largest over bodies, components and earlier times, in the field's unit, (times).
         differences: largest difference between the two routes, by field, up to the horizon.
-        horizon: s; inf where it lies beyond the last time.
-        branches: times, s, at which the motion, known in closed form, passes singular poses of its loops.
+        horizon: time from which the question is ill-posed, s; inf: after the last time.
+        branches: times, s, at which a motion known in closed form passes singular poses of its loops.
         determinate: mask of determinate components of the wrenches, (joints + loops, 6).
-        routes: computed motions, the one taken first.
-        checked_by: a closed form that knows a part of the motion, and its largest difference from the truth.
-        events: switches on the way.
-        reason: cause for which the question is ill-posed from the horizon on.
-        pressed: forces of contacts on their first bodies [N], (times, contacts, 3), NaN where they are not determinate;
-            None: there are no contacts.
+        routes: names of the routes, the one of the record first.
+        checked_by: title of a closed form for a part of the motion, and its largest difference from the record.
+        events: switches along the motion.
+        reason: cause why the question is ill-posed from the horizon on.
+        pressed: contact forces on the first bodies [N], (times, contacts, 3), NaN where not determinate; None: no
+            contacts.
     """
 
     record: Record
@@ -70,7 +70,7 @@ class TwoRouteMotion:
 
 
 def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> TwoRouteMotion:
-    """Truth at growing times, s, the first may be 0; ``tolerance`` is DOP853's.
+    """Truth at rising times, s; the first may be 0. ``tolerance`` is DOP853's.
 
     Raises:
         Refused: fewer than two routes cover the mechanism; the text says why.
@@ -78,10 +78,10 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     if mechanism.unmodelled:
         raise Refused(f"no route of the truth has {', '.join(mechanism.unmodelled)}")
     times = np.asarray(times, dtype=float)
-    found, form = analysed(mechanism), closed_form(mechanism)
-    first = JointCoordinates(mechanism, found.rank)
+    analysis, form = analysed(mechanism), closed_form(mechanism)
+    first = JointCoordinates(mechanism, analysis.rank)
     exact = _from_form(first, form, times) if form is not None and form.motion is not None else None
-    if exact is None and found.singular_start:
+    if exact is None and analysis.singular_start:
         raise Refused("the start is a singular pose, where the motion may branch, and no closed form is known")
     try:
         second = MaximalCoordinates(mechanism)
@@ -99,7 +99,7 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
     if exact is not None and form is not None:
         routes = (f"closed form: {form.title}", *routes)
     _check_limits(mechanism, best)
-    masked = replace(best, wrench=np.where(found.determinate, best.wrench, np.nan))
+    masked = replace(best, wrench=np.where(analysis.determinate, best.wrench, np.nan))
     placed, fields = masked.placed(mechanism), judged(mechanism, masked)
     bars, differences, least = {}, {}, round_off(fields, placed)
     late = np.flatnonzero(chaotic)
@@ -111,29 +111,29 @@ def find_truth(mechanism: Mechanism, times: Array, tolerance: float = 1e-15) -> 
         bar = SAFETY * difference + largest(others[1] - others[2]) + least[field]
         bars[field] = np.maximum.accumulate(bar)
         differences[field] = float(difference[times < horizon].max(initial=0.0))
-    # nothing is open in truth: all that is seen is error, and round-off of places and of cosines
+    # the true drift is zero: all drift is error; plus round-off of positions and cosines
     of_places = ROUND_OFF * np.maximum(1.0, np.maximum(largest(placed.p_WB), largest(placed.points)))
     bars["drift"] = np.maximum.accumulate(placed.drift() + of_places)
     checked = None
     if form is not None and form.motion is None:
         checked = (form.title, float(largest(form.part(times) - form.same(best)).max()))
     branches = [] if exact is None or form is None else singular_poses_of(form, first, float(times[-1]))
-    return TwoRouteMotion(masked, bars, differences, horizon, branches, found.determinate, routes, checked)
+    return TwoRouteMotion(masked, bars, differences, horizon, branches, analysis.determinate, routes, checked)
 
 
 def _runs(
     first: JointCoordinates, second: MaximalCoordinates, times: Array, tolerance: float
 ) -> tuple[Record, Record, Record, Array, tuple[str, ...]]:
-    """Three records, the best one last, growth of a small difference, and the names of routes."""
+    """Three records, the best one last, growth of a small difference [1], and the names of the routes."""
     mechanism = first.mechanism
     refuse_switching(mechanism)
     if stiff(first, float(times[-1])):
-        found = run_stiff(mechanism, first.rank, times)
+        runs = run_stiff(mechanism, first.rank, times)
         names = "joint coordinates, implicit collocation", "maximal coordinates, implicit collocation"
-        return matched(mechanism, found.precise, found.other), found.coarse, found.precise, found.growth, names
+        return matched(mechanism, runs.precise, runs.other), runs.coarse, runs.precise, runs.growth, names
     one = first.run(times, tolerance)
     two, precise, name = _second(second, times, tolerance)
-    # route 1 alone counts turns; all others are put on its
+    # route 1 alone counts turns; angles of the others are put on the same turns
     two, precise = matched(mechanism, one, two), matched(mechanism, one, precise)
     return one, two, precise, second.growth(times), (name, "joint coordinates, DOP853")
 
@@ -141,33 +141,33 @@ def _runs(
 def judged(mechanism: Mechanism, record: Record) -> dict[str, Array]:
     """Fields with an error bar: those of the record, and tracked points and energy, which follow from the poses."""
     placed = record.placed(mechanism)
-    found = {name: getattr(record, name) for name in JUDGED}
-    return found | {"points": placed.points, "energy": placed.energy()}
+    fields = {name: getattr(record, name) for name in JUDGED}
+    return fields | {"points": placed.points, "energy": placed.energy()}
 
 
 def round_off(fields: Mapping[str, Array], placed: Placed) -> dict[str, Array]:
-    """Round-off of fields at each time, by the largest value so far; of energy by its parts, which may take away."""
+    """Round-off of fields at each time, from the largest value so far; of energy from its parts, which may cancel."""
     sizes = {name: largest(values) for name, values in fields.items()}
     sizes["energy"] = np.abs(placed.energies()).sum(axis=-1)
     return {name: ROUND_OFF * np.maximum.accumulate(size) for name, size in sizes.items()}
 
 
 def _singular(mechanism: Mechanism, until: float) -> str:
-    """Clause on singular poses on the way; empty where none is found."""
+    """Clause on singular poses before ``until``, s; empty without any."""
     try:
-        found = branching(singular_poses(mechanism, until, min(5e-3, until / 200)))
-    except np.linalg.LinAlgError:  # steps of that size do not follow the motion
-        found = ""
-    return f" ({found})" if found else ""
+        clause = branching(singular_poses(mechanism, until, min(5e-3, until / 200)))
+    except np.linalg.LinAlgError:  # the step is too large for the motion
+        clause = ""
+    return f" ({clause})" if clause else ""
 
 
 def _apart(one: Record, two: Record) -> Array:
-    """Largest difference of two motions at each time, m and 1."""
+    """Largest difference of two motions at each time, in positions [m] and quaternions [1]."""
     return np.maximum(largest(one.p_WB - two.p_WB), largest(one.q_WB - two.q_WB))
 
 
 def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float = 1.0) -> None:
-    """Both routes place all bodies alike before anything has moved; only their formulas decide that.
+    """Checks that both routes place all bodies alike at the start, where only their formulas matter.
 
     Lengths of the routes are in a ``unit`` [m].
 
@@ -186,17 +186,21 @@ def check_start(first: JointCoordinates, second: MaximalCoordinates, unit: float
 
 
 def _check_branch(one: Record, precise: Record, chaotic: NDArray[np.bool_]) -> None:
-    """Raises Diverged if two routes part without chaos, for then they have taken different branches."""
+    """Checks that two routes do not part without chaos.
+
+    Raises:
+        Diverged: they do, so they have taken different branches.
+    """
     parted = np.flatnonzero((_apart(one, precise) > BRANCH) & ~chaotic)
     if len(parted):
         raise Diverged(f"the two routes part before t = {one.time[parted[0]]:.6g} s, as at a singular pose")
 
 
 def _check_limits(mechanism: Mechanism, record: Record) -> None:
-    """No joint leaves its limits but for round-off, as one that swings back to where it started; none follows a stop.
+    """Checks that no joint exceeds its limits beyond round-off, as these routes do not follow stops.
 
     Raises:
-        Refused: one does.
+        Refused: a joint does.
     """
     for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
         if joint.limits is not None:
@@ -228,7 +232,7 @@ def _second(route: MaximalCoordinates, times: Array, tolerance: float) -> tuple[
 
 
 def matched(mechanism: Mechanism, guide: Record, other: Record) -> Record:
-    """The other record with quaternions of the same sign and angles on the same turn as the guide's."""
+    """Record with quaternions of the same sign and angles on the same turn as in ``guide``."""
     q_WB = _same_sign(guide.q_WB, other.q_WB)
     q = other.q.copy()
     for joint, at in zip(mechanism.joints, mechanism.q_slices, strict=True):
@@ -246,6 +250,6 @@ def _same_sign(best: Array, other: Array) -> Array:
 
 
 def largest(values: Array) -> Array:
-    """Largest size at each time, of what is known."""
+    """Largest absolute value at each time, without NaN, (times)."""
     flat = np.abs(values.reshape(len(values), -1))
     return np.asarray(np.where(np.isnan(flat), 0.0, flat).max(axis=1, initial=0.0), dtype=np.float64)
